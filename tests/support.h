@@ -239,28 +239,6 @@ static inline double support_median(double *values, int count)
     return 0.5 * (values[(count - 1) / 2] + values[count / 2]);
 }
 
-/* Time of `work` in units of the time of `peer`: both run alternately `rounds` times (at most 64) after one warm-up
-   each, and the median of the ratios is returned, so that a slow spell of the machine hits both. */
-static inline double support_ratio(void (*work)(void *), void *work_user, void (*peer)(void *), void *peer_user,
-                                   int rounds)
-{
-    double ratios[64];
-    int i;
-    if (rounds < 1) rounds = 1;
-    if (rounds > 64) rounds = 64;
-    work(work_user);
-    peer(peer_user);
-    for (i = 0; i < rounds; ++i) {
-        double t0 = support_clock(), t1, t2;
-        work(work_user);
-        t1 = support_clock();
-        peer(peer_user);
-        t2 = support_clock();
-        ratios[i] = (t1 - t0) / (t2 - t1);
-    }
-    return support_median(ratios, rounds);
-}
-
 /* ---- pictures ---- */
 
 /* A smooth field over 14 decades (1e-6 .. 1e8) under mild noise, `channels` floats a pixel, rows packed; the same

@@ -1,0 +1,152 @@
+# lightscan: the headers need no build; this file builds examples, tests and reports. `make help` lists the targets.
+# Everything is found by name: sat.h plugs in tests/test_sat.c, tests/use_sat.c, tests/bench/bench_sat.c, ...
+# LIB=sat restricts a target to one header.
+
+all: examples
+.PHONY: all examples demo test bench report size check check-strict check-variants check-asan check-tsan \
+        check-analyze check-compilers fuzz data install dist web gpu-bench deps help clean \
+        run-tests run-demo run-bench
+.DELETE_ON_ERROR:
+.SUFFIXES:
+MAKEFLAGS += --no-builtin-rules
+
+# ---- what there is ---------------------------------------------------------------------------------------------
+
+FAMILY  := sat tonemap ssao_sat fiv raindrop softassign
+LIB     ?=
+PICK    := $(if $(LIB),$(LIB),$(FAMILY))
+HEADERS := $(wildcard $(PICK:=.h))
+LIBS    := $(HEADERS:.h=)
+
+CC      := $(if $(filter default,$(origin CC)),$(firstword $(foreach c,cc gcc clang tcc,$(if $(shell command -v $c),$c))),$(CC))
+CXX     := $(if $(filter default,$(origin CXX)),$(firstword $(foreach c,c++ g++ clang++,$(if $(shell command -v $c),$c))),$(CXX))
+HAVE_CXX:= $(if $(CXX),$(shell command -v $(CXX)))
+
+WERROR  ?= -Werror
+WARN    := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wcast-qual -Wundef $(WERROR)
+WARN_C  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
+OPT     ?= -O2
+CFLAGS  ?=
+DEFS    := -D_POSIX_C_SOURCE=200809L -I. -Itests -Iexamples
+LDLIBS  := -lm -lpthread -ldl
+
+# Optional packages; each gives flags only where its header is found.
+PKG     := $(shell command -v pkg-config)
+has      = $(shell printf '\#include <$(1)>\n' | $(CC) $(2) -E -x c - >/dev/null 2>&1 && echo 1)
+pkg      = $(if $(PKG),$(shell $(PKG) $(1) 2>/dev/null))
+EXR_INC := $(patsubst -I%,-isystem %,$(filter-out -I/usr/include,$(filter -I%,$(call pkg,--cflags OpenEXR))))
+ifeq ($(call has,openexr.h,$(EXR_INC)),1)
+EXR     := -DHAVE_OPENEXR $(EXR_INC)
+EXR_LIB := $(foreach l,$(call pkg,--libs OpenEXR),$(if $(findstring OpenEXRCore,$l),$l))
+endif
+ifeq ($(call has,stb/stb_image.h),1)
+STB     := -DHAVE_STB
+STB_LIB := $(call pkg,--libs stb)
+endif
+ifeq ($(shell echo 'int main(void){return 0;}' | $(CC) -fopenmp -x c - -o /dev/null >/dev/null 2>&1 && echo 1),1)
+OPENMP  := -fopenmp
+endif
+ifneq ($(call pkg,--exists glfw3 && echo 1),)
+GLFW    := $(call pkg,--cflags glfw3)
+GLFW_LIB:= $(call pkg,--libs glfw3)
+endif
+ifneq ($(call pkg,--exists opencv4 && echo 1),)
+OPENCV  := -DHAVE_OPENCV $(patsubst -I%,-isystem %,$(call pkg,--cflags opencv4))
+OPENCV_LIB := -lopencv_photo -lopencv_imgproc -lopencv_core
+endif
+ifeq ($(call has,embree3/rtcore.h),1)
+EMBREE  := -DHAVE_EMBREE
+EMBREE_LIB := -lembree3
+endif
+PICTURES     := $(EXR) $(STB) $(OPENMP)
+PICTURE_LIBS := $(EXR_LIB) $(STB_LIB)
+
+COMPILE_C   = $(CC) -std=c99 $(OPT) $(WARN_C) $(DEFS) $(CFLAGS) -MMD -MP
+COMPILE_CXX = $(CXX) -std=c++11 $(OPT) $(WARN) $(DEFS) $(CFLAGS) -MMD -MP
+
+# Missing packages are installed by the first `make demo` or `make test` that may do so; NO_DEPS=1 says no.
+deps: build/.deps
+build/.deps:
+	@mkdir -p build
+	@NO_DEPS='$(NO_DEPS)' sh tests/deps.sh $(if $(PKG),,pkg-config) $(if $(EXR),,libopenexr-dev) \
+	    $(if $(STB),,libstb-dev) libosmesa6
+	@touch $@
+
+# ---- examples --------------------------------------------------------------------------------------------------
+
+EXAMPLE_SOURCES := $(filter-out %_view.c,$(wildcard examples/*.c))
+VIEW_SOURCES    := $(if $(GLFW_LIB),$(wildcard examples/*_view.c))
+EXAMPLES := $(EXAMPLE_SOURCES:examples/%.c=build/%) $(VIEW_SOURCES:examples/%.c=build/%)
+examples: $(EXAMPLES)
+
+build/%_view: examples/%_view.c
+	@mkdir -p $(@D)
+	$(COMPILE_C) $(PICTURES) $(GLFW) $< -o $@ $(PICTURE_LIBS) $(GLFW_LIB) $(LDLIBS)
+build/%: examples/%.c
+	@mkdir -p $(@D)
+	$(COMPILE_C) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
+
+# make demo [IN=picture.exr] [ARGS='--gl ...']
+DEMO := $(patsubst examples/%.c,build/%,$(firstword $(wildcard examples/demo.c examples/tonemap.c)))
+demo: deps
+	@$(MAKE) --no-print-directory run-demo
+run-demo: $(DEMO)
+	@mkdir -p out
+	$(DEMO) $(ARGS) $(IN) $(if $(filter build/demo,$(DEMO)),--out )out/demo.png
+
+# ---- tests -----------------------------------------------------------------------------------------------------
+
+TEST_SOURCES := $(if $(LIB),$(wildcard tests/test_$(LIB).c tests/test_$(LIB).cpp tests/test_$(LIB)_*.c tests/test_$(LIB)_*.cpp),\
+                $(wildcard tests/test_*.c tests/test_*.cpp))
+TESTS_C      := $(filter %.c,$(TEST_SOURCES))
+TESTS_CXX    := $(if $(HAVE_CXX),$(filter %.cpp,$(TEST_SOURCES)))
+TESTS        := $(TESTS_C:tests/%.c=build/test/%_c) $(TESTS_CXX:tests/%.cpp=build/test/%_cpp)
+
+build/test/%_c: tests/%.c
+	@mkdir -p $(@D)
+	$(COMPILE_C) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
+build/test/%_cpp: tests/%.cpp
+	@mkdir -p $(@D)
+	$(COMPILE_CXX) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
+
+test: deps
+	@$(MAKE) --no-print-directory run-tests
+run-tests: $(TESTS)
+	$(if $(HAVE_CXX),,@echo "no C++ compiler (g++): the C++ twins of the tests are left out")
+	@TEST_ARGS='$(ARGS)' tests/run.sh $(TESTS)
+
+# ---- benchmarks and reports ------------------------------------------------------------------------------------
+
+BENCH_SOURCES := $(if $(LIB),$(wildcard tests/bench/bench_$(LIB).c tests/bench/bench_$(LIB).cpp),\
+                 $(wildcard tests/bench/bench_*.c tests/bench/bench_*.cpp))
+BENCHES       := $(patsubst tests/bench/bench_%.c,%,$(patsubst tests/bench/bench_%.cpp,%,$(BENCH_SOURCES)))
+PEERS         := $(OPENCV) $(EMBREE)
+
+build/bench/bench_%: tests/bench/bench_%.c
+	@mkdir -p $(@D)
+	$(COMPILE_C) -Itests/bench $(PICTURES) $(EMBREE) $< -o $@ $(PICTURE_LIBS) $(EMBREE_LIB) $(LDLIBS)
+build/bench/bench_%: tests/bench/bench_%.cpp
+	@mkdir -p $(@D)
+	$(COMPILE_CXX) -Itests/bench $(PICTURES) $(PEERS) $< -o $@ $(PICTURE_LIBS) $(OPENCV_LIB) $(EMBREE_LIB) $(LDLIBS)
+
+bench: $(BENCHES:%=out/bench/%.tsv)
+out/bench/%.tsv: build/bench/bench_% FORCE
+	@mkdir -p $(@D)
+	@QUICK='$(QUICK)' $< $(ARGS) >$@.part && mv $@.part $@ && cat $@
+.PHONY: FORCE
+FORCE:
+
+# ---- the rest --------------------------------------------------------------------------------------------------
+
+help:
+	@echo 'make demo      render the showcase to out/demo.png        [IN=picture.exr] [ARGS=...]'
+	@echo 'make test      run all tests                              [LIB=sat] [ARGS="-v word"]'
+	@echo 'make bench     error against run time, out/bench/*.tsv    [LIB=sat] [QUICK=1]'
+	@echo 'make examples  build all programs of examples/ into build/'
+	@echo 'make deps      install missing packages (Debian)'
+	@echo 'make clean     remove build/ and out/'
+
+clean:
+	rm -rf build out
+
+-include $(wildcard build/*.d build/*/*.d)

@@ -1,0 +1,151 @@
+/* bench.h - benchmark tables: error against run time, as tab-separated values.
+   SPDX-License-Identifier: MIT-0 OR Unlicense
+
+   A benchmark prints one or more tables on stdout; `make bench` keeps them in out/bench/<lib>.tsv, `make report` turns each into a
+   table and its plots. The form:
+
+       # table: Box sums against the exact ones           a title starts a table
+       # plot: Error against time; x=time_ratio; y=error; by=kind; log=xy     any number of plots of this table
+       # note: one sentence under the table
+       kind    size    time_ratio    error    default      the names of the columns, units in the name (_ms, _mb, _ratio)
+       tiled   64      1.02          3e-7     1            one row a configuration; default = 1 marks the default
+       (an empty line, or the next title, ends the table)
+
+   plot keys: x, y (columns), by (one curve or colour per value of this column), log (x, y, xy), style (points, lines; default points).
+   Times are ratios to a reference in the same run wherever the machine matters: bench_ratio runs A B A B ...
+
+       bench_start("sat.h");
+       bench_table("Box sums", "kind\ttime_ratio\terror\tdefault");
+       bench_plot("Error against time; x=time_ratio; y=error; log=xy");
+       bench_row("%s\t%.3g\t%.3g\t%d", "tiled", ratio, error, 1);
+
+   QUICK=1 in the environment asks for a short run: bench_quick(). */
+
+#ifndef BENCH_H
+#define BENCH_H
+
+#include <stdarg.h>
+#include "support.h"
+
+static inline int bench_quick(void)
+{
+    const char *quick = getenv("QUICK");
+    return quick && *quick && strcmp(quick, "0") != 0;
+}
+
+/* full rounds, or what a short run affords */
+static inline int bench_rounds(int full) { return bench_quick() ? (full > 5 ? 5 : full) : full; }
+
+/* Name of the processor, compiler and instruction set as a comment line. */
+static inline void bench_start(const char *header)
+{
+    char line[256] = "", *colon = NULL;
+    FILE *info = fopen("/proc/cpuinfo", "r");
+    while (info && fgets(line, sizeof line, info))
+        if (strncmp(line, "model name", 10) == 0 && (colon = strchr(line, ':')) != NULL) break;
+    if (info) fclose(info);
+    if (colon) colon[strcspn(colon, "\n")] = 0;
+    printf("# bench: %s\n# machine: %s; "
+#if defined(__clang__)
+           "clang " __clang_version__
+#elif defined(__GNUC__)
+           "gcc " __VERSION__
+#else
+           "unknown compiler"
+#endif
+#if defined(__AVX2__)
+           ", AVX2"
+#elif defined(__SSE2__)
+           ", SSE2"
+#elif defined(__ARM_NEON)
+           ", NEON"
+#endif
+           "\n", header, colon ? colon + 2 : "unknown processor");
+}
+
+/* Starts a table: title, and the names of the columns separated by tabs. Plots and notes may follow before the rows. */
+static const char *bench_columns;
+
+static inline void bench_table(const char *title, const char *columns)
+{
+    printf("\n# table: %s\n", title);
+    bench_columns = columns;
+}
+
+static inline void bench_plot(const char *plot) { printf("# plot: %s\n", plot); }
+static inline void bench_note(const char *note) { printf("# note: %s\n", note); }
+
+#if defined(__GNUC__)
+__attribute__((format(printf, 1, 2)))
+#endif
+static inline void bench_row(const char *format, ...)
+{
+    va_list arguments;
+    if (bench_columns) printf("%s\n", bench_columns);
+    bench_columns = NULL;
+    va_start(arguments, format);
+    vprintf(format, arguments);
+    va_end(arguments);
+    putchar('\n');
+    fflush(stdout);
+}
+
+/* A piece of work to be timed. */
+typedef void bench_fn(void *user);
+
+typedef struct bench_times {
+    double ratio;          /* median of time(work) / time(peer), run by run */
+    double work, peer;     /* median seconds of one call */
+} bench_times;
+
+/* Runs A B A B ... (`rounds` pairs, at most 64, after one warm-up each). A call shorter than a millisecond is repeated
+   inside the pair until it is not. */
+static inline bench_times bench_ratio(bench_fn *work, void *work_user, bench_fn *peer, void *peer_user, int rounds)
+{
+    double ratios[64], a[64], b[64], t0, t1, t2;
+    bench_times result;
+    int i, k, repeat[2] = {1, 1};
+    if (rounds < 1) rounds = 1;
+    if (rounds > 64) rounds = 64;
+    work(work_user);
+    peer(peer_user);
+    t0 = support_clock();
+    work(work_user);
+    t1 = support_clock();
+    peer(peer_user);
+    t2 = support_clock();
+    if (t1 - t0 < 1e-3) repeat[0] = 1 + (int)(1e-3 / (t1 - t0 + 1e-8));
+    if (t2 - t1 < 1e-3) repeat[1] = 1 + (int)(1e-3 / (t2 - t1 + 1e-8));
+    for (i = 0; i < rounds; ++i) {
+        t0 = support_clock();
+        for (k = 0; k < repeat[0]; ++k) work(work_user);
+        t1 = support_clock();
+        for (k = 0; k < repeat[1]; ++k) peer(peer_user);
+        t2 = support_clock();
+        a[i] = (t1 - t0) / repeat[0];
+        b[i] = (t2 - t1) / repeat[1];
+        ratios[i] = a[i] / b[i];
+    }
+    result.ratio = support_median(ratios, rounds);
+    result.work = support_median(a, rounds);
+    result.peer = support_median(b, rounds);
+    return result;
+}
+
+/* Median seconds of one call. */
+static inline double bench_time(bench_fn *work, void *user, int rounds)
+{
+    double t[64], start;
+    int i;
+    if (rounds < 1) rounds = 1;
+    if (rounds > 64) rounds = 64;
+    work(user);
+    for (i = 0; i < rounds; ++i) {
+        start = support_clock();
+        work(user);
+        t[i] = support_clock() - start;
+    }
+    return support_median(t, rounds);
+}
+
+#endif /* BENCH_H */

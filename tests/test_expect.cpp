@@ -1,0 +1,2 @@
+#include "expect.h"
+#include "test_expect.h"
