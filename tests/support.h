@@ -241,18 +241,18 @@ static inline double support_median(double *values, int count)
 
 /* ---- pictures ---- */
 
-/* A smooth field over 14 decades (1e-6 .. 1e8) under mild noise, `channels` floats a pixel, rows packed; the same
-   for the same seed. Alpha (channel 3) is 1. */
+/* A smooth field from 1e8 at the top to 1e-6 at the bottom under mild noise, `channels` floats a pixel, rows packed;
+   the same for the same seed. Alpha (channel 3) is 1. */
 static inline void support_hdr_image(float *pixels, int width, int height, int channels, uint64_t seed)
 {
     uint64_t state = seed;
-    double a = 6.28 * support_uniform(&state), b = 6.28 * support_uniform(&state);
+    double phase = 6.28 * support_uniform(&state);
     int x, y, c;
     for (y = 0; y < height; ++y) {
         for (x = 0; x < width; ++x) {
             double u = ((double)x + 0.5) / (double)width, v = ((double)y + 0.5) / (double)height;
-            double wave = 0.5 * sin(6.28 * u + a) * cos(3.14 * v + b) + 0.5 * sin(4.0 * (u + v) + b);
-            double light = pow(10.0, 1.0 + 7.0 * wave) * (1.0 + 0.2 * (support_uniform(&state) - 0.5));
+            double depth = 0.1 + 0.8 * v + 0.1 * sin(6.28 * u + phase);
+            double light = pow(10.0, 8.0 - 14.0 * depth) * (1.0 + 0.2 * (support_uniform(&state) - 0.5));
             for (c = 0; c < channels; ++c) {
                 double tint = c == 3 ? 1.0 : light * (1.0 + 0.3 * sin(6.28 * (u * (c + 1) + v)));
                 pixels[((size_t)y * (size_t)width + (size_t)x) * (size_t)channels + (size_t)c] = (float)tint;
