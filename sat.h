@@ -25,7 +25,7 @@
 /* SAT_STATIC makes every function private to the file; SAT_DEF replaces the linkage altogether. */
 #ifndef SAT_DEF
 #ifdef SAT_STATIC
-#define SAT_DEF static
+#define SAT_DEF static inline
 #else
 #define SAT_DEF extern
 #endif
@@ -511,8 +511,7 @@ static inline void sat__read_row(float *out, const sat_image *image, int y, int 
         for (i = 0; i < n; i++) out[i] = (float)p[(size_t)i * step];
         break;
     }
-    case SAT_F16:
-    default: {
+    case SAT_F16: {
         const uint16_t *p = (const uint16_t *)row + at;
         for (i = 0; i < n; i++) out[i] = sat__half_to_float(p[(size_t)i * step]);
         break;
