@@ -4,8 +4,7 @@
 
 all: examples
 .PHONY: all examples demo test bench report size check check-strict check-variants check-asan check-tsan \
-        check-analyze check-compilers fuzz data install dist web gpu-bench deps help clean \
-        run-tests run-demo run-bench
+        check-analyze check-compilers fuzz data install dist web gpu-bench deps help clean run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
@@ -27,6 +26,7 @@ WARN    := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdo
 WARN_C  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 OPT     ?= -O2
 CFLAGS  ?=
+B       ?= build
 DEFS    := -D_POSIX_C_SOURCE=200809L -I. -Itests -Iexamples
 LDLIBS  := -lm -lpthread -ldl
 
@@ -100,12 +100,12 @@ TEST_SOURCES := $(if $(LIB),$(wildcard tests/test_$(LIB).c tests/test_$(LIB).cpp
                 $(wildcard tests/test_*.c tests/test_*.cpp))
 TESTS_C      := $(filter %.c,$(TEST_SOURCES))
 TESTS_CXX    := $(if $(HAVE_CXX),$(filter %.cpp,$(TEST_SOURCES)))
-TESTS        := $(TESTS_C:tests/%.c=build/test/%_c) $(TESTS_CXX:tests/%.cpp=build/test/%_cpp)
+TESTS        := $(TESTS_C:tests/%.c=$(B)/test/%_c) $(TESTS_CXX:tests/%.cpp=$(B)/test/%_cpp)
 
-build/test/%_c: tests/%.c
+$(B)/test/%_c: tests/%.c
 	@mkdir -p $(@D)
 	$(COMPILE_C) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
-build/test/%_cpp: tests/%.cpp
+$(B)/test/%_cpp: tests/%.cpp
 	@mkdir -p $(@D)
 	$(COMPILE_CXX) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
 
@@ -114,6 +114,49 @@ test: deps
 run-tests: $(TESTS)
 	$(if $(HAVE_CXX),,@echo "no C++ compiler (g++): the C++ twins of the tests are left out")
 	@TEST_ARGS='$(ARGS)' tests/run.sh $(TESTS)
+
+# ---- checks ----------------------------------------------------------------------------------------------------
+# Each ends with the line "N passed, N failed, N skipped". TESTS_CXX= leaves the C++ twins out where they add nothing.
+
+check: check-strict check-variants check-asan check-tsan check-analyze check-compilers
+
+# warnings in all languages and compilers, linkage, names, macros, options, order of inclusion
+check-strict:
+	@RUNNER='bash tests/check_strict.sh' tests/run.sh $(LIBS) $(if $(LIB),,family dist)
+
+# the same tests compiled otherwise
+again = $(MAKE) --no-print-directory run-tests TESTS_CXX= B=build/$(1) OPT='$(or $(3),-O2)' CFLAGS='$(2)'
+AVX2 := $(if $(shell grep -w -m1 avx2 /proc/cpuinfo 2>/dev/null),1)
+check-variants:
+	+@echo 'plain C instead of vector instructions:' && $(call again,no_simd,-DSAT_NO_SIMD)
+	+@$(if $(AVX2),echo 'AVX2 and contraction:' && $(call again,avx2,-mavx2 -mfma -ffp-contract=fast))
+	+@echo 'no contraction, no optimisation:' && $(call again,plain,-ffp-contract=off,-O0)
+	+@$(if $(shell command -v clang),echo 'clang:' && $(call again,clang,,-O3) CC=clang OPENMP= WERROR=)
+
+ASAN  := -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
+check-asan: export ASAN_OPTIONS = detect_stack_use_after_return=1:strict_string_checks=1
+check-asan: export LSAN_OPTIONS = suppressions=tests/sanitizers.txt:print_suppressions=0
+check-asan:
+	+@$(call again,asan,$(ASAN),-O1)
+
+# OpenMP's run-time and software GL are not instrumented: both are left out here
+check-tsan: export TSAN_OPTIONS = second_deadlock_stack=1
+check-tsan: export LIGHTSCAN_GL = none
+check-tsan:
+	+@$(call again,tsan,-g -fsanitize=thread,-O1) OPENMP=
+
+check-analyze:
+	@RUNNER='bash tests/check_analyze.sh' tests/run.sh $(LIBS)
+check-compilers:
+	@RUNNER='bash tests/check_compilers.sh' tests/run.sh $(LIBS)
+
+# make fuzz [LIB=sat] [FUZZ_SECONDS=20]
+fuzz:
+	@RUNNER='bash tests/check_fuzz.sh' JOBS=1 tests/run.sh $(LIBS)
+
+# bytes of machine code with and without each option
+size:
+	@bash tests/size.sh $(LIBS)
 
 # ---- benchmarks and reports ------------------------------------------------------------------------------------
 
@@ -143,10 +186,17 @@ help:
 	@echo 'make test      run all tests                              [LIB=sat] [ARGS="-v word"]'
 	@echo 'make bench     error against run time, out/bench/*.tsv    [LIB=sat] [QUICK=1]'
 	@echo 'make examples  build all programs of examples/ into build/'
+	@echo 'make size      bytes of machine code of each header, with and without each option'
+	@echo 'make check-strict     warnings, linkage, names, macros, options, order of inclusion'
+	@echo 'make check-variants   the tests without SIMD, with AVX2, without optimisation, with clang'
+	@echo 'make check-asan       the tests under AddressSanitizer and UBSan; check-tsan: ThreadSanitizer'
+	@echo 'make check-analyze    gcc -fanalyzer, clang --analyze; check-compilers: aarch64, mingw-w64, tcc, 32 bit'
+	@echo 'make fuzz             libFuzzer on each header          [FUZZ_SECONDS=20]'
+	@echo 'make check            all of check-*; each takes LIB=sat'
 	@echo 'make deps      install missing packages (Debian)'
 	@echo 'make clean     remove build/ and out/'
 
 clean:
 	rm -rf build out
 
--include $(wildcard build/*.d build/*/*.d)
+-include $(wildcard build/*.d build/*/*.d build/*/*/*.d)

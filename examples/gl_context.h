@@ -6,11 +6,11 @@
        ...
        gl_context_close(&gl);
 
-   OSMesa (a software renderer, Debian's libosmesa6) by default; with LIGHTSCAN_GL=egl in the environment the GPU, through
-   EGL (libegl1): the first device that gives a context, else Mesa's surfaceless platform. Both libraries are opened at run time, so
-   that a program compiles and links without them. Some drivers give a newer version than the one asked for, never an older one.
-   There is no default framebuffer to speak of: draw into your own.
-   Needs -ldl before glibc 2.34. */
+   OSMesa (a software renderer, Debian's libosmesa6) by default; with LIGHTSCAN_GL=egl in the environment the GPU,
+   through EGL (libegl1): the first device that gives a context, else Mesa's surfaceless platform; LIGHTSCAN_GL=none
+   refuses. Both libraries are opened at run time, so that a program compiles and links without them. Some drivers
+   give a newer version than the one asked for, never an older one. There is no default framebuffer to speak of:
+   draw into your own. Needs -ldl before glibc 2.34. */
 
 #ifndef GL_CONTEXT_H
 #define GL_CONTEXT_H
@@ -188,6 +188,10 @@ static inline int gl_context_open(gl_context *gl, int major, int minor)
 {
     const char *kind = getenv("LIGHTSCAN_GL");
     memset(gl, 0, sizeof *gl);
+    if (kind && strcmp(kind, "none") == 0) {
+        strcpy(gl->message, "OpenGL is switched off by LIGHTSCAN_GL=none");
+        return 0;
+    }
     if (kind && strcmp(kind, "egl") == 0 ? !gl_context_open_egl(gl, major, minor)
                                          : !gl_context_open_osmesa(gl, major, minor)) return 0;
     gl_context_describe(gl);
