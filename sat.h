@@ -599,7 +599,842 @@ static inline sat__f32x4 sat__f32x4_from_bits(sat__i32x4 v) { return vreinterpre
 static inline int sat__version_matches(void) { return sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file == SAT_VERSION; }
 
 #endif /* SAT__SHARED */
-/* @SHARED GL@ */
+/* ------------------------------------------------------------------------------------------------
+   For the sibling headers: OpenGL
+
+   Written for GL 3.3 core, and for ES 3.0 as long as the shaders stay within GLSL ES 3.00. A sibling
+   defines SAT_SIBLING and SAT_SIBLING_GL before it includes this header in its implementation part, keeps
+   a sat__gl in its object, and does
+
+       create    sat__gl_open, sat__gl_build, sat__gl_texture, sat__gl_framebuffer
+       a frame   sat__gl_begin, { sat__gl_pass, sat__gl_set_..., sat__gl_draw } ..., sat__gl_end
+       destroy   DeleteProgram, DeleteTextures, DeleteFramebuffers, sat__gl_close
+
+   with the context current. Anything not wrapped here is called through the table: gl->DrawBuffers(...).
+   A frame's calls ask nothing of the GPU that makes the CPU wait.
+   ------------------------------------------------------------------------------------------------ */
+
+#if ((defined(SAT_IMPLEMENTATION) && defined(SAT_GL)) || defined(SAT_SIBLING_GL)) && !defined(SAT__SHARED_GL)
+#define SAT__SHARED_GL
+
+#include <stdio.h>
+
+#if defined(_WIN32)
+#define SAT__GL_CALL __stdcall
+#else
+#define SAT__GL_CALL
+#endif
+
+/* The names and numbers of the OpenGL registry, as far as the six headers use them. */
+enum {
+    SAT__GL_NO_ERROR = 0, SAT__GL_POINTS = 0x0000, SAT__GL_LINES = 0x0001, SAT__GL_TRIANGLES = 0x0004,
+    SAT__GL_TRIANGLE_STRIP = 0x0005,
+    SAT__GL_ZERO = 0, SAT__GL_ONE = 1, SAT__GL_SRC_ALPHA = 0x0302, SAT__GL_ONE_MINUS_SRC_ALPHA = 0x0303,
+    SAT__GL_LESS = 0x0201, SAT__GL_LEQUAL = 0x0203, SAT__GL_ALWAYS = 0x0207, SAT__GL_FILL = 0x1B02,
+    SAT__GL_BLEND_DST_RGB = 0x80C8, SAT__GL_BLEND_SRC_RGB = 0x80C9, SAT__GL_BLEND_DST_ALPHA = 0x80CA,
+    SAT__GL_BLEND_SRC_ALPHA = 0x80CB, SAT__GL_BLEND_EQUATION_RGB = 0x8009, SAT__GL_BLEND_EQUATION_ALPHA = 0x883D,
+    SAT__GL_FRONT_AND_BACK = 0x0408, SAT__GL_POLYGON_MODE = 0x0B40, SAT__GL_DEPTH_WRITEMASK = 0x0B72,
+    SAT__GL_DEPTH_FUNC = 0x0B74, SAT__GL_VIEWPORT = 0x0BA2, SAT__GL_COLOR_WRITEMASK = 0x0C23,
+    SAT__GL_CULL_FACE = 0x0B44, SAT__GL_DEPTH_TEST = 0x0B71, SAT__GL_STENCIL_TEST = 0x0B90, SAT__GL_DITHER = 0x0BD0,
+    SAT__GL_BLEND = 0x0BE2, SAT__GL_COLOR_LOGIC_OP = 0x0BF2, SAT__GL_SCISSOR_TEST = 0x0C11,
+    SAT__GL_SAMPLE_ALPHA_TO_COVERAGE = 0x809E, SAT__GL_SAMPLE_COVERAGE = 0x80A0, SAT__GL_FRAMEBUFFER_SRGB = 0x8DB9,
+    SAT__GL_RASTERIZER_DISCARD = 0x8C89, SAT__GL_PROGRAM_POINT_SIZE = 0x8642,
+    SAT__GL_UNPACK_SWAP_BYTES = 0x0CF0, SAT__GL_UNPACK_ROW_LENGTH = 0x0CF2, SAT__GL_UNPACK_SKIP_ROWS = 0x0CF3,
+    SAT__GL_UNPACK_SKIP_PIXELS = 0x0CF4, SAT__GL_UNPACK_ALIGNMENT = 0x0CF5, SAT__GL_UNPACK_SKIP_IMAGES = 0x806D,
+    SAT__GL_UNPACK_IMAGE_HEIGHT = 0x806E, SAT__GL_PACK_SWAP_BYTES = 0x0D00, SAT__GL_PACK_ROW_LENGTH = 0x0D02,
+    SAT__GL_PACK_SKIP_ROWS = 0x0D03, SAT__GL_PACK_SKIP_PIXELS = 0x0D04, SAT__GL_PACK_ALIGNMENT = 0x0D05,
+    SAT__GL_MAX_TEXTURE_SIZE = 0x0D33, SAT__GL_TEXTURE_2D = 0x0DE1, SAT__GL_TEXTURE_2D_ARRAY = 0x8C1A,
+    SAT__GL_TEXTURE_BINDING_2D = 0x8069, SAT__GL_TEXTURE_BINDING_2D_ARRAY = 0x8C1D, SAT__GL_SAMPLER_BINDING = 0x8919,
+    SAT__GL_TEXTURE0 = 0x84C0, SAT__GL_ACTIVE_TEXTURE = 0x84E0, SAT__GL_TEXTURE_MAG_FILTER = 0x2800,
+    SAT__GL_TEXTURE_MIN_FILTER = 0x2801, SAT__GL_TEXTURE_WRAP_S = 0x2802, SAT__GL_TEXTURE_WRAP_T = 0x2803,
+    SAT__GL_TEXTURE_MAX_LEVEL = 0x813D, SAT__GL_NEAREST = 0x2600, SAT__GL_LINEAR = 0x2601, SAT__GL_REPEAT = 0x2901,
+    SAT__GL_CLAMP_TO_EDGE = 0x812F,
+    SAT__GL_UNSIGNED_BYTE = 0x1401, SAT__GL_UNSIGNED_SHORT = 0x1403, SAT__GL_INT = 0x1404,
+    SAT__GL_UNSIGNED_INT = 0x1405, SAT__GL_FLOAT = 0x1406, SAT__GL_HALF_FLOAT = 0x140B,
+    SAT__GL_DEPTH_COMPONENT = 0x1902, SAT__GL_RED = 0x1903, SAT__GL_RGB = 0x1907, SAT__GL_RGBA = 0x1908,
+    SAT__GL_RG = 0x8227, SAT__GL_RG_INTEGER = 0x8228, SAT__GL_RED_INTEGER = 0x8D94, SAT__GL_RGBA_INTEGER = 0x8D99,
+    SAT__GL_R8 = 0x8229, SAT__GL_RG8 = 0x822B, SAT__GL_RGBA8 = 0x8058, SAT__GL_SRGB8_ALPHA8 = 0x8C43,
+    SAT__GL_R8UI = 0x8232, SAT__GL_R16F = 0x822D, SAT__GL_RG16F = 0x822F, SAT__GL_RGBA16F = 0x881A,
+    SAT__GL_R32F = 0x822E, SAT__GL_RG32F = 0x8230, SAT__GL_RGB32F = 0x8815, SAT__GL_RGBA32F = 0x8814,
+    SAT__GL_R32I = 0x8235, SAT__GL_R32UI = 0x8236, SAT__GL_RG32UI = 0x823C, SAT__GL_RGBA32UI = 0x8D70,
+    SAT__GL_R16UI = 0x8234, SAT__GL_DEPTH_COMPONENT24 = 0x81A6, SAT__GL_DEPTH_COMPONENT32F = 0x8CAC,
+    SAT__GL_RENDERER = 0x1F01, SAT__GL_VERSION = 0x1F02, SAT__GL_FRAGMENT_SHADER = 0x8B30, SAT__GL_VERTEX_SHADER = 0x8B31,
+    SAT__GL_COMPUTE_SHADER = 0x91B9, SAT__GL_COMPILE_STATUS = 0x8B81, SAT__GL_LINK_STATUS = 0x8B82,
+    SAT__GL_CURRENT_PROGRAM = 0x8B8D, SAT__GL_INTERLEAVED_ATTRIBS = 0x8C8C, SAT__GL_VERTEX_ARRAY_BINDING = 0x85B5,
+    SAT__GL_ARRAY_BUFFER = 0x8892, SAT__GL_ARRAY_BUFFER_BINDING = 0x8894, SAT__GL_STREAM_DRAW = 0x88E0,
+    SAT__GL_STATIC_DRAW = 0x88E4, SAT__GL_DYNAMIC_COPY = 0x88EA, SAT__GL_MAP_READ_BIT = 0x0001,
+    SAT__GL_PIXEL_PACK_BUFFER = 0x88EB, SAT__GL_PIXEL_UNPACK_BUFFER = 0x88EC,
+    SAT__GL_PIXEL_PACK_BUFFER_BINDING = 0x88ED, SAT__GL_PIXEL_UNPACK_BUFFER_BINDING = 0x88EF,
+    SAT__GL_TRANSFORM_FEEDBACK_BUFFER = 0x8C8E, SAT__GL_TRANSFORM_FEEDBACK_BUFFER_BINDING = 0x8C8F,
+    SAT__GL_TRANSFORM_FEEDBACK_BUFFER_START = 0x8C84, SAT__GL_TRANSFORM_FEEDBACK_BUFFER_SIZE = 0x8C85,
+    SAT__GL_READ_FRAMEBUFFER = 0x8CA8, SAT__GL_DRAW_FRAMEBUFFER = 0x8CA9, SAT__GL_FRAMEBUFFER = 0x8D40,
+    SAT__GL_DRAW_FRAMEBUFFER_BINDING = 0x8CA6, SAT__GL_READ_FRAMEBUFFER_BINDING = 0x8CAA,
+    SAT__GL_FRAMEBUFFER_COMPLETE = 0x8CD5, SAT__GL_COLOR_ATTACHMENT0 = 0x8CE0, SAT__GL_DEPTH_ATTACHMENT = 0x8D00,
+    SAT__GL_COLOR = 0x1800, SAT__GL_DEPTH = 0x1801,
+    SAT__GL_TIME_ELAPSED = 0x88BF, SAT__GL_QUERY_RESULT = 0x8866, SAT__GL_QUERY_RESULT_AVAILABLE = 0x8867,
+    SAT__GL_READ_ONLY = 0x88B8, SAT__GL_WRITE_ONLY = 0x88B9, SAT__GL_READ_WRITE = 0x88BA,
+    SAT__GL_IMAGE_BINDING_NAME = 0x8F3A, SAT__GL_IMAGE_BINDING_LEVEL = 0x8F3B, SAT__GL_IMAGE_BINDING_LAYERED = 0x8F3C,
+    SAT__GL_IMAGE_BINDING_LAYER = 0x8F3D, SAT__GL_IMAGE_BINDING_ACCESS = 0x8F3E, SAT__GL_IMAGE_BINDING_FORMAT = 0x906E,
+    SAT__GL_TEXTURE_FETCH_BARRIER_BIT = 0x0008, SAT__GL_SHADER_IMAGE_ACCESS_BARRIER_BIT = 0x0020,
+    SAT__GL_TEXTURE_UPDATE_BARRIER_BIT = 0x0100, SAT__GL_FRAMEBUFFER_BARRIER_BIT = 0x0400
+};
+
+/* Every function of the table, once: X(result, name without gl, arguments). These are required ... */
+#define SAT__GL_FUNCTIONS(X)                                                                                           \
+    X(void, ActiveTexture, (unsigned texture))                                                                         \
+    X(void, AttachShader, (unsigned program, unsigned shader))                                                         \
+    X(void, BeginTransformFeedback, (unsigned mode))                                                                   \
+    X(void, BindBuffer, (unsigned target, unsigned buffer))                                                            \
+    X(void, BindBufferBase, (unsigned target, unsigned index, unsigned buffer))                                        \
+    X(void, BindBufferRange, (unsigned target, unsigned index, unsigned buffer, ptrdiff_t offset, ptrdiff_t size))     \
+    X(void, BindFramebuffer, (unsigned target, unsigned framebuffer))                                                  \
+    X(void, BindSampler, (unsigned unit, unsigned sampler))                                                            \
+    X(void, BindTexture, (unsigned target, unsigned texture))                                                          \
+    X(void, BindVertexArray, (unsigned array))                                                                         \
+    X(void, BlendEquationSeparate, (unsigned rgb, unsigned alpha))                                                     \
+    X(void, BlendFuncSeparate, (unsigned src_rgb, unsigned dst_rgb, unsigned src_alpha, unsigned dst_alpha))           \
+    X(void, BufferData, (unsigned target, ptrdiff_t size, const void *data, unsigned usage))                           \
+    X(void, BufferSubData, (unsigned target, ptrdiff_t offset, ptrdiff_t size, const void *data))                      \
+    X(unsigned, CheckFramebufferStatus, (unsigned target))                                                             \
+    X(void, ClearBufferfv, (unsigned buffer, int index, const float *value))                                           \
+    X(void, ClearBufferuiv, (unsigned buffer, int index, const unsigned *value))                                       \
+    X(void, ColorMask, (unsigned char r, unsigned char g, unsigned char b, unsigned char a))                           \
+    X(void, CompileShader, (unsigned shader))                                                                          \
+    X(unsigned, CreateProgram, (void))                                                                                 \
+    X(unsigned, CreateShader, (unsigned type))                                                                         \
+    X(void, DeleteBuffers, (int count, const unsigned *buffers))                                                       \
+    X(void, DeleteFramebuffers, (int count, const unsigned *framebuffers))                                             \
+    X(void, DeleteProgram, (unsigned program))                                                                         \
+    X(void, DeleteShader, (unsigned shader))                                                                           \
+    X(void, DeleteTextures, (int count, const unsigned *textures))                                                     \
+    X(void, DeleteVertexArrays, (int count, const unsigned *arrays))                                                   \
+    X(void, DepthFunc, (unsigned function))                                                                            \
+    X(void, DepthMask, (unsigned char on))                                                                             \
+    X(void, Disable, (unsigned capability))                                                                            \
+    X(void, DisableVertexAttribArray, (unsigned index))                                                                \
+    X(void, DrawArrays, (unsigned mode, int first, int count))                                                         \
+    X(void, DrawArraysInstanced, (unsigned mode, int first, int count, int instances))                                 \
+    X(void, DrawBuffers, (int count, const unsigned *buffers))                                                         \
+    X(void, Enable, (unsigned capability))                                                                             \
+    X(void, EnableVertexAttribArray, (unsigned index))                                                                 \
+    X(void, EndTransformFeedback, (void))                                                                              \
+    X(void, Finish, (void))                                                                                            \
+    X(void, FramebufferTexture2D, (unsigned target, unsigned attachment, unsigned kind, unsigned texture, int level))  \
+    X(void, FramebufferTextureLayer, (unsigned target, unsigned attachment, unsigned texture, int level, int layer))   \
+    X(void, GenBuffers, (int count, unsigned *buffers))                                                                \
+    X(void, GenFramebuffers, (int count, unsigned *framebuffers))                                                      \
+    X(void, GenTextures, (int count, unsigned *textures))                                                              \
+    X(void, GenVertexArrays, (int count, unsigned *arrays))                                                            \
+    X(void, GetBooleanv, (unsigned name, unsigned char *value))                                                        \
+    X(unsigned, GetError, (void))                                                                                      \
+    X(void, GetInteger64i_v, (unsigned name, unsigned index, int64_t *value))                                          \
+    X(void, GetIntegeri_v, (unsigned name, unsigned index, int *value))                                                \
+    X(void, GetIntegerv, (unsigned name, int *value))                                                                  \
+    X(void, GetProgramInfoLog, (unsigned program, int size, int *length, char *log))                                   \
+    X(void, GetProgramiv, (unsigned program, unsigned name, int *value))                                               \
+    X(void, GetShaderInfoLog, (unsigned shader, int size, int *length, char *log))                                     \
+    X(void, GetShaderiv, (unsigned shader, unsigned name, int *value))                                                 \
+    X(const unsigned char *, GetString, (unsigned name))                                                               \
+    X(int, GetUniformLocation, (unsigned program, const char *name))                                                   \
+    X(unsigned char, IsEnabled, (unsigned capability))                                                                 \
+    X(void, LinkProgram, (unsigned program))                                                                           \
+    X(void *, MapBufferRange, (unsigned target, ptrdiff_t offset, ptrdiff_t size, unsigned access))                    \
+    X(void, PixelStorei, (unsigned name, int value))                                                                   \
+    X(void, ReadBuffer, (unsigned source))                                                                             \
+    X(void, ReadPixels, (int x, int y, int width, int height, unsigned format, unsigned type, void *pixels))           \
+    X(void, Scissor, (int x, int y, int width, int height))                                                            \
+    X(void, ShaderSource, (unsigned shader, int count, const char *const *parts, const int *lengths))                  \
+    X(void, TexImage2D, (unsigned target, int level, int internal, int width, int height, int border, unsigned format, \
+                         unsigned type, const void *pixels))                                                           \
+    X(void, TexImage3D, (unsigned target, int level, int internal, int width, int height, int depth, int border,       \
+                         unsigned format, unsigned type, const void *pixels))                                          \
+    X(void, TexParameteri, (unsigned target, unsigned name, int value))                                                \
+    X(void, TexSubImage2D, (unsigned target, int level, int x, int y, int width, int height, unsigned format,          \
+                            unsigned type, const void *pixels))                                                        \
+    X(void, TexSubImage3D, (unsigned target, int level, int x, int y, int z, int width, int height, int depth,         \
+                            unsigned format, unsigned type, const void *pixels))                                       \
+    X(void, TransformFeedbackVaryings, (unsigned program, int count, const char *const *names, unsigned mode))         \
+    X(void, Uniform1f, (int location, float x))                                                                        \
+    X(void, Uniform2f, (int location, float x, float y))                                                               \
+    X(void, Uniform3f, (int location, float x, float y, float z))                                                      \
+    X(void, Uniform4f, (int location, float x, float y, float z, float w))                                             \
+    X(void, Uniform1i, (int location, int x))                                                                          \
+    X(void, Uniform2i, (int location, int x, int y))                                                                   \
+    X(void, Uniform4i, (int location, int x, int y, int z, int w))                                                     \
+    X(void, Uniform1ui, (int location, unsigned x))                                                                    \
+    X(void, Uniform1fv, (int location, int count, const float *values))                                                \
+    X(void, Uniform3fv, (int location, int count, const float *values))                                                \
+    X(void, Uniform4fv, (int location, int count, const float *values))                                                \
+    X(void, UniformMatrix3fv, (int location, int count, unsigned char transpose, const float *values))                 \
+    X(void, UniformMatrix4fv, (int location, int count, unsigned char transpose, const float *values))                 \
+    X(unsigned char, UnmapBuffer, (unsigned target))                                                                   \
+    X(void, UseProgram, (unsigned program))                                                                            \
+    X(void, VertexAttribDivisor, (unsigned index, unsigned divisor))                                                   \
+    X(void, VertexAttribPointer, (unsigned index, int size, unsigned type, unsigned char normalized, int stride,       \
+                                  const void *offset))                                                                 \
+    X(void, Viewport, (int x, int y, int width, int height))
+
+/* ... and these may be NULL: has_timer and has_compute say whether the last two groups may be called. */
+#define SAT__GL_OPTIONAL_FUNCTIONS(X)                                                                                  \
+    X(void, PolygonMode, (unsigned face, unsigned mode))                                                               \
+    X(void, GenQueries, (int count, unsigned *queries))                                                                \
+    X(void, DeleteQueries, (int count, const unsigned *queries))                                                       \
+    X(void, BeginQuery, (unsigned target, unsigned query))                                                             \
+    X(void, EndQuery, (unsigned target))                                                                               \
+    X(void, GetQueryObjectui64v, (unsigned query, unsigned name, uint64_t *value))                                     \
+    X(void, BindImageTexture, (unsigned unit, unsigned texture, int level, unsigned char layered, int layer,           \
+                               unsigned access, unsigned format))                                                      \
+    X(void, DispatchCompute, (unsigned x, unsigned y, unsigned z))                                                     \
+    X(void, MemoryBarrier, (unsigned barriers))
+
+enum {
+    SAT__GL_UNITS = 16,  /* texture units that sat__gl_begin can save; more than any of the six needs */
+    SAT__GL_IMAGES = 4,  /* image units of compute shaders, the same */
+    SAT__GL_TARGETS = 4  /* colour attachments of one framebuffer */
+};
+
+/* The function table and what else belongs to one context. */
+#define SAT__GL_MEMBER(result, name, arguments) result(SAT__GL_CALL *name) arguments;
+typedef struct sat__gl {
+    SAT__GL_FUNCTIONS(SAT__GL_MEMBER)
+    SAT__GL_OPTIONAL_FUNCTIONS(SAT__GL_MEMBER)
+    int is_es, version;         /* OpenGL ES; 10 major + minor, as 33, 43, 30 */
+    int has_timer, has_compute; /* GL 3.3 timer queries; GL 4.3 compute shaders */
+    int max_size;               /* largest width and height of a texture */
+    unsigned vertex_array;      /* without any attribute: what full-screen passes draw with */
+    unsigned framebuffer;       /* for sat__gl_read and sat__gl_attach */
+    char defines[1024];         /* #define lines for the next sat__gl_build */
+    char message[8192];         /* one sentence; for shaders the log and the numbered source follow. Never NULL */
+} sat__gl;
+
+/* ---- messages and the function table */
+
+/* Keeps the sentence "what (name)" for X_gl_message and hands the result through. */
+static inline sat_result sat__gl_fail(sat__gl *gl, sat_result result, const char *what, const char *name)
+{
+    snprintf(gl->message, sizeof gl->message, name && *name ? "%s (%s)" : "%s", what, name);
+    return result;
+}
+
+/* Forgets errors of earlier calls, so that sat__gl_check blames nobody for them. */
+static inline void sat__gl_clear_errors(sat__gl *gl)
+{
+    int i;
+    for (i = 0; i < 16 && gl->GetError() != SAT__GL_NO_ERROR; i++) {}
+}
+
+/* SAT_ERR_GL_STATE when OpenGL reports an error. Waits for nothing, but call it when creating, not in every frame. */
+static inline sat_result sat__gl_check(sat__gl *gl, const char *what)
+{
+    unsigned error = gl->GetError();
+    char number[24];
+    if (error == SAT__GL_NO_ERROR) return SAT_OK;
+    snprintf(number, sizeof number, "error 0x%04x", error);
+    return sat__gl_fail(gl, SAT_ERR_GL_STATE, what, number);
+}
+
+/* "4.5 (Core Profile) ..." or "OpenGL ES 3.2 ...". */
+static inline int sat__gl_parse_version(const char *text, int *is_es)
+{
+    *is_es = strncmp(text, "OpenGL ES", 9) == 0;
+    while (*text && (*text < '0' || *text > '9')) text++;
+    return text[0] && text[1] == '.' && text[2] >= '0' && text[2] <= '9' ? 10 * (text[0] - '0') + (text[2] - '0') : 0;
+}
+
+#define SAT__GL_LOAD(result, name, arguments)                                                                          \
+    gl->name = (result(SAT__GL_CALL *) arguments)get_proc("gl" #name);                                                 \
+    if (!gl->name && !missing) missing = "gl" #name;
+#define SAT__GL_LOAD_OPTIONAL(result, name, arguments) gl->name = (result(SAT__GL_CALL *) arguments)get_proc("gl" #name);
+
+/* Fills the table for the current context. On an error nothing is left behind but the message. */
+static inline sat_result sat__gl_open(sat__gl *gl, sat_gl_get_proc *get_proc)
+{
+    const char *missing = NULL, *version, *renderer;
+    memset(gl, 0, sizeof *gl);
+    if (!get_proc) return sat__gl_fail(gl, SAT_ERR_ARGUMENT, "get_proc is NULL", NULL);
+    SAT__GL_FUNCTIONS(SAT__GL_LOAD)
+    if (missing) return sat__gl_fail(gl, SAT_ERR_GL_FUNCTION, "the context lacks a function", missing);
+    SAT__GL_OPTIONAL_FUNCTIONS(SAT__GL_LOAD_OPTIONAL)
+    version = (const char *)gl->GetString(SAT__GL_VERSION);
+    if (!version) return sat__gl_fail(gl, SAT_ERR_GL_STATE, "no OpenGL context is current", NULL);
+    gl->version = sat__gl_parse_version(version, &gl->is_es);
+    if (gl->version < (gl->is_es ? 30 : 33))
+        return sat__gl_fail(gl, SAT_ERR_GL_STATE, "OpenGL 3.3 or OpenGL ES 3.0 is needed", version);
+    renderer = (const char *)gl->GetString(SAT__GL_RENDERER); /* llvmpipe's timer is wrong at times */
+    gl->has_timer = !gl->is_es && !(renderer && strstr(renderer, "llvmpipe")) && gl->GenQueries && gl->DeleteQueries &&
+                    gl->BeginQuery && gl->EndQuery && gl->GetQueryObjectui64v;
+    gl->has_compute = !gl->is_es && gl->version >= 43 && gl->BindImageTexture && gl->DispatchCompute && gl->MemoryBarrier;
+    gl->GetIntegerv(SAT__GL_MAX_TEXTURE_SIZE, &gl->max_size);
+    sat__gl_clear_errors(gl);
+    gl->GenVertexArrays(1, &gl->vertex_array);
+    gl->GenFramebuffers(1, &gl->framebuffer);
+    return SAT_OK;
+}
+
+/* Harmless after a failed or missing sat__gl_open of a zeroed sat__gl, and when called twice. */
+static inline void sat__gl_close(sat__gl *gl)
+{
+    if (gl->vertex_array) gl->DeleteVertexArrays(1, &gl->vertex_array);
+    if (gl->framebuffer) gl->DeleteFramebuffers(1, &gl->framebuffer);
+    gl->vertex_array = gl->framebuffer = 0;
+}
+
+/* ---- programs */
+
+/* Shader text: lists of strings (each below 4096 bytes) that end with NULL; a NULL list is an empty one. The
+   #version line, the precision of ES and the pending #define lines go in front, then `library`, in every stage. */
+typedef struct sat__gl_shaders {
+    const char *name;              /* for messages, such as "ssao_sat: accessibility" */
+    const char *const *library;    /* what sat_gl_glsl() and its like give */
+    const char *const *vertex;     /* NULL: a triangle over the whole viewport; use gl_FragCoord */
+    const char *const *fragment;   /* NULL: draws nothing, for transform feedback */
+    const char *const *compute;    /* not NULL: a compute program, and the others are not looked at */
+    const char *const *varyings;   /* not NULL: captured by transform feedback, interleaved */
+} sat__gl_shaders;
+
+/* "#define name value" for the next sat__gl_build, which consumes all of them. */
+static inline void sat__gl_define(sat__gl *gl, const char *name, int value)
+{
+    size_t used = strlen(gl->defines);
+    SAT_ASSERT(used + strlen(name) + 24 < sizeof gl->defines);
+    snprintf(gl->defines + used, sizeof gl->defines - used, "#define %s %d\n", name, value);
+}
+
+/* The same for a float, bit by bit: locales write decimal points as they like. */
+static inline void sat__gl_define_float(sat__gl *gl, const char *name, float value)
+{
+    size_t used = strlen(gl->defines);
+    SAT_ASSERT(used + strlen(name) + 40 < sizeof gl->defines);
+    snprintf(gl->defines + used, sizeof gl->defines - used, "#define %s uintBitsToFloat(0x%08xu)\n", name,
+             (unsigned)sat__float_bits(value));
+}
+
+static inline int sat__gl_add_parts(const char **parts, int count, const char *const *list)
+{
+    for (; list && *list && count < 64; list++) parts[count++] = *list;
+    return count;
+}
+
+/* Appends the numbered source to the message, as far as it fits. */
+static inline void sat__gl_explain(sat__gl *gl, const char *const *parts, int count)
+{
+    size_t used = strlen(gl->message), room = sizeof gl->message - 1;
+    int i, line = 0, fresh = 1;
+    for (i = 0; i < count; i++) {
+        const char *p;
+        for (p = parts[i]; *p && used + 8 < room; p++) {
+            if (fresh) used += (size_t)snprintf(gl->message + used, room - used, "\n%3d ", ++line);
+            fresh = *p == '\n';
+            if (!fresh) gl->message[used++] = *p;
+        }
+    }
+    gl->message[used] = 0;
+#ifdef SAT_GL_DUMP
+    fprintf(stderr, "%s\n", gl->message);
+#endif
+}
+
+/* One shader, or 0 with the log and the source in the message. */
+static inline unsigned sat__gl_compile(sat__gl *gl, unsigned type, const sat__gl_shaders *shaders, const char *const *text)
+{
+    static const char es_precision[] = "precision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
+                                       "precision highp isampler2D;\nprecision highp usampler2D;\nprecision highp sampler2DArray;\n";
+    const char *parts[64];
+    int count = 0, ok = 0;
+    unsigned shader = gl->CreateShader(type);
+    if (gl->is_es) {
+        parts[count++] = "#version 300 es\n";
+        parts[count++] = es_precision;
+    } else {
+        parts[count++] = type == SAT__GL_COMPUTE_SHADER ? "#version 430 core\n" : "#version 330 core\n";
+    }
+    parts[count++] = gl->defines;
+    count = sat__gl_add_parts(parts, count, shaders->library);
+    count = sat__gl_add_parts(parts, count, text);
+    gl->ShaderSource(shader, count, parts, NULL);
+    gl->CompileShader(shader);
+    gl->GetShaderiv(shader, SAT__GL_COMPILE_STATUS, &ok);
+    if (!ok) {
+        char log[2048] = "";
+        gl->GetShaderInfoLog(shader, (int)sizeof log, NULL, log);
+        snprintf(gl->message, sizeof gl->message, "%s: a %s shader does not compile\n%s", shaders->name,
+                 type == SAT__GL_VERTEX_SHADER ? "vertex" : type == SAT__GL_COMPUTE_SHADER ? "compute" : "fragment", log);
+        sat__gl_explain(gl, parts, count);
+        gl->DeleteShader(shader);
+        return 0;
+    }
+    return shader;
+}
+
+static inline sat_result sat__gl_link(sat__gl *gl, unsigned program, const sat__gl_shaders *shaders)
+{
+    int ok = 0;
+    gl->LinkProgram(program);
+    gl->GetProgramiv(program, SAT__GL_LINK_STATUS, &ok);
+    if (!ok) {
+        char log[2048] = "";
+        gl->GetProgramInfoLog(program, (int)sizeof log, NULL, log);
+        snprintf(gl->message, sizeof gl->message, "%s: the program does not link\n%s", shaders->name, log);
+#ifdef SAT_GL_DUMP
+        fprintf(stderr, "%s\n", gl->message);
+#endif
+        return SAT_ERR_GL_SHADER;
+    }
+    return SAT_OK;
+}
+
+/* *program is 0 on an error. Delete it with gl->DeleteProgram. */
+static inline sat_result sat__gl_build(sat__gl *gl, unsigned *program, const sat__gl_shaders *shaders)
+{
+    static const char *const triangle[] = {
+        "void main() {\n"
+        "    gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);\n"
+        "}\n", NULL};
+    static const char *const nothing[] = {"void main() {}\n", NULL};
+    sat__gl_shaders plain = *shaders;
+    unsigned stage[2] = {0, 0};
+    sat_result result = SAT_ERR_GL_SHADER;
+    int i, stages = shaders->compute ? 1 : 2, count = 0;
+    plain.library = NULL;
+    *program = 0;
+    if (shaders->compute) stage[0] = sat__gl_compile(gl, SAT__GL_COMPUTE_SHADER, shaders, shaders->compute);
+    else if (shaders->vertex) stage[0] = sat__gl_compile(gl, SAT__GL_VERTEX_SHADER, shaders, shaders->vertex);
+    else stage[0] = sat__gl_compile(gl, SAT__GL_VERTEX_SHADER, &plain, triangle);
+    if (stage[0] && stages == 2)
+        stage[1] = shaders->fragment ? sat__gl_compile(gl, SAT__GL_FRAGMENT_SHADER, shaders, shaders->fragment)
+                                     : sat__gl_compile(gl, SAT__GL_FRAGMENT_SHADER, &plain, nothing);
+    if (stage[stages - 1]) {
+        *program = gl->CreateProgram();
+        for (i = 0; i < stages; i++) gl->AttachShader(*program, stage[i]);
+        while (shaders->varyings && shaders->varyings[count]) count++;
+        if (count) gl->TransformFeedbackVaryings(*program, count, shaders->varyings, SAT__GL_INTERLEAVED_ATTRIBS);
+        result = sat__gl_link(gl, *program, shaders);
+    }
+    for (i = 0; i < stages; i++)
+        if (stage[i]) gl->DeleteShader(stage[i]); /* lives on in the program */
+    if (result != SAT_OK && *program) {
+        gl->DeleteProgram(*program);
+        *program = 0;
+    }
+    gl->defines[0] = 0;
+    return result;
+}
+
+/* ---- textures, framebuffers. These change bindings: call them between sat__gl_begin and sat__gl_end. */
+
+/* The client format and type that belong to a sized internal format: floats for the float formats (half floats
+   too), 32-bit integers for the 32-bit integer ones, bytes for the 8-bit ones. Returns the bytes of a pixel. */
+static inline int sat__gl_transfer(unsigned internal, unsigned *format, unsigned *type)
+{
+    static const struct { unsigned internal, format, type; int bytes; } table[] = {
+        {SAT__GL_R8, SAT__GL_RED, SAT__GL_UNSIGNED_BYTE, 1},
+        {SAT__GL_RG8, SAT__GL_RG, SAT__GL_UNSIGNED_BYTE, 2},
+        {SAT__GL_RGBA8, SAT__GL_RGBA, SAT__GL_UNSIGNED_BYTE, 4},
+        {SAT__GL_SRGB8_ALPHA8, SAT__GL_RGBA, SAT__GL_UNSIGNED_BYTE, 4},
+        {SAT__GL_R8UI, SAT__GL_RED_INTEGER, SAT__GL_UNSIGNED_BYTE, 1},
+        {SAT__GL_R16UI, SAT__GL_RED_INTEGER, SAT__GL_UNSIGNED_SHORT, 2},
+        {SAT__GL_R16F, SAT__GL_RED, SAT__GL_FLOAT, 4},
+        {SAT__GL_RG16F, SAT__GL_RG, SAT__GL_FLOAT, 8},
+        {SAT__GL_RGBA16F, SAT__GL_RGBA, SAT__GL_FLOAT, 16},
+        {SAT__GL_R32F, SAT__GL_RED, SAT__GL_FLOAT, 4},
+        {SAT__GL_RG32F, SAT__GL_RG, SAT__GL_FLOAT, 8},
+        {SAT__GL_RGB32F, SAT__GL_RGB, SAT__GL_FLOAT, 12}, /* not a render target everywhere */
+        {SAT__GL_RGBA32F, SAT__GL_RGBA, SAT__GL_FLOAT, 16},
+        {SAT__GL_R32I, SAT__GL_RED_INTEGER, SAT__GL_INT, 4},
+        {SAT__GL_R32UI, SAT__GL_RED_INTEGER, SAT__GL_UNSIGNED_INT, 4},
+        {SAT__GL_RG32UI, SAT__GL_RG_INTEGER, SAT__GL_UNSIGNED_INT, 8},
+        {SAT__GL_RGBA32UI, SAT__GL_RGBA_INTEGER, SAT__GL_UNSIGNED_INT, 16},
+        {SAT__GL_DEPTH_COMPONENT24, SAT__GL_DEPTH_COMPONENT, SAT__GL_UNSIGNED_INT, 4},
+        {SAT__GL_DEPTH_COMPONENT32F, SAT__GL_DEPTH_COMPONENT, SAT__GL_FLOAT, 4}};
+    size_t i;
+    for (i = 0; i < sizeof table / sizeof *table; i++)
+        if (table[i].internal == internal) {
+            *format = table[i].format;
+            *type = table[i].type;
+            return table[i].bytes;
+        }
+    SAT_ASSERT(0 && "internal format not in the table");
+    return 0;
+}
+
+/* A 2D texture without mipmaps, nearest filter, clamped to the edge; pixels (packed rows, the first row at
+   v = 0) may be NULL. *texture is 0 on an error. Delete it with gl->DeleteTextures. */
+static inline sat_result sat__gl_texture(sat__gl *gl, unsigned *texture, unsigned internal, int width, int height,
+                                         const void *pixels)
+{
+    unsigned format = 0, type = 0;
+    sat_result result;
+    *texture = 0;
+    if (width < 1 || height < 1 || width > gl->max_size || height > gl->max_size)
+        return sat__gl_fail(gl, SAT_ERR_SIZE, "the context's largest texture is smaller than that", NULL);
+    sat__gl_transfer(internal, &format, &type);
+    gl->GenTextures(1, texture);
+    gl->ActiveTexture(SAT__GL_TEXTURE0);
+    gl->BindTexture(SAT__GL_TEXTURE_2D, *texture);
+    gl->TexImage2D(SAT__GL_TEXTURE_2D, 0, (int)internal, width, height, 0, format, type, pixels);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MAX_LEVEL, 0);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MIN_FILTER, SAT__GL_NEAREST);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MAG_FILTER, SAT__GL_NEAREST);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_WRAP_S, SAT__GL_CLAMP_TO_EDGE);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_WRAP_T, SAT__GL_CLAMP_TO_EDGE);
+    result = sat__gl_check(gl, "OpenGL refused a texture");
+    if (result != SAT_OK) {
+        gl->DeleteTextures(1, texture);
+        *texture = 0;
+    }
+    return result;
+}
+
+/* Replaces all pixels. */
+static inline void sat__gl_upload(sat__gl *gl, unsigned texture, unsigned internal, int width, int height, const void *pixels)
+{
+    unsigned format = 0, type = 0;
+    sat__gl_transfer(internal, &format, &type);
+    gl->ActiveTexture(SAT__GL_TEXTURE0);
+    gl->BindTexture(SAT__GL_TEXTURE_2D, texture);
+    gl->TexSubImage2D(SAT__GL_TEXTURE_2D, 0, 0, 0, width, height, format, type, pixels);
+}
+
+/* Binds a framebuffer and gives it `count` colour attachments and, unless 0, a depth texture. */
+static inline sat_result sat__gl_attach(sat__gl *gl, unsigned framebuffer, const unsigned *textures, int count, unsigned depth)
+{
+    unsigned buffers[SAT__GL_TARGETS], status;
+    char number[24];
+    int i;
+    SAT_ASSERT(count >= 0 && count <= SAT__GL_TARGETS);
+    gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, framebuffer);
+    for (i = 0; i < count; i++) {
+        buffers[i] = SAT__GL_COLOR_ATTACHMENT0 + (unsigned)i;
+        gl->FramebufferTexture2D(SAT__GL_FRAMEBUFFER, buffers[i], SAT__GL_TEXTURE_2D, textures[i], 0);
+    }
+    gl->FramebufferTexture2D(SAT__GL_FRAMEBUFFER, SAT__GL_DEPTH_ATTACHMENT, SAT__GL_TEXTURE_2D, depth, 0);
+    gl->DrawBuffers(count, buffers);
+    gl->ReadBuffer(count ? buffers[0] : 0u);
+    status = gl->CheckFramebufferStatus(SAT__GL_FRAMEBUFFER);
+    if (status == SAT__GL_FRAMEBUFFER_COMPLETE) return SAT_OK;
+    snprintf(number, sizeof number, "status 0x%04x", status);
+    return sat__gl_fail(gl, SAT_ERR_GL_STATE, "OpenGL refused a framebuffer", number);
+}
+
+/* A framebuffer of 1 to 4 textures of one size, and a depth texture unless 0. *framebuffer is 0 on an error.
+   Delete it with gl->DeleteFramebuffers, before its textures. */
+static inline sat_result sat__gl_framebuffer(sat__gl *gl, unsigned *framebuffer, const unsigned *textures, int count,
+                                             unsigned depth)
+{
+    sat_result result;
+    gl->GenFramebuffers(1, framebuffer);
+    result = sat__gl_attach(gl, *framebuffer, textures, count, depth);
+    if (result != SAT_OK) {
+        gl->DeleteFramebuffers(1, framebuffer);
+        *framebuffer = 0;
+    }
+    return result;
+}
+
+/* Copies a texture into packed rows; waits for the GPU. Some ES drivers read only RGBA back. */
+static inline sat_result sat__gl_read(sat__gl *gl, void *pixels, unsigned texture, unsigned internal, int width, int height)
+{
+    unsigned format = 0, type = 0;
+    sat_result result = sat__gl_attach(gl, gl->framebuffer, &texture, 1, 0);
+    if (result != SAT_OK) return result;
+    sat__gl_transfer(internal, &format, &type);
+    gl->ReadPixels(0, 0, width, height, format, type, pixels);
+    texture = 0;
+    gl->FramebufferTexture2D(SAT__GL_FRAMEBUFFER, SAT__GL_COLOR_ATTACHMENT0, SAT__GL_TEXTURE_2D, texture, 0);
+    return sat__gl_check(gl, "OpenGL refused to read a texture back");
+}
+
+/* ---- passes */
+
+/* Starts a pass: program, framebuffer (0: the default one) and the part of it to draw into. */
+static inline void sat__gl_pass(sat__gl *gl, unsigned program, unsigned framebuffer, int width, int height)
+{
+    gl->UseProgram(program);
+    gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, framebuffer);
+    gl->Viewport(0, 0, width, height);
+}
+
+/* Every pixel of the viewport once. */
+static inline void sat__gl_draw(sat__gl *gl)
+{
+    gl->BindVertexArray(gl->vertex_array);
+    gl->DrawArrays(SAT__GL_TRIANGLES, 0, 3);
+}
+
+/* Uniforms of the program of the pass, by name; names the compiler dropped are ignored. In a loop over many passes
+   ask GetUniformLocation once and call gl->Uniform... instead. */
+static inline void sat__gl_set_int(sat__gl *gl, unsigned program, const char *name, int x)
+{
+    gl->Uniform1i(gl->GetUniformLocation(program, name), x);
+}
+
+static inline void sat__gl_set_int2(sat__gl *gl, unsigned program, const char *name, int x, int y)
+{
+    gl->Uniform2i(gl->GetUniformLocation(program, name), x, y);
+}
+
+static inline void sat__gl_set_uint(sat__gl *gl, unsigned program, const char *name, unsigned x)
+{
+    gl->Uniform1ui(gl->GetUniformLocation(program, name), x);
+}
+
+static inline void sat__gl_set_float(sat__gl *gl, unsigned program, const char *name, float x)
+{
+    gl->Uniform1f(gl->GetUniformLocation(program, name), x);
+}
+
+static inline void sat__gl_set_float2(sat__gl *gl, unsigned program, const char *name, float x, float y)
+{
+    gl->Uniform2f(gl->GetUniformLocation(program, name), x, y);
+}
+
+static inline void sat__gl_set_float3(sat__gl *gl, unsigned program, const char *name, const float *v)
+{
+    gl->Uniform3fv(gl->GetUniformLocation(program, name), 1, v);
+}
+
+static inline void sat__gl_set_float4(sat__gl *gl, unsigned program, const char *name, const float *v)
+{
+    gl->Uniform4fv(gl->GetUniformLocation(program, name), 1, v);
+}
+
+/* 16 floats, column after column */
+static inline void sat__gl_set_matrix4(sat__gl *gl, unsigned program, const char *name, const float *m)
+{
+    gl->UniformMatrix4fv(gl->GetUniformLocation(program, name), 1, 0, m);
+}
+
+/* Binds a 2D texture to a unit below the number given to sat__gl_begin, without a sampler object, and tells the
+   sampler uniform. */
+static inline void sat__gl_set_texture(sat__gl *gl, unsigned program, const char *name, int unit, unsigned texture)
+{
+    gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)unit);
+    gl->BindTexture(SAT__GL_TEXTURE_2D, texture);
+    gl->BindSampler((unsigned)unit, 0);
+    gl->Uniform1i(gl->GetUniformLocation(program, name), unit);
+}
+
+/* ---- state: what the passes may touch, saved before and put back after
+
+   program; vertex array; draw and read framebuffer; viewport; for the first `units` texture units the 2D and the
+   2D array texture and the sampler; active texture; the capabilities and pixel store values listed below; blend
+   function and equation; depth function and mask; colour mask; polygon mode; array, pixel pack and unpack buffer;
+   transform feedback buffer 0 and the general one; with compute shaders the first SAT__GL_IMAGES image units.
+   Not saved, so leave them alone: clear values (use gl->ClearBufferfv), scissor box (disabled), stencil, everything
+   else. Blending and colour masks set per attachment come back as those of attachment 0. Call outside conditional
+   rendering and of active transform feedback. */
+
+enum { SAT__GL_CAPABILITIES = 12, SAT__GL_STORES = 12 };
+
+typedef struct sat__gl_state {
+    int units, program, vertex_array, draw_framebuffer, read_framebuffer, active_texture;
+    int viewport[4], blend[6], depth_function, polygon_mode[2];
+    int textures[SAT__GL_UNITS][3]; /* 2D, 2D array, sampler */
+    int stores[SAT__GL_STORES], buffers[4]; /* array, pixel pack, pixel unpack, transform feedback */
+    int feedback;
+    int64_t feedback_start, feedback_size;
+    int images[SAT__GL_IMAGES][6];
+    unsigned char capabilities[SAT__GL_CAPABILITIES], color_mask[4], depth_mask;
+} sat__gl_state;
+
+/* The ones that ES does not have come last. */
+static inline const unsigned *sat__gl_capability_names(const sat__gl *gl, int *count)
+{
+    static const unsigned names[SAT__GL_CAPABILITIES] = {
+        SAT__GL_BLEND, SAT__GL_DEPTH_TEST, SAT__GL_CULL_FACE, SAT__GL_SCISSOR_TEST, SAT__GL_STENCIL_TEST, SAT__GL_DITHER,
+        SAT__GL_RASTERIZER_DISCARD, SAT__GL_SAMPLE_ALPHA_TO_COVERAGE, SAT__GL_SAMPLE_COVERAGE,
+        SAT__GL_COLOR_LOGIC_OP, SAT__GL_FRAMEBUFFER_SRGB, SAT__GL_PROGRAM_POINT_SIZE};
+    *count = gl->is_es ? SAT__GL_CAPABILITIES - 3 : SAT__GL_CAPABILITIES;
+    return names;
+}
+
+static inline const unsigned *sat__gl_store_names(const sat__gl *gl, int *count)
+{
+    static const unsigned names[SAT__GL_STORES] = {
+        SAT__GL_UNPACK_ALIGNMENT, SAT__GL_PACK_ALIGNMENT, /* set to 1 by sat__gl_begin, all others to 0 */
+        SAT__GL_UNPACK_ROW_LENGTH, SAT__GL_UNPACK_SKIP_ROWS, SAT__GL_UNPACK_SKIP_PIXELS, SAT__GL_UNPACK_SKIP_IMAGES,
+        SAT__GL_UNPACK_IMAGE_HEIGHT, SAT__GL_PACK_ROW_LENGTH, SAT__GL_PACK_SKIP_ROWS, SAT__GL_PACK_SKIP_PIXELS,
+        SAT__GL_UNPACK_SWAP_BYTES, SAT__GL_PACK_SWAP_BYTES};
+    *count = gl->is_es ? SAT__GL_STORES - 2 : SAT__GL_STORES;
+    return names;
+}
+
+static inline const unsigned *sat__gl_blend_names(void)
+{
+    static const unsigned names[6] = {SAT__GL_BLEND_SRC_RGB, SAT__GL_BLEND_DST_RGB, SAT__GL_BLEND_SRC_ALPHA,
+                                      SAT__GL_BLEND_DST_ALPHA, SAT__GL_BLEND_EQUATION_RGB, SAT__GL_BLEND_EQUATION_ALPHA};
+    return names;
+}
+
+/* The target of a buffer and the name of its binding, in pairs, as in sat__gl_state.buffers. */
+static inline const unsigned *sat__gl_buffer_names(void)
+{
+    static const unsigned names[8] = {SAT__GL_ARRAY_BUFFER, SAT__GL_ARRAY_BUFFER_BINDING,
+                                      SAT__GL_PIXEL_PACK_BUFFER, SAT__GL_PIXEL_PACK_BUFFER_BINDING,
+                                      SAT__GL_PIXEL_UNPACK_BUFFER, SAT__GL_PIXEL_UNPACK_BUFFER_BINDING,
+                                      SAT__GL_TRANSFORM_FEEDBACK_BUFFER, SAT__GL_TRANSFORM_FEEDBACK_BUFFER_BINDING};
+    return names;
+}
+
+static inline const unsigned *sat__gl_image_names(void)
+{
+    static const unsigned names[6] = {SAT__GL_IMAGE_BINDING_NAME, SAT__GL_IMAGE_BINDING_LEVEL, SAT__GL_IMAGE_BINDING_LAYERED,
+                                      SAT__GL_IMAGE_BINDING_LAYER, SAT__GL_IMAGE_BINDING_ACCESS, SAT__GL_IMAGE_BINDING_FORMAT};
+    return names;
+}
+
+static inline void sat__gl_save_textures(sat__gl *gl, sat__gl_state *state)
+{
+    int i, j;
+    gl->GetIntegerv(SAT__GL_ACTIVE_TEXTURE, &state->active_texture);
+    for (i = 0; i < state->units; i++) {
+        gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)i);
+        gl->GetIntegerv(SAT__GL_TEXTURE_BINDING_2D, &state->textures[i][0]);
+        gl->GetIntegerv(SAT__GL_TEXTURE_BINDING_2D_ARRAY, &state->textures[i][1]);
+        gl->GetIntegerv(SAT__GL_SAMPLER_BINDING, &state->textures[i][2]);
+    }
+    for (i = 0; gl->has_compute && i < SAT__GL_IMAGES; i++)
+        for (j = 0; j < 6; j++) gl->GetIntegeri_v(sat__gl_image_names()[j], (unsigned)i, &state->images[i][j]);
+}
+
+static inline void sat__gl_save_pipeline(sat__gl *gl, sat__gl_state *state)
+{
+    const unsigned *names;
+    int i, count;
+    gl->GetIntegerv(SAT__GL_CURRENT_PROGRAM, &state->program);
+    gl->GetIntegerv(SAT__GL_VERTEX_ARRAY_BINDING, &state->vertex_array);
+    gl->GetIntegerv(SAT__GL_DRAW_FRAMEBUFFER_BINDING, &state->draw_framebuffer);
+    gl->GetIntegerv(SAT__GL_READ_FRAMEBUFFER_BINDING, &state->read_framebuffer);
+    gl->GetIntegerv(SAT__GL_VIEWPORT, state->viewport);
+    gl->GetIntegerv(SAT__GL_DEPTH_FUNC, &state->depth_function);
+    gl->GetBooleanv(SAT__GL_DEPTH_WRITEMASK, &state->depth_mask);
+    gl->GetBooleanv(SAT__GL_COLOR_WRITEMASK, state->color_mask);
+    if (!gl->is_es) gl->GetIntegerv(SAT__GL_POLYGON_MODE, state->polygon_mode);
+    for (i = 0; i < 6; i++) gl->GetIntegerv(sat__gl_blend_names()[i], &state->blend[i]);
+    names = sat__gl_capability_names(gl, &count);
+    for (i = 0; i < count; i++) state->capabilities[i] = gl->IsEnabled(names[i]);
+}
+
+static inline void sat__gl_save_buffers(sat__gl *gl, sat__gl_state *state)
+{
+    const unsigned *names = sat__gl_store_names(gl, &state->feedback);
+    int i, count = state->feedback;
+    for (i = 0; i < count; i++) gl->GetIntegerv(names[i], &state->stores[i]);
+    for (i = 0; i < 4; i++) gl->GetIntegerv(sat__gl_buffer_names()[2 * i + 1], &state->buffers[i]);
+    gl->GetIntegeri_v(SAT__GL_TRANSFORM_FEEDBACK_BUFFER_BINDING, 0, &state->feedback);
+    gl->GetInteger64i_v(SAT__GL_TRANSFORM_FEEDBACK_BUFFER_START, 0, &state->feedback_start);
+    gl->GetInteger64i_v(SAT__GL_TRANSFORM_FEEDBACK_BUFFER_SIZE, 0, &state->feedback_size);
+}
+
+/* Saves the state and sets what full-screen passes and transfers expect: everything off, full masks, packed rows. */
+static inline void sat__gl_begin(sat__gl *gl, sat__gl_state *state, int units)
+{
+    const unsigned *names;
+    int i, count;
+    SAT_ASSERT(units >= 1 && units <= SAT__GL_UNITS);
+    memset(state, 0, sizeof *state);
+    state->units = units;
+    sat__gl_clear_errors(gl);
+    sat__gl_save_textures(gl, state);
+    sat__gl_save_pipeline(gl, state);
+    sat__gl_save_buffers(gl, state);
+    names = sat__gl_capability_names(gl, &count);
+    for (i = 0; i < count; i++)
+        if (state->capabilities[i]) gl->Disable(names[i]);
+    names = sat__gl_store_names(gl, &count);
+    for (i = 0; i < count; i++) gl->PixelStorei(names[i], i < 2);
+    for (i = 1; i < 3; i++) gl->BindBuffer(sat__gl_buffer_names()[2 * i], 0);
+    if (!gl->is_es && gl->PolygonMode) gl->PolygonMode(SAT__GL_FRONT_AND_BACK, SAT__GL_FILL);
+    gl->ColorMask(1, 1, 1, 1);
+    gl->DepthMask(1);
+    gl->BindVertexArray(gl->vertex_array);
+}
+
+static inline void sat__gl_restore_textures(sat__gl *gl, const sat__gl_state *state)
+{
+    int i;
+    for (i = 0; i < state->units; i++) {
+        gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)i);
+        gl->BindTexture(SAT__GL_TEXTURE_2D, (unsigned)state->textures[i][0]);
+        gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, (unsigned)state->textures[i][1]);
+        gl->BindSampler((unsigned)i, (unsigned)state->textures[i][2]);
+    }
+    gl->ActiveTexture((unsigned)state->active_texture);
+    for (i = 0; gl->has_compute && i < SAT__GL_IMAGES; i++) {
+        const int *v = state->images[i];
+        gl->BindImageTexture((unsigned)i, (unsigned)v[0], v[1], (unsigned char)v[2], v[3], (unsigned)v[4], (unsigned)v[5]);
+    }
+}
+
+static inline void sat__gl_restore_pipeline(sat__gl *gl, const sat__gl_state *state)
+{
+    const unsigned *names;
+    const int *b = state->blend;
+    int i, count;
+    gl->UseProgram((unsigned)state->program);
+    gl->BindVertexArray((unsigned)state->vertex_array);
+    gl->BindFramebuffer(SAT__GL_DRAW_FRAMEBUFFER, (unsigned)state->draw_framebuffer);
+    gl->BindFramebuffer(SAT__GL_READ_FRAMEBUFFER, (unsigned)state->read_framebuffer);
+    gl->Viewport(state->viewport[0], state->viewport[1], state->viewport[2], state->viewport[3]);
+    gl->DepthFunc((unsigned)state->depth_function);
+    gl->DepthMask(state->depth_mask);
+    gl->ColorMask(state->color_mask[0], state->color_mask[1], state->color_mask[2], state->color_mask[3]);
+    if (!gl->is_es && gl->PolygonMode) gl->PolygonMode(SAT__GL_FRONT_AND_BACK, (unsigned)state->polygon_mode[0]);
+    gl->BlendFuncSeparate((unsigned)b[0], (unsigned)b[1], (unsigned)b[2], (unsigned)b[3]);
+    gl->BlendEquationSeparate((unsigned)b[4], (unsigned)b[5]);
+    names = sat__gl_capability_names(gl, &count);
+    for (i = 0; i < count; i++) {
+        if (state->capabilities[i]) gl->Enable(names[i]);
+        else gl->Disable(names[i]);
+    }
+}
+
+static inline void sat__gl_restore_buffers(sat__gl *gl, const sat__gl_state *state)
+{
+    const unsigned *names;
+    int i, count;
+    names = sat__gl_store_names(gl, &count);
+    for (i = 0; i < count; i++) gl->PixelStorei(names[i], state->stores[i]);
+    if (state->feedback && state->feedback_size > 0)
+        gl->BindBufferRange(SAT__GL_TRANSFORM_FEEDBACK_BUFFER, 0, (unsigned)state->feedback, (ptrdiff_t)state->feedback_start,
+                            (ptrdiff_t)state->feedback_size);
+    else gl->BindBufferBase(SAT__GL_TRANSFORM_FEEDBACK_BUFFER, 0, (unsigned)state->feedback);
+    for (i = 0; i < 4; i++) gl->BindBuffer(sat__gl_buffer_names()[2 * i], (unsigned)state->buffers[i]);
+}
+
+/* Puts everything back. */
+static inline void sat__gl_end(sat__gl *gl, const sat__gl_state *state)
+{
+    sat__gl_restore_textures(gl, state);
+    sat__gl_restore_buffers(gl, state);
+    sat__gl_restore_pipeline(gl, state);
+}
+
+/* ---- time on the GPU between begin and end. Only one timer may run at a time. */
+
+typedef struct sat__gl_timer { unsigned query; } sat__gl_timer;
+
+static inline void sat__gl_timer_begin(sat__gl *gl, sat__gl_timer *timer)
+{
+    timer->query = 0;
+    if (!gl->has_timer) return;
+    gl->GenQueries(1, &timer->query);
+    gl->BeginQuery(SAT__GL_TIME_ELAPSED, timer->query);
+}
+
+/* Waits for the GPU. Seconds; below 0 where there is no timer: then time it between two calls of gl->Finish. */
+static inline double sat__gl_timer_end(sat__gl *gl, sat__gl_timer *timer)
+{
+    uint64_t nanoseconds = 0;
+    if (!timer->query) return -1;
+    gl->EndQuery(SAT__GL_TIME_ELAPSED);
+    gl->GetQueryObjectui64v(timer->query, SAT__GL_QUERY_RESULT, &nanoseconds);
+    gl->DeleteQueries(1, &timer->query);
+    timer->query = 0;
+    return 1e-9 * (double)nanoseconds;
+}
+
+#endif /* SAT__SHARED_GL */
 
 /* ------------------------------------------------------------------------------------------------
    Implementation
