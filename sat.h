@@ -558,6 +558,20 @@ static inline sat__f32x4 sat__i32x4_to_f32(sat__i32x4 v) { return _mm_cvtepi32_p
 static inline sat__i32x4 sat__f32x4_truncate(sat__f32x4 v) { return _mm_cvttps_epi32(v); } /* |v| < 2^31 */
 static inline sat__i32x4 sat__f32x4_bits(sat__f32x4 v) { return _mm_castps_si128(v); }
 static inline sat__f32x4 sat__f32x4_from_bits(sat__i32x4 v) { return _mm_castsi128_ps(v); }
+static inline sat__i32x4 sat__i32x4_shift_right(sat__i32x4 v, int bits) { return _mm_srl_epi32(v, _mm_cvtsi32_si128(bits)); } /* zeros come in */
+static inline void sat__f32x4_load3(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b) /* four packed RGB pixels */
+{
+    __m128 u = _mm_loadu_ps(p), v = _mm_loadu_ps(p + 4), w = _mm_loadu_ps(p + 8);       /* rgbr gbrg brgb */
+    __m128 s = _mm_shuffle_ps(v, w, _MM_SHUFFLE(2, 1, 3, 2)), t = _mm_shuffle_ps(u, v, _MM_SHUFFLE(1, 0, 2, 1)); /* rgrg gbgb */
+    *r = _mm_shuffle_ps(u, s, _MM_SHUFFLE(2, 0, 3, 0));
+    *g = _mm_shuffle_ps(t, s, _MM_SHUFFLE(3, 1, 2, 0));
+    *b = _mm_shuffle_ps(t, w, _MM_SHUFFLE(3, 0, 3, 1));
+}
+static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 *a) /* four RGBA pixels */
+{
+    *r = _mm_loadu_ps(p), *g = _mm_loadu_ps(p + 4), *b = _mm_loadu_ps(p + 8), *a = _mm_loadu_ps(p + 12);
+    _MM_TRANSPOSE4_PS(*r, *g, *b, *a);
+}
 #elif defined(SAT__NEON)
 #define SAT__VECTOR
 typedef float32x4_t sat__f32x4;
@@ -593,6 +607,20 @@ static inline sat__f32x4 sat__i32x4_to_f32(sat__i32x4 v) { return vcvtq_f32_s32(
 static inline sat__i32x4 sat__f32x4_truncate(sat__f32x4 v) { return vcvtq_s32_f32(v); }
 static inline sat__i32x4 sat__f32x4_bits(sat__f32x4 v) { return vreinterpretq_s32_f32(v); }
 static inline sat__f32x4 sat__f32x4_from_bits(sat__i32x4 v) { return vreinterpretq_f32_s32(v); }
+static inline sat__i32x4 sat__i32x4_shift_right(sat__i32x4 v, int bits)
+{
+    return vreinterpretq_s32_u32(vshlq_u32(vreinterpretq_u32_s32(v), vdupq_n_s32(-bits)));
+}
+static inline void sat__f32x4_load3(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b)
+{
+    float32x4x3_t v = vld3q_f32(p);
+    *r = v.val[0], *g = v.val[1], *b = v.val[2];
+}
+static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 *a)
+{
+    float32x4x4_t v = vld4q_f32(p);
+    *r = v.val[0], *g = v.val[1], *b = v.val[2], *a = v.val[3];
+}
 #endif
 
 /* What a sibling's implementation calls to be sure that sat.h was implemented, and in this version. */
