@@ -569,7 +569,10 @@ static inline void sat__f32x4_load3(const float *p, sat__f32x4 *r, sat__f32x4 *g
 }
 static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 *a) /* four RGBA pixels */
 {
-    *r = _mm_loadu_ps(p), *g = _mm_loadu_ps(p + 4), *b = _mm_loadu_ps(p + 8), *a = _mm_loadu_ps(p + 12);
+    *r = _mm_loadu_ps(p);
+    *g = _mm_loadu_ps(p + 4);
+    *b = _mm_loadu_ps(p + 8);
+    *a = _mm_loadu_ps(p + 12);
     _MM_TRANSPOSE4_PS(*r, *g, *b, *a);
 }
 #elif defined(SAT__NEON)
@@ -614,12 +617,17 @@ static inline sat__i32x4 sat__i32x4_shift_right(sat__i32x4 v, int bits)
 static inline void sat__f32x4_load3(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b)
 {
     float32x4x3_t v = vld3q_f32(p);
-    *r = v.val[0], *g = v.val[1], *b = v.val[2];
+    *r = v.val[0];
+    *g = v.val[1];
+    *b = v.val[2];
 }
 static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 *a)
 {
     float32x4x4_t v = vld4q_f32(p);
-    *r = v.val[0], *g = v.val[1], *b = v.val[2], *a = v.val[3];
+    *r = v.val[0];
+    *g = v.val[1];
+    *b = v.val[2];
+    *a = v.val[3];
 }
 #endif
 
