@@ -284,8 +284,7 @@ static inline const char *support_data(const char *name)
     turn = (turn + 1) % 8;
     for (i = 0; i < 3; ++i) {
         FILE *file;
-        if (!folders[i] || strlen(folders[i]) + strlen(name) + 2 > sizeof paths[0]) continue;
-        snprintf(paths[turn], sizeof paths[turn], "%s/%s", folders[i], name);
+        if (!folders[i] || snprintf(paths[turn], sizeof paths[0], "%s/%s", folders[i], name) >= (int)sizeof paths[0]) continue;
         file = fopen(paths[turn], "rb");
         if (file) { fclose(file); return paths[turn]; }
     }

@@ -1,0 +1,313 @@
+/* The glue of the examples: pictures, meshes, command line, threads. */
+
+#include "support.h"
+#include "common.h"
+#include "mesh.h"
+
+/* tests run in the root of the project, the two twins at the same time */
+#ifdef __cplusplus
+#define OUT_FILE(name) "build/cpp_" name
+#else
+#define OUT_FILE(name) "build/c_" name
+#endif
+
+static void fill_image(image *picture, int width, int height, int channels)
+{
+    uint64_t seed = 7;
+    size_t i, n = (size_t)width * (size_t)height * (size_t)channels;
+    EXPECT(image_create(picture, width, height, channels));
+    for (i = 0; i < n; ++i) picture->pixels[i] = (float)exp(8 * support_gaussian(&seed));
+}
+
+static int same_pixels(const image *a, const image *b)
+{
+    return a->width == b->width && a->height == b->height && a->channels == b->channels &&
+           memcmp(a->pixels, b->pixels, (size_t)a->width * (size_t)a->height * (size_t)a->channels * sizeof(float)) == 0;
+}
+
+/* ---- pictures ---- */
+
+TEST(pfm_comes_back)
+{
+    image a, b;
+    fill_image(&a, 37, 11, 3);
+    if (!EXPECT(image_save(&a, OUT_FILE("a.pfm"))) || !EXPECT(image_load(&b, OUT_FILE("a.pfm")))) return;
+    EXPECT(same_pixels(&a, &b));
+    image_free(&a);
+    image_free(&b);
+}
+
+TEST(exr_comes_back)
+{
+    image a, b;
+    size_t i;
+    int worst = 0;
+    fill_image(&a, 123, 45, 3);
+    if (!image_save(&a, OUT_FILE("a.exr"))) {
+        EXPECT(strstr(a.message, "libopenexr-dev") != NULL);
+        image_free(&a);
+        SKIP("needs libopenexr-dev");
+    }
+    if (!EXPECT(image_load(&b, OUT_FILE("a.exr")))) return;
+    EXPECT(same_pixels(&a, &b));
+    image_free(&b);
+    for (i = 0; i < 123 * 45 * 3; ++i) a.pixels[i] = (float)(1.0 + (double)i / 7.0);
+    EXPECT(image_save_exr(&a, OUT_FILE("half.exr"), 1));
+    if (!EXPECT(image_load(&b, OUT_FILE("half.exr")))) return;
+    for (i = 0; i < 123 * 45 * 3; ++i) worst |= !(fabsf(a.pixels[i] - b.pixels[i]) <= a.pixels[i] / 2048.0f);
+    EXPECT(!worst);
+    image_free(&a);
+    image_free(&b);
+}
+
+TEST(one_channel_exr_is_grey)
+{
+    image a, b;
+    int i, same = 1;
+    fill_image(&a, 8, 4, 1);
+    if (!image_save(&a, OUT_FILE("grey.exr"))) {
+        EXPECT(a.message[0] != 0);
+        image_free(&a);
+        SKIP("needs libopenexr-dev");
+    }
+    if (!EXPECT(image_load(&b, OUT_FILE("grey.exr")))) return;
+    EXPECT_EQ(b.channels, 3);
+    for (i = 0; i < 96; ++i) same &= b.pixels[i] == a.pixels[i / 3];
+    EXPECT(same);
+    image_free(&a);
+    image_free(&b);
+}
+
+TEST(png_keeps_8_bits)
+{
+    image a, b;
+    int i, worst = 0;
+    EXPECT(image_create(&a, 256, 3, 3));
+    for (i = 0; i < 256 * 3 * 3; ++i) a.pixels[i] = (float)i / (256 * 9);
+    a.pixels[0] = -1;
+    a.pixels[1] = 2;
+    a.pixels[2] = (float)NAN;
+    if (!EXPECT(image_save(&a, OUT_FILE("a.png")))) return;
+    if (!image_load(&b, OUT_FILE("a.png"))) {
+        EXPECT(strstr(b.message, "libstb-dev") != NULL);
+        image_free(&a);
+        SKIP("reading .png needs libstb-dev");
+    }
+    EXPECT_EQ(b.width, 256);
+    EXPECT_EQ(b.height, 3);
+    EXPECT_NEAR(b.pixels[0], 0, 0);
+    EXPECT_NEAR(b.pixels[1], 1, 0);
+    EXPECT_NEAR(b.pixels[2], 0, 0);
+    for (i = 3; i < 256 * 9; ++i) worst |= !(fabsf(a.pixels[i] - b.pixels[i]) <= 0.005f);
+    EXPECT(!worst);
+    image_free(&a);
+    image_free(&b);
+}
+
+TEST(bad_files_are_refused_with_a_sentence)
+{
+    image a;
+    FILE *file = fopen(OUT_FILE("bad.pfm"), "wb");
+    if (!EXPECT(file != NULL)) return;
+    fputs("PF\n10 10\n-1\n", file);
+    fclose(file);
+    EXPECT(!image_load(&a, OUT_FILE("bad.pfm")) && strstr(a.message, "ends too early") && !a.pixels);
+    EXPECT(!image_load(&a, "no/such.exr") && strstr(a.message, "cannot be opened"));
+    EXPECT(!image_load(&a, "Makefile") && strstr(a.message, "is none of"));
+    EXPECT(!image_create(&a, 0, 5, 3));
+    EXPECT(!image_create(&a, 1 << 20, 5, 3));
+    file = fopen(OUT_FILE("bad.exr"), "wb");
+    if (!EXPECT(file != NULL)) return;
+    fputs("this is no picture", file);
+    fclose(file);
+    EXPECT(!image_load(&a, OUT_FILE("bad.exr")) && a.message[0] && !a.pixels);
+}
+
+/* Every input the project is tried on: its size, or why it is refused. */
+typedef struct known_file { const char *path; int width, height; const char *refused; } known_file;
+
+static const known_file known_files[] = {
+    {"hdr/Desk.exr", 644, 874, NULL}, {"hdr/StillLife.exr", 1240, 846, NULL}, {"hdr/memorial.exr", 512, 768, NULL},
+    {"hdr/memorial.hdr", 512, 768, NULL}, {"hdr/belgium.exr", 1025, 769, NULL}, {"hdr/belgium.hdr", 1025, 769, NULL},
+    {"hdr/GoldenGate.exr", 1262, 860, NULL}, {"hdr/Fog.exr", 1000, 672, NULL}, {"hdr/Carrots.exr", 600, 400, NULL},
+    {"hdr/MtTamNorth.exr", 1198, 796, NULL}, {"hdr/AllHalfValues.exr", 256, 256, NULL},
+    {"hdr/BrightRingsNanInf.exr", 800, 800, NULL}, {"hdr/WideFloatRange.exr", 500, 500, NULL},
+    {"hdr/WideColorGamut.exr", 800, 800, NULL}, {"env/city.exr", 1024, 512, NULL}, {"env/interior.exr", 1024, 512, NULL},
+    {"env/night.exr", 1024, 512, NULL}, {"env/forest.exr", 1024, 512, NULL}, {"env/studio.exr", 1024, 512, NULL},
+    {"env/esplanade.exr", 512, 256, NULL}, {"env/workshop.exr", 512, 256, NULL}, {"env/lobby.exr", 512, 256, NULL},
+    {"env/apartment.exr", 512, 256, NULL}, {"env/StageEnvLatLong.exr", 1000, 500, NULL},
+    {"env/city_original_dwab.exr", 0, 0, "DWAB"}, {"photos/brushes.jpg", 1024, 806, NULL}, {"tiles/tiles_0.png", 2048, 2048, NULL},
+};
+
+TEST(known_files_load_or_are_refused)
+{
+    size_t i;
+    int seen = 0, absent_package = 0;
+    for (i = 0; i < sizeof known_files / sizeof known_files[0]; ++i) {
+        const known_file *k = &known_files[i];
+        const char *path = support_data(k->path);
+        image a;
+        if (!path) continue;
+        ++seen;
+        if (!image_load(&a, path)) {
+            if (strstr(a.message, "apt-get")) { absent_package = 1; continue; }
+            if (!EXPECT(k->refused && strstr(a.message, k->refused))) puts(a.message);
+            continue;
+        }
+        EXPECT(!k->refused);
+        EXPECT_EQ(a.width, k->width);
+        EXPECT_EQ(a.height, k->height);
+        image_free(&a);
+    }
+    if (absent_package) SKIP("reading all inputs needs libopenexr-dev and libstb-dev");
+    if (!seen) SKIP("no inputs in $LIGHTSCAN_DATA, ../shared/data or data");
+}
+
+static double mean_of(const image *a, int channel, int x0, int x1)
+{
+    double sum = 0;
+    int x, y;
+    for (y = 0; y < a->height; ++y)
+        for (x = x0; x < x1; ++x) sum += (double)a->pixels[3 * ((size_t)y * (size_t)a->width + (size_t)x) + (size_t)channel];
+    return sum / a->height / (x1 - x0);
+}
+
+TEST(same_picture_in_both_formats)
+{
+    const char *exr = support_data("hdr/memorial.exr"), *hdr = support_data("hdr/memorial.hdr");
+    image a, b;
+    if (!exr || !hdr) SKIP("hdr/memorial.exr and .hdr are not there");
+    if (!image_load(&a, exr)) SKIP(a.message);
+    if (!image_load(&b, hdr)) { image_free(&a); SKIP(b.message); }
+    EXPECT(same_pixels(&a, &b));
+    image_free(&a);
+    image_free(&b);
+}
+
+/* The right half of a chroma-subsampled picture is not empty, and its colours are those of a landscape. */
+TEST(subsampled_chroma_is_whole)
+{
+    const char *path = support_data("hdr/MtTamNorth.exr");
+    image a;
+    if (!path) SKIP("hdr/MtTamNorth.exr is not there");
+    if (!image_load(&a, path)) SKIP(a.message);
+    EXPECT(mean_of(&a, 1, a.width / 2, a.width) > 0.1 * mean_of(&a, 1, 0, a.width / 2));
+    EXPECT(mean_of(&a, 0, 0, a.width) > 0.3 * mean_of(&a, 1, 0, a.width));
+    EXPECT(mean_of(&a, 0, 0, a.width) < 3.0 * mean_of(&a, 1, 0, a.width));
+    image_free(&a);
+}
+
+/* ---- meshes ---- */
+
+TEST(known_meshes_load)
+{
+    static const struct { const char *path; int vertices, triangles; } known[] = {
+        {"mesh/bunny.ply", 35947, 69451}, {"mesh/bunny_small.ply", 1839, 3674}, {"mesh/dragon_res4.ply", 5205, 11102},
+        {"mesh/dragon_res4_ascii.ply", 5205, 11102}, {"mesh/queen.ply", 5162, 10320}, {"mesh/fandisk.ply", 6475, 12946},
+        {"mesh/teapot.ply", 3644, 6320}, {"mesh/city_gen1.ply", 19721, 27562}};
+    size_t i;
+    int seen = 0;
+    for (i = 0; i < sizeof known / sizeof known[0]; ++i) {
+        const char *path = support_data(known[i].path);
+        float low[3], high[3];
+        mesh m;
+        if (!path) continue;
+        ++seen;
+        if (!EXPECT(mesh_load(&m, path))) { puts(m.message); continue; }
+        EXPECT_EQ(m.vertex_count, known[i].vertices);
+        EXPECT_EQ(m.triangle_count, known[i].triangles);
+        mesh_bounds(&m, low, high);
+        EXPECT(low[0] < high[0] && low[1] < high[1] && low[2] < high[2] && high[0] < 1e6f);
+        mesh_free(&m);
+    }
+    if (!seen) SKIP("no meshes in $LIGHTSCAN_DATA, ../shared/data or data");
+}
+
+static int write_text(const char *path, const char *text)
+{
+    FILE *file = fopen(path, "wb");
+    if (!file) return 0;
+    fputs(text, file);
+    return fclose(file) == 0;
+}
+
+TEST(obj_with_a_quad_and_negative_numbers)
+{
+    mesh m;
+    if (!EXPECT(write_text(OUT_FILE("quad.obj"), "# four\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1 2/2 3//3 4\nf -4 -3 -2\n"))) return;
+    if (!EXPECT(mesh_load(&m, OUT_FILE("quad.obj")))) return;
+    EXPECT_EQ(m.triangle_count, 3);
+    EXPECT_EQ(m.indices[5], 3);
+    EXPECT_EQ(m.indices[6], 0);
+    mesh_free(&m);
+}
+
+TEST(bad_meshes_are_refused)
+{
+    mesh m;
+    EXPECT(write_text(OUT_FILE("bad.obj"), "v 0 0 0\nf 1 2 3\n") && !mesh_load(&m, OUT_FILE("bad.obj")) && strstr(m.message, "does not exist"));
+    EXPECT(write_text(OUT_FILE("bad.ply"), "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nend_header\n1 2") &&
+           !mesh_load(&m, OUT_FILE("bad.ply")) && strstr(m.message, "too early"));
+    EXPECT(!mesh_load(&m, "no/such.ply") && strstr(m.message, "cannot be opened"));
+    EXPECT(m.positions == NULL && m.indices == NULL);
+}
+
+/* ---- command line, threads, text ---- */
+
+TEST(options_are_read)
+{
+    float key = 1;
+    int local = 0, frames = 2, size[2] = {0, 0}, first;
+    const char *hour = "noon";
+    common_settings common;
+    common_option options[5] = {{"key", 'f', &key, ""}, {"local", 'b', &local, ""}, {"frames", 'i', &frames, ""},
+                                {"size", 'z', size, ""}, {"hour", 's', (void *)&hour, ""}};
+    char words[12][16] = {"prog", "--key", "0.5", "in.exr", "--local", "--size=1280x720", "--hour", "dusk", "--threads", "2", "--out", "o.png"};
+    char *argv[13];
+    int i;
+    for (i = 0; i < 12; ++i) argv[i] = words[i];
+    argv[12] = NULL;
+    first = common_parse(&common, 12, argv, "prog", options, 5);
+    EXPECT_NEAR(key, 0.5, 0);
+    EXPECT(local && size[0] == 1280 && size[1] == 720 && strcmp(hour, "dusk") == 0);
+    EXPECT_EQ(frames, 2);
+    EXPECT(strcmp(common.out, "o.png") == 0);
+    EXPECT(common.workers == 2 || !common.threads.parallel_for);
+    EXPECT(first == 11 && strcmp(argv[first], "in.exr") == 0);
+    EXPECT(!common_set(&options[0], "fast") && !common_set(&options[2], "1.5") && !common_set(&options[3], "10"));
+}
+
+static void mark_range(int begin, int end, int worker, void *context)
+{
+    unsigned char *marks = (unsigned char *)context;
+    int i;
+    (void)worker;
+    for (i = begin; i < end; ++i) ++marks[i];
+}
+
+TEST(threads_cover_each_item_once)
+{
+    static unsigned char marks[1000];
+    int workers = 3, i, once = 1;
+    sat_threads t = common_threads(&workers);
+    if (!t.parallel_for) {
+        EXPECT_EQ(workers, 1);
+        SKIP("built without OpenMP");
+    }
+    t.parallel_for(1000, mark_range, marks, t.user);
+    for (i = 0; i < 1000; ++i) once &= marks[i] == 1;
+    EXPECT(once);
+}
+
+TEST(contact_sheet_is_written)
+{
+    static unsigned char grey[40 * 30 * 3];
+    common_cell cells[3] = {{grey, 40, 30, "A: 1e-6"}, {grey, 40, 30, "b_c"}, {grey, 40, 30, NULL}};
+    common_canvas canvas = {grey, 40, 30};
+    int i, white = 0;
+    memset(grey, 128, sizeof grey);
+    common_text(&canvas, 1, 1, "I", 1);
+    for (i = 0; i < 40 * 30; ++i) white += grey[3 * i] == 255;
+    EXPECT_EQ(white, 11);       /* the serifs and the stem */
+    EXPECT(common_contact_sheet(OUT_FILE("sheet.png"), cells, 3, 2));
+}
