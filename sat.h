@@ -157,7 +157,7 @@ typedef enum sat_kind {
 } sat_kind;
 
 typedef enum sat_non_finite {
-    SAT_NON_FINITE_CLAMP, /* NaN counts as 0, infinity as +-max_value */
+    SAT_NON_FINITE_CLAMP, /* NaN counts as 0, infinity as +- the largest value the kind can sum */
     SAT_NON_FINITE_REFUSE /* build and update return SAT_ERR_NON_FINITE; the table then holds zeros */
 } sat_non_finite;
 
@@ -167,8 +167,8 @@ typedef struct sat_options {
     int subtract_mean;         /* 0; 1 (FLOAT, DOUBLE): Hensley 2005. Good at low contrast; makes dark boxes of
                                   HDR images about 100 times worse */
     double quantum;            /* 0: the finest power of two that max_value and max_box_area allow; FIXED kinds only */
-    double max_value;          /* 1e30; > 0: pixels beyond +-max_value are clamped to it and counted. Lower it for
-                                  FIXED kinds: the quantum is proportional to it. 0: largest |pixel| of the first build */
+    double max_value;          /* 0: as large as the kind can sum (FIXED kinds: the largest |pixel| of the first build).
+                                  > 0: pixels beyond +-max_value are clamped to it and counted */
     double max_box_area;       /* 0: the whole table; FIXED kinds: no larger box is ever asked for */
     sat_non_finite non_finite; /* SAT_NON_FINITE_CLAMP */
     sat_allocator allocator;   /* malloc; used by create and destroy only */
@@ -178,10 +178,10 @@ SAT_DEF sat_options sat_defaults(void);
 
 typedef struct sat_table sat_table;
 
-/* What the last build or update met. */
+/* What the last build or update met. FIXED kinds keep the quantum that the first build settled. */
 typedef struct sat_statistics {
     size_t nan, infinite, clamped; /* channel values replaced: NaN, infinite, beyond max_value */
-    double largest, mean_abs;      /* over |value| of all channels, after replacement */
+    double largest, mean_abs;      /* over |value| of all channels, after replacement (and less the mean when subtracted) */
     double quantum;                /* FIXED kinds: the step that pixels are rounded to; else 0 */
     size_t bytes;                  /* memory the table holds */
 } sat_statistics;
@@ -1508,7 +1508,1648 @@ SAT_DEF sat_image sat_image_f32(const float *pixels, int width, int height, int 
     return image;
 }
 
-/* @CORE@ */
+/* @CORE BEGIN@ */
+/* ---- scans */
+
+SAT_DEF sat_scan_options sat_scan_defaults(void)
+{
+    sat_scan_options options;
+    memset(&options, 0, sizeof options);
+    options.k = 4;
+    return options;
+}
+
+/* One pass of a scan over elements of any type: destination and source levels and where they lie. */
+typedef struct sat__scan {
+    unsigned char *out;
+    const unsigned char *in, *uncles;
+    size_t n, size, offset; /* offset: recursive doubling's distance between terms */
+    unsigned char *temporaries; /* two elements a worker, because combine must not write onto its operands */
+    sat_combine_fn *combine;
+    void *user;
+    sat_scan_counters counters;
+    const sat_threads *threads; /* NULL while counting */
+    int k;
+} sat__scan;
+
+/* Work is cut into blocks of this many elements: an int counts the blocks of any array. */
+enum { SAT__SCAN_BLOCK = 1 << 14 };
+
+static void sat__scan_run(sat__scan *scan, size_t elements, sat_range_fn *body)
+{
+    sat__parallel_for(scan->threads, (int)((elements + SAT__SCAN_BLOCK - 1) / SAT__SCAN_BLOCK), body, scan);
+    scan->counters.passes++;
+}
+
+/* target = source[0] + source[step] + ... + source[(terms-1) step], left to right, after *first when it is given. */
+static void sat__scan_fold(sat__scan *scan, unsigned char *target, const unsigned char *first,
+                           const unsigned char *source, size_t terms, size_t step, int worker)
+{
+    unsigned char *left = scan->temporaries + (size_t)worker * 2 * scan->size, *next = left + scan->size, *swap;
+    size_t i = first ? 0 : 1;
+    memcpy(left, first ? first : source, scan->size);
+    if (!scan->threads) {
+        scan->counters.reads += terms + (first != NULL);
+        scan->counters.adds += terms - (first == NULL);
+        scan->counters.writes++;
+        scan->counters.nodes++;
+    }
+    for (; i < terms; i++) {
+        scan->combine(next, left, source + i * step * scan->size, scan->user);
+        swap = left;
+        left = next;
+        next = swap;
+    }
+    memcpy(target, left, scan->size);
+}
+
+/* Recursive doubling, one pass: out[i] = in[i - (k-1) offset] + ... + in[i - offset] + in[i], where terms before
+   the array count nothing (Slomp 2012, section 4.4). Elements below `offset` are final; of them those below
+   offset / k are in both halves already. The thesis prints other copy counts, which are right for k = 2 only. */
+static void sat__scan_doubling(int begin, int end, int worker, void *context)
+{
+    sat__scan *scan = (sat__scan *)context;
+    size_t i = (size_t)begin * SAT__SCAN_BLOCK, stop = (size_t)end * SAT__SCAN_BLOCK;
+    size_t offset = scan->offset, final_in_both = offset / (size_t)scan->k;
+    if (stop > scan->n) stop = scan->n;
+    if (i < final_in_both) i = final_in_both;
+    for (; i < stop; i++) {
+        size_t terms = i / offset + 1;
+        if (terms > (size_t)scan->k) terms = (size_t)scan->k;
+        if (i >= offset) {
+            sat__scan_fold(scan, scan->out + i * scan->size, NULL, scan->in + (i - (terms - 1) * offset) * scan->size, terms, offset, worker);
+            continue;
+        }
+        memcpy(scan->out + i * scan->size, scan->in + i * scan->size, scan->size);
+        if (scan->threads) continue;
+        scan->counters.copies++;
+        scan->counters.reads++;
+        scan->counters.writes++;
+    }
+}
+
+/* The result lands in `out`: `scratch` (n elements) takes the other half of the ping-pong. */
+static void sat__scan_recursive_doubling(sat__scan *scan, unsigned char *out, unsigned char *scratch, const void *in)
+{
+    unsigned char *from = out, *to = scratch, *swap;
+    size_t passes = 0, offset;
+    for (offset = 1; offset < scan->n; passes++) offset = offset > SIZE_MAX / (size_t)scan->k ? SIZE_MAX : offset * (size_t)scan->k;
+    if (passes % 2) {
+        from = scratch;
+        to = out;
+    }
+    if (from != in) memcpy(from, in, scan->n * scan->size);
+    for (offset = 1; offset < scan->n; offset *= (size_t)scan->k) {
+        scan->in = from;
+        scan->out = to;
+        scan->offset = offset;
+        sat__scan_run(scan, scan->n, sat__scan_doubling);
+        swap = from;
+        from = to;
+        to = swap;
+        if (offset > SIZE_MAX / (size_t)scan->k) break;
+    }
+}
+
+/* Balanced tree, one reduction: node g = sum of its k children (section 4.5). */
+static void sat__scan_reduce(int begin, int end, int worker, void *context)
+{
+    sat__scan *scan = (sat__scan *)context;
+    size_t k = (size_t)scan->k, g = (size_t)begin * SAT__SCAN_BLOCK, stop = (size_t)end * SAT__SCAN_BLOCK;
+    size_t nodes = (scan->n + k - 1) / k;
+    if (stop > nodes) stop = nodes;
+    for (; g < stop; g++) {
+        size_t terms = scan->n - g * k < k ? scan->n - g * k : k;
+        sat__scan_fold(scan, scan->out + g * scan->size, NULL, scan->in + g * k * scan->size, terms, 1, worker);
+    }
+}
+
+/* Balanced tree, one direct inclusive expansion: child = uncle (the finished node left of its parent) + its reduced
+   siblings to the left + itself. Right to left, so that a level may be expanded in place. */
+static void sat__scan_expand(int begin, int end, int worker, void *context)
+{
+    sat__scan *scan = (sat__scan *)context;
+    size_t k = (size_t)scan->k, g = (size_t)begin * SAT__SCAN_BLOCK, stop = (size_t)end * SAT__SCAN_BLOCK;
+    size_t groups = (scan->n + k - 1) / k, d;
+    if (stop > groups) stop = groups;
+    for (; g < stop; g++) {
+        const unsigned char *uncle = g ? scan->uncles + (g - 1) * scan->size : NULL;
+        for (d = scan->n - g * k < k ? scan->n - g * k : k; d-- > 0;)
+            sat__scan_fold(scan, scan->out + (g * k + d) * scan->size, uncle, scan->in + g * k * scan->size, d + 1, 1, worker);
+    }
+}
+
+/* levels: scratch for the reduced levels 1, 2, ... one behind the other; the root is never computed. */
+static void sat__scan_balanced_tree(sat__scan *scan, unsigned char *out, unsigned char *levels, const unsigned char *in)
+{
+    size_t counts[66], begins[66], k = (size_t)scan->k, level = 0;
+    counts[0] = scan->n;
+    begins[0] = begins[1] = 0;
+    for (; counts[level] > k; level++) {
+        counts[level + 1] = (counts[level] + k - 1) / k;
+        begins[level + 2] = begins[level + 1] + counts[level + 1] * scan->size;
+        scan->in = level ? levels + begins[level] : in;
+        scan->out = levels + begins[level + 1];
+        scan->n = counts[level];
+        sat__scan_run(scan, counts[level + 1], sat__scan_reduce);
+    }
+    scan->uncles = NULL;
+    for (level++; level-- > 0;) {
+        scan->n = counts[level];
+        scan->in = level ? levels + begins[level] : in;
+        scan->out = level ? levels + begins[level] : out;
+        sat__scan_run(scan, (counts[level] + k - 1) / k, sat__scan_expand);
+        scan->uncles = scan->out;
+    }
+}
+
+static void sat__scan_sequential(sat__scan *scan, unsigned char *out, const unsigned char *in)
+{
+    size_t i;
+    scan->threads = NULL;
+    memmove(out, in, scan->size);
+    for (i = 1; i < scan->n; i++) {
+        unsigned char *sum = scan->temporaries;
+        scan->combine(sum, out + (i - 1) * scan->size, in + i * scan->size, scan->user);
+        memcpy(out + i * scan->size, sum, scan->size);
+    }
+    scan->counters.passes = 1;
+    scan->counters.adds = scan->n - 1;
+    scan->counters.reads = scan->counters.writes = scan->counters.nodes = scan->n;
+}
+
+/* Elements of scratch: the other ping-pong half, or all reduced levels of the tree. */
+static size_t sat__scan_scratch(const sat_scan_options *options, size_t n)
+{
+    size_t k = (size_t)options->k, total = 0;
+    if (options->algorithm == SAT_SCAN_RECURSIVE_DOUBLING) return n;
+    if (options->algorithm == SAT_SCAN_BALANCED_TREE)
+        for (; n > k; total += n) n = (n + k - 1) / k;
+    return total;
+}
+
+static sat_result sat__scan_check(sat_scan_options *resolved, sat_allocator *allocator, const void *out, const void *in,
+                                  size_t n, const sat_scan_options *options)
+{
+    *resolved = options ? *options : sat_scan_defaults();
+    if ((n && (!out || !in)) || resolved->k < 2 || resolved->k > 64) return SAT_ERR_ARGUMENT;
+    if ((unsigned)resolved->algorithm > (unsigned)SAT_SCAN_BALANCED_TREE) return SAT_ERR_ARGUMENT;
+    if (!sat__threads_are_valid(&resolved->threads)) return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(allocator, &resolved->allocator)) return SAT_ERR_ARGUMENT;
+    if (n / SAT__SCAN_BLOCK >= (size_t)0x7fffffff) return SAT_ERR_SIZE;
+    if (resolved->counters) memset(resolved->counters, 0, sizeof *resolved->counters);
+    return SAT_OK;
+}
+
+SAT_DEF sat_result sat_scan_any(void *out, const void *in, size_t n, size_t element_size, sat_combine_fn *combine,
+                                const void *identity, void *user, const sat_scan_options *options)
+{
+    sat_scan_options resolved;
+    sat_allocator allocator;
+    sat__scan scan;
+    size_t elements, bytes;
+    unsigned char *scratch;
+    sat_result result = sat__scan_check(&resolved, &allocator, out, in, n, options);
+    if (result) return result;
+    if (!combine || element_size < 1 || element_size > 4096 || (resolved.exclusive && !identity)) return SAT_ERR_ARGUMENT;
+    if (n == 0) return SAT_OK;
+
+    memset(&scan, 0, sizeof scan);
+    scan.n = n;
+    scan.size = element_size;
+    scan.combine = combine;
+    scan.user = user;
+    scan.k = resolved.k;
+    scan.threads = resolved.counters ? NULL : &resolved.threads;
+    elements = 2 * (size_t)sat__worker_count(&resolved.threads) + sat__scan_scratch(&resolved, n);
+    if (!sat__multiply_size(&bytes, elements, element_size)) return SAT_ERR_SIZE;
+    scratch = (unsigned char *)sat__alloc(&allocator, bytes);
+    if (!scratch) return SAT_ERR_MEMORY;
+    scan.temporaries = scratch;
+    scratch += 2 * (size_t)sat__worker_count(&resolved.threads) * element_size;
+
+    if (resolved.algorithm == SAT_SCAN_RECURSIVE_DOUBLING) sat__scan_recursive_doubling(&scan, (unsigned char *)out, scratch, in);
+    else if (resolved.algorithm == SAT_SCAN_BALANCED_TREE) sat__scan_balanced_tree(&scan, (unsigned char *)out, scratch, (const unsigned char *)in);
+    else sat__scan_sequential(&scan, (unsigned char *)out, (const unsigned char *)in);
+
+    if (resolved.exclusive) {
+        memmove((unsigned char *)out + element_size, out, (n - 1) * element_size);
+        memcpy(out, identity, element_size);
+    }
+    if (resolved.counters) *resolved.counters = scan.counters;
+    sat__release(&allocator, scan.temporaries, bytes);
+    return SAT_OK;
+}
+
+/* The typed scans: a plain loop when sequential, else the general one with this sum. */
+#define SAT__DEFINE_SCAN(suffix, type)                                                                                 \
+    static void sat__combine_##suffix(void *out, const void *left, const void *right, void *user)                      \
+    {                                                                                                                  \
+        type a, b;                                                                                                     \
+        (void)user;                                                                                                    \
+        memcpy(&a, left, sizeof a);                                                                                    \
+        memcpy(&b, right, sizeof b);                                                                                   \
+        a = (type)(a + b);                                                                                             \
+        memcpy(out, &a, sizeof a);                                                                                     \
+    }                                                                                                                  \
+    SAT_DEF sat_result sat_scan_##suffix(type *out, const type *in, size_t n, const sat_scan_options *options)         \
+    {                                                                                                                  \
+        sat_scan_options resolved;                                                                                     \
+        sat_allocator allocator;                                                                                       \
+        const type zero = 0;                                                                                           \
+        type sum = 0, value;                                                                                           \
+        size_t i;                                                                                                      \
+        sat_result result = sat__scan_check(&resolved, &allocator, out, in, n, options);                               \
+        if (result) return result;                                                                                     \
+        if (resolved.algorithm != SAT_SCAN_SEQUENTIAL || resolved.counters)                                            \
+            return sat_scan_any(out, in, n, sizeof(type), sat__combine_##suffix, &zero, NULL, options);                \
+        for (i = 0; i < n; i++) {                                                                                      \
+            value = in[i];                                                                                             \
+            if (resolved.exclusive) out[i] = sum;                                                                      \
+            sum = (type)(sum + value);                                                                                 \
+            if (!resolved.exclusive) out[i] = sum;                                                                     \
+        }                                                                                                              \
+        return SAT_OK;                                                                                                 \
+    }
+
+SAT__DEFINE_SCAN(f32, float)
+SAT__DEFINE_SCAN(f64, double)
+SAT__DEFINE_SCAN(u32, uint32_t)
+SAT__DEFINE_SCAN(u64, uint64_t)
+
+/* Two's complement sums are the unsigned ones. */
+SAT_DEF sat_result sat_scan_i32(int32_t *out, const int32_t *in, size_t n, const sat_scan_options *options)
+{
+    return sat_scan_u32((uint32_t *)out, (const uint32_t *)in, n, options);
+}
+
+/* A k-ary counter of partial sums: level l holds up to k - 1 finished sums of k^l values. */
+SAT_DEF double sat_reduce_f32(const float *in, size_t n, ptrdiff_t stride, int k)
+{
+    double level[64] = {0}, total = 0;
+    unsigned char held[64] = {0};
+    int l, top = 0;
+    size_t i;
+    if (!in) return 0;
+    if (k < 2 || k > 64) k = 4;
+    for (i = 0; i < n; i++) {
+        double value = (double)*(const float *)(const void *)((const unsigned char *)in + (ptrdiff_t)i * stride);
+        for (l = 0;; l++) {
+            level[l] = held[l] ? level[l] + value : value;
+            if (++held[l] < k) break;
+            held[l] = 0;
+            value = level[l];
+        }
+        if (l > top) top = l;
+    }
+    for (l = 0; l <= top; l++)
+        if (held[l]) total += level[l];
+    return total;
+}
+
+/* ---- tables: layout
+
+   Corners are numbered like grid lines: corner (X, Y) holds the sum of [0,X) x [0,Y), so X = 0 and Y = 0 are a stored
+   border of zeros and no lookup branches at an edge (eq 4.4 with its cases put in order). Channels are planes.
+   The tile of a corner is that of the pixel to its upper left; corner 0 belongs to tile 0. A tiled table is
+
+     S(X, Y) = above[tile row][X] + left[Y][tile column] + local[Y][X]
+
+   local: float sums that restart in every tile; left: double, all columns left of the tile over the tile's own rows;
+   above: double, all rows above the tile row. */
+
+enum { SAT__LINE = 64, SAT__STRIP = 512, SAT__MAX_STRIP = 4096 };
+
+/* What one band of rows, or one strip of columns, met: summed in a fixed order afterwards. */
+typedef struct sat__tally {
+    size_t nan, infinite, clamped;
+    double largest, sum_abs, tile_largest, tile_squares;
+    int negative;
+} sat__tally;
+
+struct sat_table {
+    sat_options options;
+    sat_allocator allocator;
+    void *block;
+    size_t block_bytes;
+    int width, height, channels, shift; /* tile side = 1 << shift */
+    int tiles_x, tiles_y, bands;        /* bands: entries of `tallies` a channel */
+    int rows;                           /* stored corner rows; less than height + 1 only in a stream */
+    size_t element, stride, plane;      /* bytes; elements between corner rows; elements between channels */
+    unsigned char *sums;                /* corner (0, 0) of channel 0 */
+    double *left, *above;               /* tiled only */
+    size_t left_plane, above_plane, above_stride;
+    unsigned char *columns;             /* running column sums: a set for each channel and, tiled, for each worker */
+    size_t columns_stride;
+    float *pixels;                      /* one row piece a worker */
+    uint64_t *integers;                 /* the same, quantised */
+    sat__tally *tallies, total[4];
+    double quantum, limit;              /* pixels are clamped to +-limit */
+    float mean[4];
+    int build_failed;                   /* non-finite input refused */
+};
+
+static int sat__is_fixed(sat_kind kind) { return kind == SAT_KIND_FIXED32 || kind == SAT_KIND_FIXED64; }
+
+static size_t sat__kind_size(sat_kind kind) { return kind == SAT_KIND_DOUBLE || kind == SAT_KIND_FIXED64 ? 8 : 4; }
+
+static int sat__tile_of(const sat_table *t, int corner) { return (corner - (corner > 0)) >> t->shift; }
+
+/* Corner (0, y) of a channel, where y counts stored rows. */
+static unsigned char *sat__row(const sat_table *t, int channel, int y)
+{
+    return t->sums + ((size_t)channel * t->plane + (size_t)y * t->stride) * t->element;
+}
+
+static double *sat__left(const sat_table *t, int channel, int y)
+{
+    return t->left + (size_t)channel * t->left_plane + (size_t)y * (size_t)t->tiles_x;
+}
+
+static double *sat__above(const sat_table *t, int channel, int tile_row)
+{
+    return t->above + (size_t)channel * t->above_plane + (size_t)tile_row * t->above_stride;
+}
+
+SAT_DEF sat_options sat_defaults(void)
+{
+    sat_options options;
+    memset(&options, 0, sizeof options);
+    options.tile = 32;
+    return options;
+}
+
+static int sat__options_are_valid(const sat_options *o)
+{
+    if ((unsigned)o->kind > (unsigned)SAT_KIND_FIXED64 || (unsigned)o->non_finite > (unsigned)SAT_NON_FINITE_REFUSE) return 0;
+    if (o->tile < 8 || o->tile > 128 || (o->tile & (o->tile - 1))) return 0;
+    if (!(o->quantum >= 0) || !(o->max_value >= 0) || !(o->max_box_area >= 0)) return 0;
+    if (!sat__is_finite_double(o->quantum) || !sat__is_finite_double(o->max_value) || !sat__is_finite_double(o->max_box_area)) return 0;
+    if (o->subtract_mean && o->kind != SAT_KIND_FLOAT && o->kind != SAT_KIND_DOUBLE) return 0;
+    return sat__threads_are_valid(&o->threads);
+}
+
+/* All memory of a table, in one block: with base NULL this measures it. */
+static size_t sat__lay_out(sat_table *t, unsigned char *base)
+{
+    sat__arena arena;
+    size_t line = SAT__LINE / t->element, workers = (size_t)sat__worker_count(&t->options.threads);
+    size_t corners = (size_t)t->width + 1, channels = (size_t)t->channels, planes;
+    int tiled = t->options.kind == SAT_KIND_TILED;
+    arena.base = base;
+    arena.used = 0;
+    arena.overflow = 0;
+    /* corner 1 starts a cache line, so that whole rows can be stored with aligned vectors */
+    t->stride = (corners + line - 1 + line - 1) / line * line;
+    t->plane = t->stride * (size_t)t->rows;
+    if (!sat__multiply_size(&planes, t->plane, channels) || t->plane / t->stride != (size_t)t->rows) return 0;
+    t->sums = (unsigned char *)sat__carve(&arena, planes, t->element);
+    if (t->sums) t->sums += (line - 1) * t->element;
+    t->left_plane = (size_t)t->rows * (size_t)t->tiles_x;
+    t->above_stride = corners;
+    t->above_plane = corners * (size_t)t->tiles_y;
+    t->left = tiled ? (double *)sat__carve(&arena, t->left_plane * channels, sizeof(double)) : NULL;
+    t->above = tiled ? (double *)sat__carve(&arena, t->above_plane * channels, sizeof(double)) : NULL;
+    t->columns_stride = (corners + line) / line * line * t->element;
+    t->columns = (unsigned char *)sat__carve(&arena, tiled && workers > channels ? workers : channels, t->columns_stride);
+    t->pixels = (float *)sat__carve(&arena, workers * SAT__MAX_STRIP, sizeof(float));
+    t->integers = sat__is_fixed(t->options.kind) ? (uint64_t *)sat__carve(&arena, workers * SAT__MAX_STRIP, sizeof(uint64_t)) : NULL;
+    t->tallies = (sat__tally *)sat__carve(&arena, (size_t)t->bands * channels, sizeof(sat__tally));
+    return arena.overflow ? 0 : arena.used;
+}
+
+/* rows: corner rows to store, and tile_rows: strips above to store. */
+static sat_result sat__table_create(sat_table **out, int width, int height, int rows, int tile_rows, int channels, const sat_options *options)
+{
+    sat_table t, *table;
+    unsigned char *base;
+    memset(&t, 0, sizeof t);
+    t.options = options ? *options : sat_defaults();
+    if (width < 1 || height < 1 || channels < 1 || channels > 4 || !sat__options_are_valid(&t.options)) return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(&t.allocator, &t.options.allocator)) return SAT_ERR_ARGUMENT;
+    if (width == 0x7fffffff || height == 0x7fffffff) return SAT_ERR_SIZE;
+    t.width = width;
+    t.height = height;
+    t.rows = rows;
+    t.channels = channels;
+    t.element = sat__kind_size(t.options.kind);
+    while (1 << t.shift < t.options.tile) t.shift++;
+    t.tiles_x = (width - 1) / t.options.tile + 1;
+    t.tiles_y = tile_rows;
+    t.bands = t.options.kind == SAT_KIND_TILED ? t.tiles_y : (width + SAT__STRIP - 1) / SAT__STRIP;
+    t.block_bytes = sat__lay_out(&t, NULL);
+    if (!t.block_bytes || t.block_bytes > SIZE_MAX / 2 - sizeof t - SAT__LINE) return SAT_ERR_SIZE;
+    t.block_bytes += sizeof t + SAT__LINE;
+    t.block = sat__alloc(&t.allocator, t.block_bytes);
+    if (!t.block) return SAT_ERR_MEMORY;
+    memset(t.block, 0, t.block_bytes);
+    base = (unsigned char *)t.block;
+    table = (sat_table *)t.block;
+    sat__lay_out(&t, sat__align64(base + sizeof t));
+    *table = t;
+    *out = table;
+    return SAT_OK;
+}
+
+SAT_DEF sat_result sat_create(sat_table **out, int width, int height, int channels, const sat_options *options)
+{
+    int tile = options ? options->tile : 32;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (tile < 1 || height < 1) return SAT_ERR_ARGUMENT;
+    return sat__table_create(out, width, height, height == 0x7fffffff ? height : height + 1, (height - 1) / tile + 1, channels, options);
+}
+
+SAT_DEF void sat_destroy(sat_table *table)
+{
+    if (table) {
+        sat_allocator allocator = table->allocator;
+        sat__release(&allocator, table->block, table->block_bytes);
+    }
+}
+
+/* ---- tables: one row of running sums
+
+   Each step takes eight pixels: add them to the running column sums, then make prefix sums of these eight by halves
+   (pairs, fours, eight), then add the carry of the row so far. Only that last addition waits for the step before.
+   The vector code does the same additions in the same order: the same bits with SSE2, NEON and plain C. */
+
+#define SAT__DEFINE_SUM_ROW(suffix, type, pixel)                                                                       \
+    static type sat__sum_row_plain_##suffix(type *out, type *column, const pixel *in, int n, type carry)               \
+    {                                                                                                                  \
+        int i, j;                                                                                                      \
+        for (i = 0; i < n; i += 8) {                                                                                   \
+            type c[8];                                                                                                 \
+            int m = n - i < 8 ? n - i : 8;                                                                             \
+            for (j = 0; j < 8; j++) c[j] = 0;                                                                          \
+            for (j = 0; j < m; j++) c[j] = column[i + j] = (type)(column[i + j] + (type)in[i + j]);                    \
+            c[1] += c[0], c[3] += c[2], c[5] += c[4], c[7] += c[6];                                                    \
+            c[2] += c[1], c[3] += c[1], c[6] += c[5], c[7] += c[5];                                                    \
+            c[4] += c[3], c[5] += c[3], c[6] += c[3], c[7] += c[3];                                                    \
+            for (j = 0; j < m; j++) out[i + j] = c[j] + carry;                                                         \
+            carry += c[7];                                                                                             \
+        }                                                                                                              \
+        return carry;                                                                                                  \
+    }
+
+SAT__DEFINE_SUM_ROW(f32, float, float)
+SAT__DEFINE_SUM_ROW(f64, double, float)
+SAT__DEFINE_SUM_ROW(u32, uint32_t, uint32_t)
+SAT__DEFINE_SUM_ROW(u64, uint64_t, uint64_t)
+
+#if defined(SAT__SSE2)
+typedef __m128 sat__vec_f32;
+typedef __m128d sat__vec_f64;
+typedef __m128i sat__vec_u32;
+typedef __m128i sat__vec_u64;
+#define SAT__LOAD_f32(p) _mm_loadu_ps(p)
+#define SAT__LOAD_f64(p) _mm_loadu_pd(p)
+#define SAT__LOAD_u32(p) _mm_loadu_si128((const __m128i *)(const void *)(p))
+#define SAT__LOAD_u64(p) _mm_loadu_si128((const __m128i *)(const void *)(p))
+#define SAT__PIXELS_f64(p) _mm_cvtps_pd(_mm_castsi128_ps(_mm_loadl_epi64((const __m128i *)(const void *)(p))))
+#define SAT__STORE_f32(p, v) _mm_storeu_ps(p, v)
+#define SAT__STORE_f64(p, v) _mm_storeu_pd(p, v)
+#define SAT__STORE_u32(p, v) _mm_storeu_si128((__m128i *)(void *)(p), v)
+#define SAT__STORE_u64(p, v) _mm_storeu_si128((__m128i *)(void *)(p), v)
+#define SAT__STREAM_f32(p, v) _mm_stream_ps(p, v)
+#define SAT__STREAM_f64(p, v) _mm_stream_pd(p, v)
+#define SAT__STREAM_u32(p, v) _mm_stream_si128((__m128i *)(void *)(p), v)
+#define SAT__STREAM_u64(p, v) _mm_stream_si128((__m128i *)(void *)(p), v)
+#define SAT__ADD_f32(a, b) _mm_add_ps(a, b)
+#define SAT__ADD_f64(a, b) _mm_add_pd(a, b)
+#define SAT__ADD_u32(a, b) _mm_add_epi32(a, b)
+#define SAT__ADD_u64(a, b) _mm_add_epi64(a, b)
+#define SAT__SET_f32(s) _mm_set1_ps(s)
+#define SAT__SET_f64(s) _mm_set1_pd(s)
+#define SAT__SET_u32(s) _mm_set1_epi32((int32_t)(s))
+#define SAT__SET_u64(s) _mm_set1_epi64x((int64_t)(s))
+#define SAT__LAST_f32(v) _mm_shuffle_ps(v, v, 255)
+#define SAT__LAST_f64(v) _mm_unpackhi_pd(v, v)
+#define SAT__LAST_u32(v) _mm_shuffle_epi32(v, 255)
+#define SAT__LAST_u64(v) _mm_unpackhi_epi64(v, v)
+/* within a vector: pairs, then the first pair's sum onto the second pair */
+static inline sat__vec_f32 sat__prefix_f32(sat__vec_f32 v)
+{
+    v = _mm_add_ps(v, _mm_castsi128_ps(_mm_slli_epi64(_mm_castps_si128(v), 32)));
+    return _mm_add_ps(v, _mm_shuffle_ps(_mm_setzero_ps(), v, _MM_SHUFFLE(1, 1, 0, 0)));
+}
+static inline sat__vec_u32 sat__prefix_u32(sat__vec_u32 v)
+{
+    v = _mm_add_epi32(v, _mm_slli_epi64(v, 32));
+    return _mm_add_epi32(v, _mm_slli_si128(_mm_shuffle_epi32(v, 0x55), 8));
+}
+#define SAT__PREFIX_f64(v) _mm_add_pd(v, _mm_unpacklo_pd(_mm_setzero_pd(), v))
+#define SAT__PREFIX_u64(v) _mm_add_epi64(v, _mm_slli_si128(v, 8))
+#elif defined(SAT__NEON)
+typedef float32x4_t sat__vec_f32;
+typedef float64x2_t sat__vec_f64;
+typedef uint32x4_t sat__vec_u32;
+typedef uint64x2_t sat__vec_u64;
+#define SAT__LOAD_f32(p) vld1q_f32(p)
+#define SAT__LOAD_f64(p) vld1q_f64(p)
+#define SAT__LOAD_u32(p) vld1q_u32(p)
+#define SAT__LOAD_u64(p) vld1q_u64(p)
+#define SAT__PIXELS_f64(p) vcvt_f64_f32(vld1_f32(p))
+#define SAT__STORE_f32(p, v) vst1q_f32(p, v)
+#define SAT__STORE_f64(p, v) vst1q_f64(p, v)
+#define SAT__STORE_u32(p, v) vst1q_u32(p, v)
+#define SAT__STORE_u64(p, v) vst1q_u64(p, v)
+#define SAT__STREAM_f32(p, v) vst1q_f32(p, v)
+#define SAT__STREAM_f64(p, v) vst1q_f64(p, v)
+#define SAT__STREAM_u32(p, v) vst1q_u32(p, v)
+#define SAT__STREAM_u64(p, v) vst1q_u64(p, v)
+#define SAT__ADD_f32(a, b) vaddq_f32(a, b)
+#define SAT__ADD_f64(a, b) vaddq_f64(a, b)
+#define SAT__ADD_u32(a, b) vaddq_u32(a, b)
+#define SAT__ADD_u64(a, b) vaddq_u64(a, b)
+#define SAT__SET_f32(s) vdupq_n_f32(s)
+#define SAT__SET_f64(s) vdupq_n_f64(s)
+#define SAT__SET_u32(s) vdupq_n_u32(s)
+#define SAT__SET_u64(s) vdupq_n_u64(s)
+#define SAT__LAST_f32(v) vdupq_laneq_f32(v, 3)
+#define SAT__LAST_f64(v) vdupq_laneq_f64(v, 1)
+#define SAT__LAST_u32(v) vdupq_laneq_u32(v, 3)
+#define SAT__LAST_u64(v) vdupq_laneq_u64(v, 1)
+static inline sat__vec_u32 sat__prefix_u32(sat__vec_u32 v)
+{
+    v = vaddq_u32(v, vreinterpretq_u32_u64(vshlq_n_u64(vreinterpretq_u64_u32(v), 32)));
+    return vaddq_u32(v, vcombine_u32(vdup_n_u32(0), vdup_laneq_u32(v, 1)));
+}
+static inline sat__vec_f32 sat__prefix_f32(sat__vec_f32 v)
+{
+    v = vaddq_f32(v, vreinterpretq_f32_u64(vshlq_n_u64(vreinterpretq_u64_f32(v), 32)));
+    return vaddq_f32(v, vcombine_f32(vdup_n_f32(0), vdup_laneq_f32(v, 1)));
+}
+#define SAT__PREFIX_f64(v) vaddq_f64(v, vcombine_f64(vdup_n_f64(0), vdup_laneq_f64(v, 0)))
+#define SAT__PREFIX_u64(v) vaddq_u64(v, vcombine_u64(vdup_n_u64(0), vdup_laneq_u64(v, 0)))
+#endif
+
+#ifdef SAT__VECTOR
+#define SAT__PIXELS_f32(p) SAT__LOAD_f32(p)
+#define SAT__PIXELS_u32(p) SAT__LOAD_u32(p)
+#define SAT__PIXELS_u64(p) SAT__LOAD_u64(p)
+#define SAT__PREFIX_f32(v) sat__prefix_f32(v)
+#define SAT__PREFIX_u32(v) sat__prefix_u32(v)
+
+/* Eight pixels are two vectors of four lanes ... */
+#define SAT__DEFINE_SUM_ROW_4(suffix, type, pixel)                                                                     \
+    static type sat__sum_row_##suffix(type *out, type *column, const pixel *in, int n, type carry_in, int stream)      \
+    {                                                                                                                  \
+        sat__vec_##suffix carry = SAT__SET_##suffix(carry_in), a, b, sum_a, sum_b;                                     \
+        type last[4];                                                                                                  \
+        int i = 0;                                                                                                     \
+        for (; i + 8 <= n; i += 8) {                                                                                   \
+            a = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i), SAT__PIXELS_##suffix(in + i));                       \
+            b = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i + 4), SAT__PIXELS_##suffix(in + i + 4));               \
+            SAT__STORE_##suffix(column + i, a);                                                                        \
+            SAT__STORE_##suffix(column + i + 4, b);                                                                    \
+            a = SAT__PREFIX_##suffix(a);                                                                               \
+            b = SAT__PREFIX_##suffix(b);                                                                               \
+            b = SAT__ADD_##suffix(b, SAT__LAST_##suffix(a));                                                           \
+            sum_a = SAT__ADD_##suffix(a, carry);                                                                       \
+            sum_b = SAT__ADD_##suffix(b, carry);                                                                       \
+            carry = SAT__ADD_##suffix(carry, SAT__LAST_##suffix(b));                                                   \
+            if (stream) {                                                                                              \
+                SAT__STREAM_##suffix(out + i, sum_a);                                                                  \
+                SAT__STREAM_##suffix(out + i + 4, sum_b);                                                              \
+            } else {                                                                                                   \
+                SAT__STORE_##suffix(out + i, sum_a);                                                                   \
+                SAT__STORE_##suffix(out + i + 4, sum_b);                                                               \
+            }                                                                                                          \
+        }                                                                                                              \
+        SAT__STORE_##suffix(last, carry);                                                                              \
+        return sat__sum_row_plain_##suffix(out + i, column + i, in + i, n - i, last[0]);                               \
+    }
+
+/* ... or four of two. */
+#define SAT__DEFINE_SUM_ROW_2(suffix, type, pixel)                                                                     \
+    static type sat__sum_row_##suffix(type *out, type *column, const pixel *in, int n, type carry_in, int stream)      \
+    {                                                                                                                  \
+        sat__vec_##suffix carry = SAT__SET_##suffix(carry_in), a, b, c, d, half;                                       \
+        type last[2];                                                                                                  \
+        int i = 0;                                                                                                     \
+        for (; i + 8 <= n; i += 8) {                                                                                   \
+            a = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i), SAT__PIXELS_##suffix(in + i));                       \
+            b = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i + 2), SAT__PIXELS_##suffix(in + i + 2));               \
+            c = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i + 4), SAT__PIXELS_##suffix(in + i + 4));               \
+            d = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i + 6), SAT__PIXELS_##suffix(in + i + 6));               \
+            SAT__STORE_##suffix(column + i, a);                                                                        \
+            SAT__STORE_##suffix(column + i + 2, b);                                                                    \
+            SAT__STORE_##suffix(column + i + 4, c);                                                                    \
+            SAT__STORE_##suffix(column + i + 6, d);                                                                    \
+            a = SAT__PREFIX_##suffix(a);                                                                               \
+            b = SAT__ADD_##suffix(SAT__PREFIX_##suffix(b), SAT__LAST_##suffix(a));                                     \
+            c = SAT__PREFIX_##suffix(c);                                                                               \
+            d = SAT__ADD_##suffix(SAT__PREFIX_##suffix(d), SAT__LAST_##suffix(c));                                     \
+            half = SAT__LAST_##suffix(b);                                                                              \
+            c = SAT__ADD_##suffix(c, half);                                                                            \
+            d = SAT__ADD_##suffix(d, half);                                                                            \
+            half = SAT__LAST_##suffix(d);                                                                              \
+            a = SAT__ADD_##suffix(a, carry);                                                                           \
+            b = SAT__ADD_##suffix(b, carry);                                                                           \
+            c = SAT__ADD_##suffix(c, carry);                                                                           \
+            d = SAT__ADD_##suffix(d, carry);                                                                           \
+            carry = SAT__ADD_##suffix(carry, half);                                                                    \
+            if (stream) {                                                                                              \
+                SAT__STREAM_##suffix(out + i, a);                                                                      \
+                SAT__STREAM_##suffix(out + i + 2, b);                                                                  \
+                SAT__STREAM_##suffix(out + i + 4, c);                                                                  \
+                SAT__STREAM_##suffix(out + i + 6, d);                                                                  \
+            } else {                                                                                                   \
+                SAT__STORE_##suffix(out + i, a);                                                                       \
+                SAT__STORE_##suffix(out + i + 2, b);                                                                   \
+                SAT__STORE_##suffix(out + i + 4, c);                                                                   \
+                SAT__STORE_##suffix(out + i + 6, d);                                                                   \
+            }                                                                                                          \
+        }                                                                                                              \
+        SAT__STORE_##suffix(last, carry);                                                                              \
+        return sat__sum_row_plain_##suffix(out + i, column + i, in + i, n - i, last[0]);                               \
+    }
+
+SAT__DEFINE_SUM_ROW_4(f32, float, float)
+SAT__DEFINE_SUM_ROW_4(u32, uint32_t, uint32_t)
+SAT__DEFINE_SUM_ROW_2(f64, double, float)
+SAT__DEFINE_SUM_ROW_2(u64, uint64_t, uint64_t)
+#else
+#define sat__sum_row_f32(out, column, in, n, carry, stream) sat__sum_row_plain_f32(out, column, in, n, carry)
+#define sat__sum_row_f64(out, column, in, n, carry, stream) sat__sum_row_plain_f64(out, column, in, n, carry)
+#define sat__sum_row_u32(out, column, in, n, carry, stream) sat__sum_row_plain_u32(out, column, in, n, carry)
+#define sat__sum_row_u64(out, column, in, n, carry, stream) sat__sum_row_plain_u64(out, column, in, n, carry)
+#endif
+
+/* ---- tables: reading pixels */
+
+/* Adds |values| to the tally and returns 1, or returns 0 and changes nothing when one is NaN or beyond the limit. The
+   comparison is made on the bits, which order like the magnitudes and put infinity and NaN above all numbers. */
+static int sat__measure(const float *p, int n, float limit, sat__tally *tally)
+{
+    float sums[4] = {0, 0, 0, 0}, largest[4] = {0, 0, 0, 0};
+    uint32_t limit_bits = sat__float_bits(limit), beyond = 0, signs = 0;
+    double sum;
+    int i = 0;
+#ifdef SAT__VECTOR
+    sat__f32x4 sum4 = sat__f32x4_set1(0), largest4 = sum4;
+    sat__i32x4 beyond4 = sat__i32x4_set1(0), signs4 = beyond4, limit4 = sat__i32x4_set1((int32_t)limit_bits);
+    for (; i + 4 <= n; i += 4) {
+        sat__f32x4 v = sat__f32x4_load(p + i), magnitude = sat__f32x4_abs(v);
+        beyond4 = sat__i32x4_or(beyond4, sat__i32x4_greater(sat__f32x4_bits(magnitude), limit4));
+        signs4 = sat__i32x4_or(signs4, sat__f32x4_bits(v));
+        sum4 = sat__f32x4_add(sum4, magnitude);
+        largest4 = sat__f32x4_max(largest4, magnitude);
+    }
+    sat__f32x4_store(sums, sum4);
+    sat__f32x4_store(largest, largest4);
+    beyond = (uint32_t)sat__i32x4_any(beyond4);
+    signs = (uint32_t)sat__i32x4_any(sat__i32x4_greater(sat__i32x4_set1(0), signs4)) << 31;
+#endif
+    for (; i < n; i++) {
+        uint32_t bits = sat__float_bits(p[i]), magnitude_bits = bits & 0x7fffffffu;
+        float magnitude = sat__float_from_bits(magnitude_bits);
+        beyond |= (uint32_t)(magnitude_bits > limit_bits);
+        signs |= bits;
+        sums[i & 3] += magnitude;
+        if (magnitude > largest[i & 3]) largest[i & 3] = magnitude;
+    }
+    if (beyond) return 0;
+    sum = ((double)sums[0] + (double)sums[1]) + ((double)sums[2] + (double)sums[3]);
+    if (!sat__is_finite_double(sum))
+        for (sum = 0, i = 0; i < n; i++) sum += fabs((double)p[i]);
+    tally->sum_abs += sum;
+    tally->negative |= (int)(signs >> 31);
+    for (i = 0; i < 4; i++)
+        if ((double)largest[i] > tally->largest) tally->largest = (double)largest[i];
+    return 1;
+}
+
+/* The rule for values no sum can hold: NaN becomes 0, infinity and what lies beyond the limit become +-limit. */
+static void sat__replace(float *p, int n, float limit, sat__tally *tally)
+{
+    int i;
+    for (i = 0; i < n; i++) {
+        if (sat__is_nan(p[i])) {
+            p[i] = 0;
+            tally->nan++;
+        } else if (!(p[i] <= limit && p[i] >= -limit)) {
+            if (sat__is_finite(p[i])) tally->clamped++;
+            else tally->infinite++;
+            p[i] = p[i] > 0 ? limit : -limit;
+        }
+    }
+}
+
+/* Pixels [x0, x0 + n) of a row as floats that may be summed: a pointer into the image where nothing has to change. */
+static const float *sat__prepare(const sat_table *t, const sat_image *image, int y, int x0, int n, int channel, int worker, sat__tally *tally)
+{
+    float *scratch = t->pixels + (size_t)worker * SAT__MAX_STRIP, limit = (float)t->limit, mean = t->mean[channel];
+    const float *p = scratch;
+    sat__tally unused;
+    int i;
+    unused.largest = unused.sum_abs = unused.negative = 0;
+    if (image->format == SAT_F32 && image->channels == 1) p = (const float *)sat__image_row(image, y) + x0;
+    else sat__read_row(scratch, image, y, x0, x0 + n, channel);
+    if (!sat__measure(p, n, limit, t->options.subtract_mean ? &unused : tally)) {
+        if (p != scratch) memcpy(scratch, p, (size_t)n * sizeof(float));
+        sat__replace(scratch, n, limit, tally);
+        sat__measure(scratch, n, limit, t->options.subtract_mean ? &unused : tally);
+        p = scratch;
+    }
+    if (t->options.subtract_mean) {
+        for (i = 0; i < n; i++) scratch[i] = p[i] - mean;
+        p = scratch;
+        sat__measure(p, n, 3.4028235e38f, tally);
+    }
+    return p;
+}
+
+/* Rounds pixels / quantum to integers, modulo 2^32 or 2^64, ties to even: adding 1.5 * 2^52 leaves the integer in the
+   low bits of a double. A quantum that is a power of two makes this exact but for that one rounding. */
+static void sat__quantise(const sat_table *t, uint64_t *out, const float *in, int n)
+{
+    const double magic = 6755399441055744.0, inverse = t->quantum > 0 ? 1 / t->quantum : 1;
+    uint64_t magic_bits, bits;
+    uint32_t *out32 = (uint32_t *)(void *)out;
+    int wide = t->options.kind == SAT_KIND_FIXED64, i = 0;
+    double shifted;
+    memcpy(&magic_bits, &magic, sizeof magic);
+#ifdef SAT__SSE2
+    for (; i + 4 <= n; i += 4) {
+        __m128 v = _mm_loadu_ps(in + i);
+        __m128d scale = _mm_set1_pd(inverse), shift = _mm_set1_pd(magic);
+        __m128i a = _mm_castpd_si128(_mm_add_pd(_mm_mul_pd(_mm_cvtps_pd(v), scale), shift));
+        __m128i b = _mm_castpd_si128(_mm_add_pd(_mm_mul_pd(_mm_cvtps_pd(_mm_movehl_ps(v, v)), scale), shift));
+        if (wide) {
+            _mm_storeu_si128((__m128i *)(void *)(out + i), _mm_sub_epi64(a, _mm_castpd_si128(shift)));
+            _mm_storeu_si128((__m128i *)(void *)(out + i + 2), _mm_sub_epi64(b, _mm_castpd_si128(shift)));
+        } else {
+            __m128 low = _mm_shuffle_ps(_mm_castsi128_ps(a), _mm_castsi128_ps(b), _MM_SHUFFLE(2, 0, 2, 0));
+            _mm_storeu_si128((__m128i *)(void *)(out32 + i), _mm_castps_si128(low));
+        }
+    }
+#endif
+    for (; i < n; i++) {
+        shifted = (double)in[i] * inverse + magic;
+        memcpy(&bits, &shifted, sizeof bits);
+        if (wide) out[i] = bits - magic_bits;
+        else out32[i] = (uint32_t)bits;
+    }
+}
+
+/* ---- tables: building */
+
+typedef struct sat__build {
+    sat_table *table;
+    const sat_image *image;
+    int first_band, bands;                        /* tiled: tile rows to rebuild */
+    int channel, strips, block_rows, diagonal;    /* flat: a wavefront of blocks */
+    int first_strip_block;
+    int stream;                                   /* stores that bypass the cache: the table is larger than it */
+} sat__build;
+
+/* One row of tiles' worth of pixels: local sums into `row`, sums of the tiles to the left into `left`. */
+static void sat__tiled_row(const sat_table *t, const sat_image *image, int channel, int y, float *row, double *left,
+                           float *column, int worker, sat__tally *tally, int stream)
+{
+    int x0, x, tile = t->options.tile;
+    double run = 0;
+    for (x0 = 0; x0 < t->width; x0 += SAT__MAX_STRIP) {
+        int n = sat__min_int(t->width - x0, SAT__MAX_STRIP);
+        const float *in = sat__prepare(t, image, y, x0, n, channel, worker, tally);
+        for (x = 0; x < n; x += tile) {
+            left[(x0 + x) >> t->shift] = run;
+            run += (double)sat__sum_row_f32(row + 1 + x0 + x, column + x0 + x, in + x, sat__min_int(n - x, tile), 0, stream);
+        }
+    }
+}
+
+/* Tile rows are independent but for the strips above, which are summed afterwards. */
+static void sat__build_bands(int begin, int end, int worker, void *context)
+{
+    const sat__build *b = (const sat__build *)context;
+    const sat_table *t = b->table;
+    float *column = (float *)(void *)(t->columns + (size_t)worker * t->columns_stride);
+    int job, y, tile_x;
+    for (job = begin; job < end; job++) {
+        int channel = job / b->bands, band = b->first_band + job % b->bands;
+        int y0 = band << t->shift, y1 = sat__min_int(t->height - y0, t->options.tile) + y0;
+        sat__tally *tally = t->tallies + channel * t->bands + band;
+        const float *last = (const float *)(const void *)sat__row(t, channel, y1);
+        memset(tally, 0, sizeof *tally);
+        memset(column, 0, t->columns_stride);
+        for (y = y0; y < y1; y++)
+            sat__tiled_row(t, b->image, channel, y, (float *)(void *)sat__row(t, channel, y + 1), sat__left(t, channel, y + 1),
+                           column, worker, tally, b->stream && y + 1 < y1);
+        for (tile_x = 1; tile_x <= t->tiles_x; tile_x++) {
+            double corner = fabs((double)last[sat__min_int(tile_x << t->shift, t->width)]);
+            if (corner > tally->tile_largest) tally->tile_largest = corner;
+            tally->tile_squares += corner * corner;
+        }
+    }
+}
+
+/* next[X] = above[X] + the sum of this tile row left of X: corners [X0, X1) of the tile row's last corner row. */
+static void sat__add_above(const sat_table *t, double *next, const double *above, const float *local, const double *left, int X0, int X1)
+{
+    int X = X0;
+    while (X < X1) {
+        int tile = sat__tile_of(t, X), stop = sat__min_int(X1, ((tile + 1) << t->shift) + 1);
+        for (; X < stop; X++) next[X] = (left[tile] + (double)local[X]) + above[X];
+    }
+}
+
+enum { SAT__ABOVE_PIECE = 1024 };
+
+static void sat__build_above(int begin, int end, int worker, void *context)
+{
+    const sat__build *b = (const sat__build *)context;
+    const sat_table *t = b->table;
+    int job, band, pieces = t->width / SAT__ABOVE_PIECE + 1;
+    (void)worker;
+    for (job = begin; job < end; job++) {
+        int channel = job / pieces, X0 = job % pieces * SAT__ABOVE_PIECE, X1 = sat__min_int(t->width - X0, SAT__ABOVE_PIECE - 1) + X0 + 1;
+        for (band = b->first_band; band + 1 < t->tiles_y; band++) {
+            int Y = (band + 1) << t->shift;
+            sat__add_above(t, sat__above(t, channel, band + 1), sat__above(t, channel, band),
+                           (const float *)(const void *)sat__row(t, channel, Y), sat__left(t, channel, Y), X0, X1);
+        }
+    }
+}
+
+/* Row sums of pixels [x0, x0 + n) into a flat table, going on from corner x0 of the same row. */
+static void sat__flat_piece(const sat_table *t, const sat_image *image, int channel, int y, int x0, int n,
+                            unsigned char *row, unsigned char *columns, int worker, sat__tally *tally, int stream)
+{
+    const float *in = sat__prepare(t, image, y, x0, n, channel, worker, tally);
+    uint64_t *integers = t->integers ? t->integers + (size_t)worker * SAT__MAX_STRIP : NULL;
+    void *out = row + (size_t)x0 * t->element, *column = columns + (size_t)x0 * t->element;
+    if (integers) sat__quantise(t, integers, in, n);
+    switch (t->options.kind) {
+    case SAT_KIND_DOUBLE: sat__sum_row_f64((double *)out + 1, (double *)column, in, n, *(double *)out, stream); break;
+    case SAT_KIND_FIXED32: sat__sum_row_u32((uint32_t *)out + 1, (uint32_t *)column, (uint32_t *)(void *)integers, n, *(uint32_t *)out, stream); break;
+    case SAT_KIND_FIXED64: sat__sum_row_u64((uint64_t *)out + 1, (uint64_t *)column, integers, n, *(uint64_t *)out, stream); break;
+    case SAT_KIND_TILED:
+    case SAT_KIND_FLOAT: sat__sum_row_f32((float *)out + 1, (float *)column, in, n, *(float *)out, stream); break;
+    }
+}
+
+/* Rows [y0, y1) of strips [strip0, strip1): what lies left of and above the block is finished. */
+static void sat__flat_block(const sat__build *b, int strip0, int strip1, int y0, int y1, int worker)
+{
+    const sat_table *t = b->table;
+    unsigned char *columns = t->columns + (size_t)b->channel * t->columns_stride;
+    int y, strip;
+    for (y = y0; y < y1; y++)
+        for (strip = strip0; strip < strip1; strip++)
+            sat__flat_piece(t, b->image, b->channel, y, strip * SAT__STRIP, sat__min_int(SAT__STRIP, t->width - strip * SAT__STRIP),
+                            sat__row(t, b->channel, y + 1), columns, worker, t->tallies + b->channel * t->bands + strip, b->stream);
+}
+
+static void sat__build_diagonal(int begin, int end, int worker, void *context)
+{
+    const sat__build *b = (const sat__build *)context;
+    int i;
+    for (i = begin; i < end; i++) {
+        int strip = b->first_strip_block + i, y0 = (b->diagonal - strip) * b->block_rows;
+        sat__flat_block(b, strip, strip + 1, y0, sat__min_int(b->block_rows, b->table->height - y0) + y0, worker);
+    }
+}
+
+/* Flat tables. One worker goes down strips whose column sums stay in the first-level cache. Several take the blocks of
+   one anti-diagonal after the other, each of which needs only blocks of the diagonal before. Same additions, same bits. */
+static void sat__build_flat(sat__build *b)
+{
+    const sat_table *t = b->table;
+    int strip, group = sat__max_int(1, (int)(16384 / t->element / SAT__STRIP)), blocks;
+    memset(t->columns, 0, t->columns_stride * (size_t)t->channels);
+    memset(t->tallies, 0, sizeof *t->tallies * (size_t)t->bands * (size_t)t->channels);
+    b->block_rows = 64;
+    blocks = (t->height - 1) / b->block_rows + 1;
+    for (b->channel = 0; b->channel < t->channels; b->channel++) {
+        if (sat__worker_count(&t->options.threads) == 1) {
+            for (strip = 0; strip < t->bands; strip += group)
+                sat__flat_block(b, strip, sat__min_int(strip + group, t->bands), 0, t->height, 0);
+            continue;
+        }
+        for (b->diagonal = 0; b->diagonal < t->bands + blocks - 1; b->diagonal++) {
+            b->first_strip_block = sat__max_int(0, b->diagonal - blocks + 1);
+            sat__parallel_for(&t->options.threads, sat__min_int(b->diagonal + 1, t->bands) - b->first_strip_block, sat__build_diagonal, b);
+        }
+    }
+}
+
+/* The smallest power of two that is at least v > 0. */
+static double sat__power_of_two(double v)
+{
+    int exponent;
+    double fraction = frexp(v, &exponent);
+    return ldexp(1.0, fraction > 0.5 ? exponent : exponent - 1);
+}
+
+static double sat__largest_pixel(const sat_table *t, const sat_image *image)
+{
+    sat__tally tally;
+    int channel, x, y;
+    memset(&tally, 0, sizeof tally);
+    for (channel = 0; channel < image->channels; channel++)
+        for (y = 0; y < image->height; y++)
+            for (x = 0; x < image->width; x += SAT__MAX_STRIP)
+                sat__prepare(t, image, y, x, sat__min_int(image->width - x, SAT__MAX_STRIP), channel, 0, &tally);
+    return tally.largest;
+}
+
+/* What a fixed-point box sum may reach, in quanta, divided by the pixels of a box. */
+static double sat__fixed_range(const sat_table *t)
+{
+    double area = t->options.max_box_area > 0 ? t->options.max_box_area : (double)t->width * (double)t->height;
+    return (t->options.kind == SAT_KIND_FIXED32 ? 2147483647.0 : 9223372036854774784.0) / area - 0.5;
+}
+
+/* Settles the largest value a pixel may have and the quantum. Limits keep every float sum finite. */
+static sat_result sat__resolve(sat_table *t, const sat_image *image)
+{
+    const double float_max = 3.4028234663852886e38, tile = t->options.tile;
+    double wanted = t->options.max_value > 0 ? t->options.max_value : float_max, range;
+    t->limit = t->options.kind == SAT_KIND_TILED ? float_max / (tile * tile) : t->options.kind == SAT_KIND_FLOAT ? float_max / 2147483648.0 : float_max;
+    if (t->options.subtract_mean) t->limit /= 2;
+    if (wanted < t->limit) t->limit = wanted;
+    if (!sat__is_fixed(t->options.kind)) return SAT_OK;
+    range = sat__fixed_range(t);
+    if (range > 1125899906842624.0) range = 1125899906842624.0; /* 2^50: what sat__quantise can round */
+    if (range < 1) return SAT_ERR_LIMIT;
+    if (t->options.quantum > 0) t->quantum = t->options.quantum;
+    if (!(t->quantum > 0)) {
+        double largest = t->limit;
+        if (image->format == SAT_U8 || image->format == SAT_U16) largest = image->format == SAT_U8 ? 255 : 65535;
+        else if (!(t->options.max_value > 0)) largest = sat__largest_pixel(t, image);
+        if (largest > t->limit) largest = t->limit;
+        if (!(largest > 0)) return SAT_OK; /* a black image settles nothing */
+        t->quantum = sat__power_of_two(largest / range);
+    }
+    if (range * t->quantum < t->limit) t->limit = range * t->quantum;
+    return SAT_OK;
+}
+
+/* Hensley 2005: the mean of each channel, as the float that every pixel is lowered by. */
+static void sat__measure_means(sat_table *t, const sat_image *image)
+{
+    sat__tally ignored;
+    int channel, x, y, i;
+    memset(&ignored, 0, sizeof ignored);
+    for (channel = 0; channel < t->channels; channel++) {
+        double total = 0;
+        t->mean[channel] = 0;
+        for (y = 0; y < t->height; y++)
+            for (x = 0; x < t->width; x += SAT__MAX_STRIP) {
+                int n = sat__min_int(t->width - x, SAT__MAX_STRIP);
+                const float *p = sat__prepare(t, image, y, x, n, channel, 0, &ignored);
+                for (i = 0; i < n; i++) total += (double)p[i];
+            }
+        t->mean[channel] = (float)(total / ((double)t->width * (double)t->height));
+    }
+}
+
+/* Sums the tallies in a fixed order. */
+static void sat__total(sat_table *t)
+{
+    int channel, band;
+    for (channel = 0; channel < t->channels; channel++) {
+        sat__tally *total = &t->total[channel];
+        memset(total, 0, sizeof *total);
+        for (band = 0; band < t->bands; band++) {
+            const sat__tally *tally = &t->tallies[channel * t->bands + band];
+            total->nan += tally->nan;
+            total->infinite += tally->infinite;
+            total->clamped += tally->clamped;
+            total->sum_abs += tally->sum_abs;
+            total->negative |= tally->negative;
+            total->tile_squares += tally->tile_squares;
+            if (tally->largest > total->largest) total->largest = tally->largest;
+            if (tally->tile_largest > total->tile_largest) total->tile_largest = tally->tile_largest;
+        }
+    }
+}
+
+/* Tile rows [first_band, last_band) anew, then the strips below; flat tables anew altogether. */
+static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_band, int last_band)
+{
+    sat__build b;
+    int channel;
+    memset(&b, 0, sizeof b);
+    b.table = t;
+    b.image = image;
+    b.first_band = first_band;
+    b.bands = last_band - first_band;
+    b.stream = t->plane * t->element > (size_t)4 << 20;
+    if (t->options.kind == SAT_KIND_TILED) {
+        sat__parallel_for(&t->options.threads, b.bands * t->channels, sat__build_bands, &b);
+        sat__parallel_for(&t->options.threads, (t->width / SAT__ABOVE_PIECE + 1) * t->channels, sat__build_above, &b);
+    } else sat__build_flat(&b);
+#ifdef SAT__SSE2
+    _mm_sfence();
+#endif
+    sat__total(t);
+    if (t->options.non_finite != SAT_NON_FINITE_REFUSE) return SAT_OK;
+    for (channel = 0; channel < t->channels; channel++)
+        if (t->total[channel].nan || t->total[channel].infinite) t->build_failed = 1;
+    if (!t->build_failed) return SAT_OK;
+    for (channel = 0; channel < t->channels; channel++) memset(sat__row(t, channel, 0), 0, (t->plane - (SAT__LINE / t->element - 1)) * t->element);
+    if (t->left) memset(t->left, 0, t->left_plane * (size_t)t->channels * sizeof(double));
+    if (t->above) memset(t->above, 0, t->above_plane * (size_t)t->channels * sizeof(double));
+    memset(t->mean, 0, sizeof t->mean);
+    return SAT_ERR_NON_FINITE;
+}
+
+static int sat__fits(const sat_table *t, const sat_image *image)
+{
+    return image->width == t->width && image->height == t->height && image->channels == t->channels;
+}
+
+SAT_DEF sat_result sat_build(sat_table *table, const sat_image *image)
+{
+    sat_result result;
+    if (!table || !sat__image_is_valid(image)) return SAT_ERR_ARGUMENT;
+    if (!sat__fits(table, image)) return SAT_ERR_MISMATCH;
+    table->build_failed = 0;
+    if (table->options.subtract_mean) {
+        table->options.subtract_mean = 0;
+        sat__resolve(table, image);
+        sat__measure_means(table, image);
+        table->options.subtract_mean = 1;
+    }
+    result = sat__resolve(table, image);
+    return result ? result : sat__rebuild(table, image, 0, table->tiles_y);
+}
+
+SAT_DEF sat_result sat_update(sat_table *table, const sat_image *image, int x0, int y0, int x1, int y1)
+{
+    if (!table || !sat__image_is_valid(image)) return SAT_ERR_ARGUMENT;
+    if (!sat__fits(table, image)) return SAT_ERR_MISMATCH;
+    if (x0 < 0 || y0 < 0 || x1 > table->width || y1 > table->height || x0 > x1 || y0 > y1) return SAT_ERR_ARGUMENT;
+    if (x0 == x1 || y0 == y1) return SAT_OK;
+    if (table->options.kind != SAT_KIND_TILED || table->build_failed) return sat_build(table, image);
+    return sat__rebuild(table, image, y0 >> table->shift, ((y1 - 1) >> table->shift) + 1);
+}
+
+SAT_DEF sat_statistics sat_get_statistics(const sat_table *table)
+{
+    sat_statistics s;
+    int channel;
+    memset(&s, 0, sizeof s);
+    if (!table) return s;
+    for (channel = 0; channel < table->channels; channel++) {
+        const sat__tally *total = &table->total[channel];
+        s.nan += total->nan;
+        s.infinite += total->infinite;
+        s.clamped += total->clamped;
+        s.mean_abs += total->sum_abs;
+        if (total->largest > s.largest) s.largest = total->largest;
+    }
+    s.mean_abs /= (double)table->width * (double)table->height * (double)table->channels;
+    s.quantum = table->quantum;
+    s.bytes = table->block_bytes;
+    return s;
+}
+
+/* ---- tables: lookups */
+
+/* The two corner rows of a box, and the strips that go with them. */
+typedef struct sat__rows {
+    const void *low, *high; /* at y0 and y1 */
+    const double *left_low, *left_high, *above_low, *above_high; /* above_low == above_high: same tile row */
+} sat__rows;
+
+static sat__rows sat__rows_at(const sat_table *t, int channel, int y0, int y1)
+{
+    sat__rows r;
+    memset(&r, 0, sizeof r);
+    r.low = sat__row(t, channel, y0);
+    r.high = sat__row(t, channel, y1);
+    if (t->options.kind == SAT_KIND_TILED) {
+        r.left_low = sat__left(t, channel, y0);
+        r.left_high = sat__left(t, channel, y1);
+        r.above_low = sat__above(t, channel, sat__tile_of(t, y0));
+        r.above_high = sat__above(t, channel, sat__tile_of(t, y1));
+    }
+    return r;
+}
+
+/* The four-corner sum (eq 4.2) of a tiled table. Differences are taken along x first, so that what both corners of a row
+   share cancels exactly; strips that all four corners share are not read at all. */
+static double sat__tiled_sum(const sat_table *t, const sat__rows *r, int x0, int x1)
+{
+    const float *low = (const float *)r->low, *high = (const float *)r->high;
+    double sum = ((double)high[x1] - (double)high[x0]) - ((double)low[x1] - (double)low[x0]);
+    int tile0 = sat__tile_of(t, x0), tile1 = sat__tile_of(t, x1);
+    if (r->above_low != r->above_high) sum += (r->above_high[x1] - r->above_high[x0]) - (r->above_low[x1] - r->above_low[x0]);
+    if (tile0 != tile1) sum += (r->left_high[tile1] - r->left_high[tile0]) - (r->left_low[tile1] - r->left_low[tile0]);
+    return sum;
+}
+
+/* Integer differences wrap around, and the true sum is the representative near zero. */
+static double sat__rows_sum(const sat_table *t, const sat__rows *r, int channel, int x0, int x1, int height)
+{
+    double sum = 0;
+    switch (t->options.kind) {
+    case SAT_KIND_TILED: return sat__tiled_sum(t, r, x0, x1);
+    case SAT_KIND_FLOAT: {
+        const float *low = (const float *)r->low, *high = (const float *)r->high;
+        sum = ((double)high[x1] - (double)high[x0]) - ((double)low[x1] - (double)low[x0]);
+        break;
+    }
+    case SAT_KIND_DOUBLE: {
+        const double *low = (const double *)r->low, *high = (const double *)r->high;
+        sum = (high[x1] - high[x0]) - (low[x1] - low[x0]);
+        break;
+    }
+    case SAT_KIND_FIXED32: {
+        const uint32_t *low = (const uint32_t *)r->low, *high = (const uint32_t *)r->high;
+        return (double)(int32_t)(high[x1] - high[x0] - low[x1] + low[x0]) * t->quantum;
+    }
+    case SAT_KIND_FIXED64: {
+        const uint64_t *low = (const uint64_t *)r->low, *high = (const uint64_t *)r->high;
+        return (double)(int64_t)(high[x1] - high[x0] - low[x1] + low[x0]) * t->quantum;
+    }
+    }
+    if (t->options.subtract_mean) sum += (double)t->mean[channel] * ((double)(x1 - x0) * (double)height);
+    return sum;
+}
+
+static int sat__clip_box(const sat_table *t, int *x0, int *y0, int *x1, int *y1)
+{
+    if (*x0 < 0) *x0 = 0;
+    if (*y0 < 0) *y0 = 0;
+    if (*x1 > t->width) *x1 = t->width;
+    if (*y1 > t->height) *y1 = t->height;
+    return *x0 < *x1 && *y0 < *y1;
+}
+
+SAT_DEF double sat_sum(const sat_table *table, int channel, int x0, int y0, int x1, int y1)
+{
+    sat__rows rows;
+    if (!table || channel < 0 || channel >= table->channels || !sat__clip_box(table, &x0, &y0, &x1, &y1)) return 0;
+    rows = sat__rows_at(table, channel, y0, y1);
+    return sat__rows_sum(table, &rows, channel, x0, x1, y1 - y0);
+}
+
+SAT_DEF double sat_mean(const sat_table *table, int channel, int x0, int y0, int x1, int y1)
+{
+    if (!table || !sat__clip_box(table, &x0, &y0, &x1, &y1)) return 0;
+    return sat_sum(table, channel, x0, y0, x1, y1) / ((double)(x1 - x0) * (double)(y1 - y0));
+}
+
+SAT_DEF float sat_restore(const sat_table *table, int channel, int x, int y)
+{
+    if (!table || x < 0 || y < 0 || x >= table->width || y >= table->height) return 0;
+    return (float)sat_sum(table, channel, x, y, x + 1, y + 1);
+}
+
+/* ---- tables: real corners and borders
+
+   Along each axis an interval becomes at most 12 pieces of whole pixels with a weight each; a box is the sum over all
+   pairs of pieces. Weights are positive, so nothing cancels. */
+
+typedef struct sat__piece {
+    int begin, end;
+    double weight;
+} sat__piece;
+
+typedef struct sat__pieces {
+    sat__piece piece[12];
+    int count;
+} sat__pieces;
+
+static void sat__add_piece(sat__pieces *list, int begin, int end, double weight)
+{
+    sat__piece *p = &list->piece[list->count];
+    if (begin >= end || !(weight > 0) || list->count == 12) return;
+    p->begin = begin;
+    p->end = end;
+    p->weight = weight;
+    list->count++;
+}
+
+/* [a, b) inside [0, n]: a part of the first pixel, whole ones, a part of the last. */
+static void sat__add_interval(sat__pieces *list, double a, double b, int n, double weight)
+{
+    int first, last;
+    if (a < 0) a = 0;
+    if (b > n) b = n;
+    if (!(a < b)) return;
+    first = (int)a;
+    last = (int)b;
+    if (first == last) {
+        sat__add_piece(list, first, first + 1, weight * (b - a));
+        return;
+    }
+    if (a > first) {
+        sat__add_piece(list, first, first + 1, weight * ((first + 1) - a));
+        first++;
+    }
+    sat__add_piece(list, first, last, weight);
+    if (b > last) sat__add_piece(list, last, last + 1, weight * (b - last));
+}
+
+/* The length that the mean is divided by; the pieces that the border rule makes of [a, b). */
+static double sat__border_pieces(sat__pieces *list, double a, double b, int n, sat_border border)
+{
+    double period = border == SAT_BORDER_MIRROR ? 2.0 * n : n, length = b - a, whole;
+    int i;
+    list->count = 0;
+    if (border == SAT_BORDER_CLAMP) {
+        if (a < 0) sat__add_piece(list, 0, 1, (b < 0 ? b : 0) - a);
+        if (b > n) sat__add_piece(list, n - 1, n, b - (a > n ? a : n));
+    }
+    if (border != SAT_BORDER_MIRROR && border != SAT_BORDER_WRAP) {
+        sat__add_interval(list, a, b, n, 1);
+        if (border != SAT_BORDER_CLIP) return length;
+        if (a < 0) a = 0;
+        if (b > n) b = n;
+        return b > a ? b - a : 0;
+    }
+    whole = floor(length / period);
+    a -= floor(a / period) * period;
+    b = a + (length - whole * period);
+    sat__add_piece(list, 0, n, border == SAT_BORDER_MIRROR ? 2 * whole : whole);
+    for (i = 0; i < 4; i++) { /* copy i covers [i n, (i + 1) n); odd ones of a mirror run backwards */
+        double begin = a - (double)i * n, end = b - (double)i * n;
+        if (begin >= n || end <= 0) continue;
+        if (border == SAT_BORDER_MIRROR && i % 2) sat__add_interval(list, n - end, n - begin, n, 1);
+        else sat__add_interval(list, begin, end, n, 1);
+    }
+    return length;
+}
+
+static double sat__sum_pieces(const sat_table *t, int channel, const sat__pieces *px, const sat__pieces *py)
+{
+    double sum = 0;
+    int i, j;
+    for (j = 0; j < py->count; j++)
+        for (i = 0; i < px->count; i++)
+            sum += px->piece[i].weight * py->piece[j].weight *
+                   sat_sum(t, channel, px->piece[i].begin, py->piece[j].begin, px->piece[i].end, py->piece[j].end);
+    return sum;
+}
+
+SAT_DEF double sat_sum_fractional(const sat_table *table, int channel, double x0, double y0, double x1, double y1)
+{
+    sat__pieces px, py;
+    if (!table) return 0;
+    px.count = py.count = 0;
+    sat__add_interval(&px, x0, x1, table->width, 1);
+    sat__add_interval(&py, y0, y1, table->height, 1);
+    return sat__sum_pieces(table, channel, &px, &py);
+}
+
+SAT_DEF double sat_mean_border(const sat_table *table, int channel, double x0, double y0, double x1, double y1,
+                               sat_border border_x, sat_border border_y)
+{
+    sat__pieces px, py;
+    double area;
+    if (!table || (unsigned)border_x > (unsigned)SAT_BORDER_WRAP || (unsigned)border_y > (unsigned)SAT_BORDER_WRAP) return 0;
+    if (!(x0 < x1) || !(y0 < y1)) return 0;
+    if (!(fabs(x0) < 1e15) || !(fabs(x1) < 1e15) || !(fabs(y0) < 1e15) || !(fabs(y1) < 1e15)) return 0;
+    area = sat__border_pieces(&px, x0, x1, table->width, border_x) * sat__border_pieces(&py, y0, y1, table->height, border_y);
+    return area > 0 ? sat__sum_pieces(table, channel, &px, &py) / area : 0;
+}
+
+/* ---- tables: box filters */
+
+typedef struct sat__filter {
+    const sat_table *table;
+    unsigned char *out;
+    const unsigned char *radii;
+    ptrdiff_t out_stride, radii_stride;
+    int radius;
+} sat__filter;
+
+/* One output row: box means of `height` rows between two corner rows. */
+static void sat__filter_row(float *out, const sat_table *t, const sat__rows *rows, int channel, int radius, int height)
+{
+    int x, step = t->channels;
+    for (x = 0; x < t->width; x++) {
+        int x0 = x > radius ? x - radius : 0, x1 = t->width - x > radius ? x + radius + 1 : t->width;
+        out[(size_t)x * (size_t)step] = (float)(sat__rows_sum(t, rows, channel, x0, x1, height) / ((double)(x1 - x0) * (double)height));
+    }
+}
+
+static void sat__filter_rows(int begin, int end, int worker, void *context)
+{
+    const sat__filter *f = (const sat__filter *)context;
+    const sat_table *t = f->table;
+    int y, channel;
+    (void)worker;
+    for (y = begin; y < end; y++)
+        for (channel = 0; channel < t->channels; channel++) {
+            int y0 = y > f->radius ? y - f->radius : 0, y1 = t->height - y > f->radius ? y + f->radius + 1 : t->height;
+            sat__rows rows = sat__rows_at(t, channel, y0, y1);
+            sat__filter_row((float *)(void *)(f->out + (ptrdiff_t)y * f->out_stride) + channel, t, &rows, channel, f->radius, y1 - y0);
+        }
+}
+
+static void sat__filter_variable_rows(int begin, int end, int worker, void *context)
+{
+    const sat__filter *f = (const sat__filter *)context;
+    const sat_table *t = f->table;
+    int x, y, channel;
+    (void)worker;
+    for (y = begin; y < end; y++) {
+        float *out = (float *)(void *)(f->out + (ptrdiff_t)y * f->out_stride);
+        const float *radii = (const float *)(const void *)(f->radii + (ptrdiff_t)y * f->radii_stride);
+        for (x = 0; x < t->width; x++) {
+            double reach = radii[x] > 0 ? (double)radii[x] + 0.5 : 0.5, limit = (double)t->width + t->height;
+            if (!(reach < limit)) reach = sat__is_nan(radii[x]) ? 0.5 : limit;
+            for (channel = 0; channel < t->channels; channel++)
+                out[x * t->channels + channel] = (float)sat_mean_border(t, channel, x + 0.5 - reach, y + 0.5 - reach, x + 0.5 + reach,
+                                                                        y + 0.5 + reach, SAT_BORDER_CLIP, SAT_BORDER_CLIP);
+        }
+    }
+}
+
+static int sat__stride_is_valid(const sat_table *t, ptrdiff_t stride, int channels)
+{
+    size_t step = stride < 0 ? (size_t)0 - (size_t)stride : (size_t)stride, row;
+    if (!sat__multiply_size(&row, (size_t)t->width, (size_t)channels * sizeof(float))) return 0;
+    return step % sizeof(float) == 0 && (t->height == 1 || step >= row);
+}
+
+SAT_DEF sat_result sat_box_filter(float *out, ptrdiff_t out_stride, const sat_table *table, int radius)
+{
+    sat__filter f;
+    if (!out || !table || radius < 0 || !sat__stride_is_valid(table, out_stride, table->channels)) return SAT_ERR_ARGUMENT;
+    memset(&f, 0, sizeof f);
+    f.table = table;
+    f.out = (unsigned char *)out;
+    f.out_stride = out_stride;
+    f.radius = radius;
+    sat__parallel_for(&table->options.threads, table->height, sat__filter_rows, &f);
+    return SAT_OK;
+}
+
+SAT_DEF sat_result sat_box_filter_variable(float *out, ptrdiff_t out_stride, const sat_table *table,
+                                           const float *radius, ptrdiff_t radius_stride)
+{
+    sat__filter f;
+    if (!out || !table || !radius || !sat__stride_is_valid(table, out_stride, table->channels)) return SAT_ERR_ARGUMENT;
+    if (!sat__stride_is_valid(table, radius_stride, 1)) return SAT_ERR_ARGUMENT;
+    memset(&f, 0, sizeof f);
+    f.table = table;
+    f.out = (unsigned char *)out;
+    f.out_stride = out_stride;
+    f.radii = (const unsigned char *)radius;
+    f.radii_stride = radius_stride;
+    sat__parallel_for(&table->options.threads, table->height, sat__filter_variable_rows, &f);
+    return SAT_OK;
+}
+
+/* ---- error bounds */
+
+/* Roundings that one stored sum goes through when `rows` rows of `columns` pixels are added: down the column, three
+   within eight pixels, and one carry for every eight. */
+static double sat__roundings(double rows, double columns) { return rows + 3 + columns / 8 + 1; }
+
+/* The most tiles an interval of this many pixels can touch. */
+static double sat__tiles_touched(double pixels, double tile) { return floor((pixels + tile - 2) / tile) + 1; }
+
+/* Never below the error of a box sum. Every stored sum of non-negative pixels is off by at most (roundings) u times
+   itself, and a box adds four of them a tile it touches; signed pixels count with their magnitude. */
+static double sat__sum_bound(const sat_table *t, const sat__tally *total, double box_width, double box_height)
+{
+    const double u = 5.9604644775390625e-8, v = 1.1102230246251565e-16; /* 2^-24, 2^-53 */
+    double width = t->width, height = t->height, tile = t->options.tile, area = box_width * box_height;
+    double all = total->sum_abs * (1 + 1e-3), strips = 16 * v * (width / tile + height / tile + 4) * all;
+    double lowered = t->options.subtract_mean ? u * area * total->largest : 0; /* pixel - mean is rounded once */
+    double touched, largest;
+    switch (t->options.kind) {
+    case SAT_KIND_FLOAT: return 4 * u * 1.01 * sat__roundings(height, width) * all + lowered + strips;
+    case SAT_KIND_DOUBLE: return 4 * v * sat__roundings(height, width) * all + lowered + strips;
+    case SAT_KIND_FIXED32:
+    case SAT_KIND_FIXED64: return 0.5 * t->quantum * area + v * all;
+    case SAT_KIND_TILED: break;
+    }
+    touched = sat__tiles_touched(box_width, tile) * sat__tiles_touched(box_height, tile);
+    largest = total->negative ? tile * tile * total->largest : total->tile_largest * 1.001;
+    if (largest > all) largest = all;
+    largest = 4 * touched * largest < 4 * all * 4 ? 4 * touched * largest : 16 * all;
+    return u * 1.01 * sat__roundings(tile, tile) * largest + strips;
+}
+
+SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_width, int box_height)
+{
+    double w, h;
+    if (!table || channel < 0 || channel >= table->channels || box_width < 1 || box_height < 1) return 0;
+    w = sat__min_int(box_width, table->width);
+    h = sat__min_int(box_height, table->height);
+    return sat__sum_bound(table, &table->total[channel], w, h) / (w * h);
+}
+
+/* Roundings are taken as independent, so that their squares add. The factors are fitted to measured errors
+   (bench_sat, table "bound"). */
+SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width, int box_height)
+{
+    const double u = 5.9604644775390625e-8, v = 1.1102230246251565e-16; /* 2^-24, 2^-53 */
+    double w, h, width, height, tile, stored, tiles;
+    const sat__tally *total;
+    if (!table || channel < 0 || channel >= table->channels || box_width < 1 || box_height < 1) return 0;
+    total = &table->total[channel];
+    width = table->width;
+    height = table->height;
+    tile = table->options.tile;
+    w = sat__min_int(box_width, table->width);
+    h = sat__min_int(box_height, table->height);
+    if (sat__is_fixed(table->options.kind)) return table->quantum / sqrt(12 * w * h);
+    if (table->options.kind == SAT_KIND_TILED) {
+        tiles = (double)table->tiles_x * ((height - 1) / tile + 1);
+        stored = sqrt(total->tile_squares / tiles);
+        return 0.5 * u * stored * sqrt(sat__tiles_touched(w, tile) * sat__tiles_touched(h, tile)) / (w * h);
+    }
+    stored = total->sum_abs / (table->options.subtract_mean ? sqrt(width * height) : 1);
+    return 0.3 * (table->options.kind == SAT_KIND_FLOAT ? u : v) * stored * sqrt(sat__roundings(height, width)) / (w * h);
+}
+
+/* ---- choosing a kind */
+
+/* Largest |pixel|, sum and largest tile sum of the whole image, all channels together. */
+static void sat__survey(sat_table *t, const sat_image *image, double *tile_sums)
+{
+    sat__tally *total = &t->total[0];
+    int x, y, channel, i, tile = t->options.tile;
+    for (channel = 0; channel < image->channels; channel++)
+        for (y = 0; y < t->height; y++)
+            for (x = 0; x < t->width; x += tile) {
+                int n = sat__min_int(tile, t->width - x);
+                const float *p = sat__prepare(t, image, y, x, n, channel, 0, total);
+                double *sum = &tile_sums[x / tile];
+                if (y % tile == 0) *sum = 0;
+                for (i = 0; i < n; i++) *sum += fabs((double)p[i]);
+                if (*sum > total->tile_largest) total->tile_largest = *sum;
+            }
+    total->negative = 0; /* the tile sums are of magnitudes already */
+}
+
+SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_width, int box_height,
+                            double max_relative_error, size_t max_bytes, const sat_options *options)
+{
+    static const sat_kind cheapest_first[] = {SAT_KIND_FLOAT, SAT_KIND_FIXED32, SAT_KIND_TILED, SAT_KIND_DOUBLE, SAT_KIND_FIXED64};
+    sat_options resolved = options ? *options : sat_defaults();
+    sat_table *survey, t;
+    double allowed, area, best = -1, *tile_sums;
+    sat_result result;
+    int i;
+    if (!kind || !sat__image_is_valid(image) || box_width < 1 || box_height < 1 || !(max_relative_error >= 0)) return SAT_ERR_ARGUMENT;
+    resolved.kind = SAT_KIND_TILED;
+    resolved.subtract_mean = 0;
+    /* a one-row table holds all the scratch memory this needs; its strips take the tile sums */
+    result = sat__table_create(&survey, image->width, image->height, 2, 1, image->channels, &resolved);
+    if (result) return result;
+    tile_sums = survey->left;
+    sat__resolve(survey, image);
+    sat__survey(survey, image, tile_sums);
+    box_width = sat__min_int(box_width, image->width);
+    box_height = sat__min_int(box_height, image->height);
+    area = (double)box_width * box_height;
+    allowed = max_relative_error * survey->total[0].sum_abs / ((double)image->width * image->height * image->channels);
+    result = SAT_ERR_LIMIT;
+    for (i = 0; i < 5 && result; i++) {
+        double error;
+        t = *survey;
+        t.options.kind = cheapest_first[i];
+        t.options.max_value = survey->total[0].largest;
+        if (!(t.options.max_box_area > 0)) t.options.max_box_area = area;
+        t.rows = image->height + 1;
+        t.tiles_y = (image->height - 1) / resolved.tile + 1;
+        t.element = sat__kind_size(t.options.kind);
+        if (max_bytes && (sat__lay_out(&t, NULL) == 0 || sat__lay_out(&t, NULL) > max_bytes)) continue;
+        t.quantum = resolved.quantum;
+        if (sat__resolve(&t, image)) continue;
+        error = sat__sum_bound(&t, &survey->total[0], (double)box_width, (double)box_height) / area;
+        if (best < 0 || error < best || error <= allowed) {
+            best = error;
+            *kind = t.options.kind;
+        }
+        if (error <= allowed) result = SAT_OK;
+    }
+    sat_destroy(survey);
+    return result;
+}
+
+/* ---- streaming
+
+   The table is a ring: the last 2 radius + 2 corner rows, and the strips above the tile rows that these lie in. */
+
+struct sat_stream {
+    sat_table *table;
+    int radius, strips;  /* strips: tile rows in the ring */
+    uint64_t taken, given;
+};
+
+SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, int radius, const sat_options *options)
+{
+    sat_options resolved = options ? *options : sat_defaults();
+    sat_allocator allocator;
+    sat_stream *stream;
+    sat_result result;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (radius < 0 || radius > 0x3fffffff - 2 || resolved.subtract_mean || !sat__options_are_valid(&resolved)) return SAT_ERR_ARGUMENT;
+    if (sat__is_fixed(resolved.kind)) {
+        if (!(resolved.quantum > 0) && !(resolved.max_value > 0)) return SAT_ERR_ARGUMENT; /* the largest pixel is not known yet */
+        if (!(resolved.max_box_area > 0)) resolved.max_box_area = (2.0 * radius + 1) * (2.0 * radius + 1);
+    }
+    memset(&resolved.threads, 0, sizeof resolved.threads);
+    if (!sat__resolve_allocator(&allocator, &resolved.allocator)) return SAT_ERR_ARGUMENT;
+    stream = (sat_stream *)sat__alloc(&allocator, sizeof *stream);
+    if (!stream) return SAT_ERR_MEMORY;
+    memset(stream, 0, sizeof *stream);
+    stream->radius = radius;
+    stream->strips = (2 * radius + 1) / resolved.tile + 3;
+    result = sat__table_create(&stream->table, width, 2 * radius + 2, 2 * radius + 2, stream->strips, channels, &resolved);
+    if (result) sat__release(&allocator, stream, sizeof *stream);
+    else *out = stream;
+    return result;
+}
+
+SAT_DEF void sat_stream_destroy(sat_stream *stream)
+{
+    if (stream) {
+        sat_allocator allocator = stream->table->allocator;
+        sat_destroy(stream->table);
+        sat__release(&allocator, stream, sizeof *stream);
+    }
+}
+
+static int sat__ring_row(const sat_stream *s, uint64_t corner_row) { return (int)(corner_row % (uint64_t)s->table->rows); }
+
+static int sat__ring_strip(const sat_stream *s, uint64_t corner_row)
+{
+    uint64_t tile_row = (corner_row - (corner_row > 0)) >> s->table->shift;
+    return (int)(tile_row % (uint64_t)s->strips);
+}
+
+/* Adds one image row below those taken so far. */
+static void sat__stream_take(sat_stream *s, const sat_image *row)
+{
+    sat_table *t = s->table;
+    uint64_t corner_row = s->taken + 1;
+    int channel, x, slot = sat__ring_row(s, corner_row), tile = t->options.tile;
+    for (channel = 0; channel < t->channels; channel++) {
+        unsigned char *sums = sat__row(t, channel, slot);
+        unsigned char *columns = t->columns + (size_t)channel * t->columns_stride;
+        memset(sums, 0, t->element);
+        if (t->options.kind != SAT_KIND_TILED) {
+            for (x = 0; x < t->width; x += SAT__STRIP)
+                sat__flat_piece(t, row, channel, 0, x, sat__min_int(SAT__STRIP, t->width - x), sums, columns, 0, &t->total[channel], 0);
+            continue;
+        }
+        if (s->taken % (uint64_t)tile == 0) memset(columns, 0, t->columns_stride);
+        sat__tiled_row(t, row, channel, 0, (float *)(void *)sums, sat__left(t, channel, slot), (float *)(void *)columns, 0, &t->total[channel], 0);
+        if (corner_row % (uint64_t)tile == 0)
+            sat__add_above(t, sat__above(t, channel, sat__ring_strip(s, corner_row + 1)), sat__above(t, channel, sat__ring_strip(s, corner_row)),
+                           (float *)(void *)sums, sat__left(t, channel, slot), 0, t->width + 1);
+    }
+    s->taken++;
+}
+
+SAT_DEF sat_result sat_stream_push(sat_stream *stream, float *out_row, int *rows_out, const sat_image *row)
+{
+    sat_table *t;
+    uint64_t reach, low, high;
+    int channel;
+    if (!stream || !out_row || !rows_out) return SAT_ERR_ARGUMENT;
+    *rows_out = 0;
+    t = stream->table;
+    if (row) {
+        size_t bad = 0;
+        sat_result result;
+        if (!sat__image_is_valid(row)) return SAT_ERR_ARGUMENT;
+        if (row->width != t->width || row->height != 1 || row->channels != t->channels) return SAT_ERR_MISMATCH;
+        if (stream->taken == 0 && (result = sat__resolve(t, row)) != SAT_OK) return result;
+        sat__stream_take(stream, row);
+        for (channel = 0; channel < t->channels; channel++) bad += t->total[channel].nan + t->total[channel].infinite;
+        if (bad && t->options.non_finite == SAT_NON_FINITE_REFUSE) return SAT_ERR_NON_FINITE;
+    }
+    reach = (uint64_t)stream->radius + 1;
+    high = stream->given + reach;
+    if (row ? high > stream->taken : stream->given >= stream->taken) return SAT_OK;
+    if (high > stream->taken) high = stream->taken;
+    low = stream->given >= reach ? stream->given + 1 - reach : 0;
+    for (channel = 0; channel < t->channels; channel++) {
+        sat__rows rows;
+        memset(&rows, 0, sizeof rows);
+        rows.low = sat__row(t, channel, sat__ring_row(stream, low));
+        rows.high = sat__row(t, channel, sat__ring_row(stream, high));
+        if (t->options.kind == SAT_KIND_TILED) {
+            rows.left_low = sat__left(t, channel, sat__ring_row(stream, low));
+            rows.left_high = sat__left(t, channel, sat__ring_row(stream, high));
+            rows.above_low = sat__above(t, channel, sat__ring_strip(stream, low));
+            rows.above_high = sat__above(t, channel, sat__ring_strip(stream, high));
+        }
+        sat__filter_row(out_row + channel, t, &rows, channel, stream->radius, (int)(high - low));
+    }
+    stream->given++;
+    *rows_out = 1;
+    return SAT_OK;
+}
+
+/* @CORE END@ */
 
 #ifdef __cplusplus
 }
