@@ -179,6 +179,15 @@ out/bench/%.tsv: build/bench/bench_% FORCE
 .PHONY: FORCE
 FORCE:
 
+report:
+	@sh tests/deps.sh gnuplot-nox
+	@$(MAKE) --no-print-directory bench QUICK='$(QUICK)' >/dev/null
+	@mkdir -p out/bench report
+	@$(MAKE) --no-print-directory -s size >out/bench/size.tsv
+	@bash tests/report.sh $(patsubst %,out/bench/%.tsv,$(filter $(BENCHES),$(PICK)) $(filter-out $(PICK),$(BENCHES))) out/bench/size.tsv >report/index.html.part
+	@mv report/index.html.part report/index.html
+	@echo report/index.html
+
 # ---- the rest --------------------------------------------------------------------------------------------------
 
 help:
@@ -194,9 +203,26 @@ help:
 	@echo 'make fuzz             libFuzzer on each header          [FUZZ_SECONDS=20]'
 	@echo 'make check            all of check-*; each takes LIB=sat'
 	@echo 'make deps      install missing packages (Debian)'
-	@echo 'make clean     remove build/ and out/'
+	@echo 'make report    all tables and plots in report/index.html  [QUICK=1]'
+	@echo 'make data      fetch free environment maps and meshes into data/'
+	@echo 'make install   headers and lightscan.pc                   [PREFIX=/usr/local] [DESTDIR=]'
+	@echo 'make clean     remove build/, out/, dist/ and report/'
+
+# inputs for examples, into data/
+data:
+	@sh examples/data.sh data
+
+PREFIX  ?= /usr/local
+DESTDIR ?=
+VERSION = $(shell awk '/define SAT_VERSION_(MAJOR|MINOR|PATCH)/ { printf "%s%s", dot, $$3; dot = "." }' sat.h)
+install:
+	install -d '$(DESTDIR)$(PREFIX)/include' '$(DESTDIR)$(PREFIX)/share/pkgconfig'
+	install -m 644 $(wildcard $(FAMILY:=.h)) '$(DESTDIR)$(PREFIX)/include'
+	printf '%s\n' 'prefix=$(PREFIX)' 'includedir=$${prefix}/include' '' 'Name: lightscan' \
+	    'Description: Summed-area tables, tone mapping, ambient occlusion, soft shadows, rain and photomosaics in single headers' \
+	    'Version: $(VERSION)' 'Cflags: -I$${includedir}' 'Libs: -lm' >'$(DESTDIR)$(PREFIX)/share/pkgconfig/lightscan.pc'
 
 clean:
-	rm -rf build out
+	rm -rf build out dist report
 
 -include $(wildcard build/*.d build/*/*.d build/*/*/*.d)

@@ -1,0 +1,109 @@
+#!/bin/bash
+# One self-contained HTML page from benchmark tables; tests/bench/bench.h states their form. Plots by gnuplot, inside.
+# usage: tests/report.sh TABLE.tsv... >index.html
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+plotting=1
+command -v gnuplot >/dev/null || { plotting=; echo "no plots: apt-get install gnuplot-nox" >&2; }
+
+escape() { sed 's/&/\&amp;/g; s/</\&lt;/g; s/>/\&gt;/g'; }
+
+# split FILE: $work/N.rows (columns, then rows), N.title, N.plots, N.notes; prints how many
+split() {
+    rm -f "$work"/*.rows "$work"/*.title "$work"/*.plots "$work"/*.notes
+    awk -v dir="$work" '
+        function name(kind) { return dir "/" n "." kind }
+        /^# table:/ { ++n; open = 1; print substr($0, 10) > name("title"); next }
+        /^# plot:/ && n { print substr($0, 9) > name("plots"); next }
+        /^# note:/ && n { print substr($0, 9) > name("notes"); next }
+        /^#/ { next }
+        /^[ \t]*$/ { next }
+        open { print > name("rows") }
+        END { print n + 0 }' "$1"
+}
+
+# value KEY PLOT: what the line "title; key=value; key=value" says
+value() { tr ';' '\n' <<<"$2" | sed -n "s/^ *$1=//p" | head -1 | sed 's/ *$//'; }
+
+# plot ROWS LINE: an SVG on stdout; nothing when a column is missing or no row has numbers
+plot() {
+    local rows=$1 title x y by log style count defaults
+    title=${2%%;*} x=$(value x "$2") y=$(value y "$2") by=$(value by "$2") log=$(value log "$2") style=$(value style "$2")
+    count=$(awk -F '\t' -v x="$x" -v y="$y" -v by="$by" -v out="$work/points" -v defaults="$work/defaults" '
+        function number(v) { return v ~ /^ *[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)? *$/ }
+        BEGIN { printf "" > out; printf "" > defaults }
+        NR == 1 { for (i = 1; i <= NF; ++i) column[$i] = i; next }
+        !(x in column) || !(y in column) { exit }
+        number($column[x]) && number($column[y]) {
+            key = by != "" && by in column ? $column[by] : "all"
+            if (!(key in rank)) { rank[key] = n++; names[n - 1] = key }
+            points[key] = points[key] $column[x] "\t" $column[y] "\n"
+            if ("default" in column && $column["default"] == 1) print $column[x] "\t" $column[y] > defaults
+        }
+        END {
+            for (i = 0; i < n; ++i) printf "\"%s\"\n%s\n\n", names[i], points[names[i]] > out
+            print n + 0
+        }' "$rows")
+    [ "$count" -gt 0 ] || return
+    defaults=
+    [ -s "$work/defaults" ] && defaults=", '$work/defaults' using 1:2 with points pointtype 6 pointsize 2 linewidth 2 linecolor rgb '#c03030' title 'default'"
+    {
+        echo "set terminal svg size 620,400 dynamic font 'sans-serif,12' background rgb 'white' name '$plot_id'"
+        echo "set title '${title//\'/}' noenhanced; set xlabel '$x' noenhanced; set ylabel '$y' noenhanced"
+        echo "set key outside right noenhanced; set grid linecolor rgb '#dddddd'; set format '%g'"
+        [ -z "$log" ] || echo "set logscale $log"
+        echo "plot for [i=0:$((count - 1))] '$work/points' index i using 1:2 with ${style:-points} linewidth 1.5 pointtype 7 pointsize 0.7 title columnheader(1)$defaults"
+    } | gnuplot 2>/dev/null | sed -e '/<?xml/d' -e '/<!DOCTYPE/,/>/d'
+}
+
+# the rows as an HTML table; the default's in bold
+table() {
+    escape <"$1" | awk -F '\t' '
+        NR == 1 { printf "<div class=wide><table><tr>"; for (i = 1; i <= NF; ++i) { if ($i == "default") d = i; else printf "<th>%s", $i }; print "</tr>"; next }
+        { printf "<tr%s>", d && $d == 1 ? " class=default" : ""; for (i = 1; i <= NF; ++i) if (i != d) printf "<td>%s", $i; print "</tr>" }
+        END { print "</table></div>" }'
+}
+
+cat <<'HTML'
+<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>lightscan: error against run time</title>
+<style>
+body { font: 15px/1.45 sans-serif; max-width: 1320px; margin: 2em auto; padding: 0 1em; color: #222; background: #fff }
+h1, h2, h3 { font-weight: 600; margin: 1.6em 0 .4em } nav a { margin-right: 1em }
+table { border-collapse: collapse; font-size: 13px; margin: .5em 0 } .wide { overflow-x: auto }
+th, td { padding: .15em .6em; border-bottom: 1px solid #ddd; text-align: right; white-space: nowrap }
+th:first-child, td:first-child { text-align: left } tr.default td { font-weight: 700; color: #c03030 }
+.plots { display: flex; flex-wrap: wrap; gap: 12px } .plots svg { width: 620px; height: auto; border: 1px solid #eee }
+.note, .machine { color: #666 } details { margin: .4em 0 }
+</style></head><body>
+<h1>lightscan: error against run time</h1>
+<p>Each point and row is one configuration; red is the default. Times are ratios to a reference measured in the same run
+wherever a column says so; other times hold for this machine only.</p>
+HTML
+echo "<nav>"
+for file; do [ -s "$file" ] && printf '<a href="#%s">%s</a>\n' "$(basename "$file" .tsv)" "$(basename "$file" .tsv)"; done
+echo "</nav>"
+for file; do
+    [ -s "$file" ] || continue
+    id=$(basename "$file" .tsv)
+    printf '<h2 id="%s">%s</h2>\n' "$id" "$id"
+    sed -n 's/^# machine: */<p class=machine>/p' "$file" | head -1
+    n=$(split "$file")
+    for ((t = 1; t <= n; ++t)); do
+        printf '<h3>%s</h3>\n' "$(escape <"$work/$t.title")"
+        [ -s "$work/$t.rows" ] || { echo "<p class=note>No rows: an input or a package is absent.</p>"; continue; }
+        if [ -n "$plotting" ] && [ -f "$work/$t.plots" ]; then
+            echo "<div class=plots>"
+            p=0
+            while IFS= read -r line; do plot_id=${id}_${t}_$((++p)); plot "$work/$t.rows" "$line"; done <"$work/$t.plots"
+            echo "</div>"
+        fi
+        [ ! -f "$work/$t.notes" ] || escape <"$work/$t.notes" | sed 's/^/<p class=note>/'
+        rows=$(wc -l <"$work/$t.rows")
+        echo "<details$([ "$rows" -gt 25 ] || echo " open")><summary>$((rows - 1)) rows</summary>"
+        table "$work/$t.rows"
+        echo "</details>"
+    done
+done
+echo "</body></html>"
