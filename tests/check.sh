@@ -5,7 +5,12 @@ script=$(basename "$0" .sh)
 
 have() { command -v "$1" >/dev/null; }
 pass() { passed=$((passed + 1)); }
-fail() { failed=$((failed + 1)); echo "not ok $lib: $1"; [ -z "$2" ] || printf '%s\n' "$2" | head -25 | sed 's/^/    /'; }
+# the first two failures at length, the others, often of the same cause, in brief
+fail() {
+    failed=$((failed + 1))
+    echo "not ok $lib: $1"
+    [ -z "$2" ] || printf '%s\n' "$2" | head -$((failed <= 2 ? 25 : 4)) | sed 's/^/    /'
+}
 skip() { skipped=$((skipped + 1)); echo "skip $lib: $1"; }
 # ok WHAT COMMAND...: the command must succeed, and what it prints is shown when it does not
 ok() { local what=$1 text; shift; if text=$("$@" 2>&1); then pass; else fail "$what" "$text"; fi; }
