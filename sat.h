@@ -180,8 +180,7 @@ typedef struct sat_table sat_table;
 
 /* What the last build or update met. FIXED kinds keep the quantum that the first build settled. */
 typedef struct sat_statistics {
-    size_t nan, infinite, clamped; /* channel values replaced: NaN, infinite, beyond max_value */
-    double largest, mean_abs;      /* over |value| of all channels, after replacement (and less the mean when subtracted) */
+    size_t nan, infinite, clamped; /* channel values replaced: NaN, infinite, too large */
     double quantum;                /* FIXED kinds: the step that pixels are rounded to; else 0 */
     size_t bytes;                  /* memory the table holds */
 } sat_statistics;
@@ -1823,8 +1822,9 @@ enum { SAT__LINE = 64, SAT__STRIP = 512, SAT__MAX_STRIP = 4096 };
 /* What one band of rows, or one strip of columns, met: summed in a fixed order afterwards. */
 typedef struct sat__tally {
     size_t nan, infinite, clamped;
-    double largest, sum_abs, tile_largest, tile_squares;
-    int negative;
+    double sum_abs, largest;            /* of |pixel|; sum_abs of tables without negative pixels comes from corners */
+    double tile_largest, tile_squares;  /* of tile sums */
+    int negative, overflow;             /* some pixel has its sign bit set; some sum is not finite */
 } sat__tally;
 
 struct sat_table {
@@ -1846,7 +1846,7 @@ struct sat_table {
     sat__tally *tallies, total[4];
     double quantum, limit;              /* pixels are clamped to +-limit */
     float mean[4];
-    int build_failed;                   /* non-finite input refused */
+    int refused;                        /* the last build met NaN or infinity and was not to */
 };
 
 static int sat__is_fixed(sat_kind kind) { return kind == SAT_KIND_FIXED32 || kind == SAT_KIND_FIXED64; }
@@ -1972,20 +1972,35 @@ SAT_DEF void sat_destroy(sat_table *table)
 
    Each step takes eight pixels: add them to the running column sums, then make prefix sums of these eight by halves
    (pairs, fours, eight), then add the carry of the row so far. Only that last addition waits for the step before.
-   The vector code does the same additions in the same order: the same bits with SSE2, NEON and plain C. */
+   The vector code does the same additions in the same order: the same bits with AVX2, SSE2, NEON and plain C.
+   *signs collects the sign bits of all pixels (floats only). */
+
+#define SAT__SIGN_f32(v) (int32_t)sat__float_bits(v)
+#define SAT__SIGN_f64(v) (int32_t)sat__float_bits(v)
+#define SAT__SIGN_u32(v) 0
+#define SAT__SIGN_u64(v) 0
 
 #define SAT__DEFINE_SUM_ROW(suffix, type, pixel)                                                                       \
-    static type sat__sum_row_plain_##suffix(type *out, type *column, const pixel *in, int n, type carry)               \
+    static type sat__sum_row_plain_##suffix(type *out, type *column, const pixel *in, int n, type carry, int32_t *signs) \
     {                                                                                                                  \
         int i, j;                                                                                                      \
         for (i = 0; i < n; i += 8) {                                                                                   \
             type c[8];                                                                                                 \
             int m = n - i < 8 ? n - i : 8;                                                                             \
             for (j = 0; j < 8; j++) c[j] = 0;                                                                          \
-            for (j = 0; j < m; j++) c[j] = column[i + j] = (type)(column[i + j] + (type)in[i + j]);                    \
-            c[1] += c[0], c[3] += c[2], c[5] += c[4], c[7] += c[6];                                                    \
-            c[2] += c[1], c[3] += c[1], c[6] += c[5], c[7] += c[5];                                                    \
-            c[4] += c[3], c[5] += c[3], c[6] += c[3], c[7] += c[3];                                                    \
+            for (j = 0; j < m; j++) {                                                                                  \
+                c[j] = column[i + j] = (type)(column[i + j] + (type)in[i + j]);                                        \
+                *signs |= SAT__SIGN_##suffix(in[i + j]);                                                               \
+            }                                                                                                          \
+            c[1] += c[0];                                                                                              \
+            c[3] += c[2];                                                                                              \
+            c[5] += c[4];                                                                                              \
+            c[7] += c[6];                                                                                              \
+            c[2] += c[1];                                                                                              \
+            c[3] += c[1];                                                                                              \
+            c[6] += c[5];                                                                                              \
+            c[7] += c[5];                                                                                              \
+            for (j = 4; j < 8; j++) c[j] += c[3];                                                                      \
             for (j = 0; j < m; j++) out[i + j] = c[j] + carry;                                                         \
             carry += c[7];                                                                                             \
         }                                                                                                              \
@@ -2090,17 +2105,23 @@ static inline sat__vec_f32 sat__prefix_f32(sat__vec_f32 v)
 #define SAT__PIXELS_u64(p) SAT__LOAD_u64(p)
 #define SAT__PREFIX_f32(v) sat__prefix_f32(v)
 #define SAT__PREFIX_u32(v) sat__prefix_u32(v)
+#define SAT__SIGNS_f32(p) all = sat__i32x4_or(all, sat__i32x4_or(sat__f32x4_bits(sat__f32x4_load(p)), sat__f32x4_bits(sat__f32x4_load((p) + 4))))
+#define SAT__SIGNS_f64(p) SAT__SIGNS_f32(p)
+#define SAT__SIGNS_u32(p)
+#define SAT__SIGNS_u64(p)
 
 /* Eight pixels are two vectors of four lanes ... */
 #define SAT__DEFINE_SUM_ROW_4(suffix, type, pixel)                                                                     \
-    static type sat__sum_row_##suffix(type *out, type *column, const pixel *in, int n, type carry_in, int stream)      \
+    static type sat__sum_row_##suffix(type *out, type *column, const pixel *in, int n, type first, int stream, int32_t *signs) \
     {                                                                                                                  \
-        sat__vec_##suffix carry = SAT__SET_##suffix(carry_in), a, b, sum_a, sum_b;                                     \
+        sat__vec_##suffix carry = SAT__SET_##suffix(first), a, b, sum_a, sum_b;                                        \
+        sat__i32x4 all = sat__i32x4_set1(*signs);                                                                      \
         type last[4];                                                                                                  \
         int i = 0;                                                                                                     \
         for (; i + 8 <= n; i += 8) {                                                                                   \
             a = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i), SAT__PIXELS_##suffix(in + i));                       \
             b = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i + 4), SAT__PIXELS_##suffix(in + i + 4));               \
+            SAT__SIGNS_##suffix(in + i);                                                                               \
             SAT__STORE_##suffix(column + i, a);                                                                        \
             SAT__STORE_##suffix(column + i + 4, b);                                                                    \
             a = SAT__PREFIX_##suffix(a);                                                                               \
@@ -2117,15 +2138,17 @@ static inline sat__vec_f32 sat__prefix_f32(sat__vec_f32 v)
                 SAT__STORE_##suffix(out + i + 4, sum_b);                                                               \
             }                                                                                                          \
         }                                                                                                              \
+        *signs = sat__i32x4_any(sat__i32x4_greater(sat__i32x4_set1(0), all)) ? -1 : 0;                                 \
         SAT__STORE_##suffix(last, carry);                                                                              \
-        return sat__sum_row_plain_##suffix(out + i, column + i, in + i, n - i, last[0]);                               \
+        return i == n ? last[0] : sat__sum_row_plain_##suffix(out + i, column + i, in + i, n - i, last[0], signs);     \
     }
 
 /* ... or four of two. */
 #define SAT__DEFINE_SUM_ROW_2(suffix, type, pixel)                                                                     \
-    static type sat__sum_row_##suffix(type *out, type *column, const pixel *in, int n, type carry_in, int stream)      \
+    static type sat__sum_row_##suffix(type *out, type *column, const pixel *in, int n, type first, int stream, int32_t *signs) \
     {                                                                                                                  \
-        sat__vec_##suffix carry = SAT__SET_##suffix(carry_in), a, b, c, d, half;                                       \
+        sat__vec_##suffix carry = SAT__SET_##suffix(first), a, b, c, d, half;                                          \
+        sat__i32x4 all = sat__i32x4_set1(*signs);                                                                      \
         type last[2];                                                                                                  \
         int i = 0;                                                                                                     \
         for (; i + 8 <= n; i += 8) {                                                                                   \
@@ -2133,6 +2156,7 @@ static inline sat__vec_f32 sat__prefix_f32(sat__vec_f32 v)
             b = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i + 2), SAT__PIXELS_##suffix(in + i + 2));               \
             c = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i + 4), SAT__PIXELS_##suffix(in + i + 4));               \
             d = SAT__ADD_##suffix(SAT__LOAD_##suffix(column + i + 6), SAT__PIXELS_##suffix(in + i + 6));               \
+            SAT__SIGNS_##suffix(in + i);                                                                               \
             SAT__STORE_##suffix(column + i, a);                                                                        \
             SAT__STORE_##suffix(column + i + 2, b);                                                                    \
             SAT__STORE_##suffix(column + i + 4, c);                                                                    \
@@ -2162,103 +2186,117 @@ static inline sat__vec_f32 sat__prefix_f32(sat__vec_f32 v)
                 SAT__STORE_##suffix(out + i + 6, d);                                                                   \
             }                                                                                                          \
         }                                                                                                              \
+        *signs = sat__i32x4_any(sat__i32x4_greater(sat__i32x4_set1(0), all)) ? -1 : 0;                                 \
         SAT__STORE_##suffix(last, carry);                                                                              \
-        return sat__sum_row_plain_##suffix(out + i, column + i, in + i, n - i, last[0]);                               \
+        return i == n ? last[0] : sat__sum_row_plain_##suffix(out + i, column + i, in + i, n - i, last[0], signs);     \
     }
 
+#ifdef SAT__AVX2
+/* The one loop where eight lanes pay: halves are prefixed side by side, then the lower half's sum goes to the upper. */
+static float sat__sum_row_f32(float *out, float *column, const float *in, int n, float first, int stream, int32_t *signs)
+{
+    __m256 carry = _mm256_set1_ps(first), zero = _mm256_setzero_ps(), all = _mm256_castsi256_ps(_mm256_set1_epi32(*signs)), v, pixels, low;
+    int i = 0;
+    for (; i + 8 <= n; i += 8) {
+        pixels = _mm256_loadu_ps(in + i);
+        all = _mm256_or_ps(all, pixels);
+        v = _mm256_add_ps(_mm256_loadu_ps(column + i), pixels);
+        _mm256_storeu_ps(column + i, v);
+        v = _mm256_add_ps(v, _mm256_castsi256_ps(_mm256_slli_epi64(_mm256_castps_si256(v), 32)));
+        v = _mm256_add_ps(v, _mm256_shuffle_ps(zero, v, _MM_SHUFFLE(1, 1, 0, 0)));
+        low = _mm256_permute2f128_ps(v, v, 0x08);
+        v = _mm256_add_ps(v, _mm256_shuffle_ps(low, low, 255));
+        low = _mm256_add_ps(v, carry);
+        carry = _mm256_add_ps(carry, _mm256_permutevar8x32_ps(v, _mm256_set1_epi32(7)));
+        if (stream) _mm256_stream_ps(out + i, low);
+        else _mm256_storeu_ps(out + i, low);
+    }
+    *signs = _mm256_movemask_ps(all) ? -1 : 0;
+    first = _mm256_cvtss_f32(carry);
+    return i == n ? first : sat__sum_row_plain_f32(out + i, column + i, in + i, n - i, first, signs);
+}
+#else
 SAT__DEFINE_SUM_ROW_4(f32, float, float)
+#endif
 SAT__DEFINE_SUM_ROW_4(u32, uint32_t, uint32_t)
 SAT__DEFINE_SUM_ROW_2(f64, double, float)
 SAT__DEFINE_SUM_ROW_2(u64, uint64_t, uint64_t)
 #else
-#define sat__sum_row_f32(out, column, in, n, carry, stream) sat__sum_row_plain_f32(out, column, in, n, carry)
-#define sat__sum_row_f64(out, column, in, n, carry, stream) sat__sum_row_plain_f64(out, column, in, n, carry)
-#define sat__sum_row_u32(out, column, in, n, carry, stream) sat__sum_row_plain_u32(out, column, in, n, carry)
-#define sat__sum_row_u64(out, column, in, n, carry, stream) sat__sum_row_plain_u64(out, column, in, n, carry)
+#define sat__sum_row_f32(out, column, in, n, carry, stream, signs) sat__sum_row_plain_f32(out, column, in, n, carry, signs)
+#define sat__sum_row_f64(out, column, in, n, carry, stream, signs) sat__sum_row_plain_f64(out, column, in, n, carry, signs)
+#define sat__sum_row_u32(out, column, in, n, carry, stream, signs) sat__sum_row_plain_u32(out, column, in, n, carry, signs)
+#define sat__sum_row_u64(out, column, in, n, carry, stream, signs) sat__sum_row_plain_u64(out, column, in, n, carry, signs)
 #endif
 
 /* ---- tables: reading pixels */
 
-/* Adds |values| to the tally and returns 1, or returns 0 and changes nothing when one is NaN or beyond the limit. The
-   comparison is made on the bits, which order like the magnitudes and put infinity and NaN above all numbers. */
-static int sat__measure(const float *p, int n, float limit, sat__tally *tally)
+/* How much a build looks at its pixels. Sums absorb NaN and infinity, so that a finished row tells whether it met any:
+   most images are never looked at, and a band that did meet one is built again with more care. */
+enum { SAT__TRUST, SAT__REPLACE_NON_FINITE, SAT__CLAMP_ALL };
+
+/* 1 when no |value| is NaN, infinite or above the limit. Made on the bits, which order like the magnitudes. */
+static int sat__is_tame(const float *p, int n, float limit)
 {
-    float sums[4] = {0, 0, 0, 0}, largest[4] = {0, 0, 0, 0};
-    uint32_t limit_bits = sat__float_bits(limit), beyond = 0, signs = 0;
-    double sum;
+    uint32_t limit_bits = sat__float_bits(limit), beyond = 0;
     int i = 0;
 #ifdef SAT__VECTOR
-    sat__f32x4 sum4 = sat__f32x4_set1(0), largest4 = sum4;
-    sat__i32x4 beyond4 = sat__i32x4_set1(0), signs4 = beyond4, limit4 = sat__i32x4_set1((int32_t)limit_bits);
-    for (; i + 4 <= n; i += 4) {
-        sat__f32x4 v = sat__f32x4_load(p + i), magnitude = sat__f32x4_abs(v);
-        beyond4 = sat__i32x4_or(beyond4, sat__i32x4_greater(sat__f32x4_bits(magnitude), limit4));
-        signs4 = sat__i32x4_or(signs4, sat__f32x4_bits(v));
-        sum4 = sat__f32x4_add(sum4, magnitude);
-        largest4 = sat__f32x4_max(largest4, magnitude);
-    }
-    sat__f32x4_store(sums, sum4);
-    sat__f32x4_store(largest, largest4);
+    sat__i32x4 beyond4 = sat__i32x4_set1(0), limit4 = sat__i32x4_set1((int32_t)limit_bits);
+    for (; i + 4 <= n; i += 4)
+        beyond4 = sat__i32x4_or(beyond4, sat__i32x4_greater(sat__f32x4_bits(sat__f32x4_abs(sat__f32x4_load(p + i))), limit4));
     beyond = (uint32_t)sat__i32x4_any(beyond4);
-    signs = (uint32_t)sat__i32x4_any(sat__i32x4_greater(sat__i32x4_set1(0), signs4)) << 31;
 #endif
-    for (; i < n; i++) {
-        uint32_t bits = sat__float_bits(p[i]), magnitude_bits = bits & 0x7fffffffu;
-        float magnitude = sat__float_from_bits(magnitude_bits);
-        beyond |= (uint32_t)(magnitude_bits > limit_bits);
-        signs |= bits;
-        sums[i & 3] += magnitude;
-        if (magnitude > largest[i & 3]) largest[i & 3] = magnitude;
-    }
-    if (beyond) return 0;
-    sum = ((double)sums[0] + (double)sums[1]) + ((double)sums[2] + (double)sums[3]);
-    if (!sat__is_finite_double(sum))
-        for (sum = 0, i = 0; i < n; i++) sum += fabs((double)p[i]);
-    tally->sum_abs += sum;
-    tally->negative |= (int)(signs >> 31);
-    for (i = 0; i < 4; i++)
-        if ((double)largest[i] > tally->largest) tally->largest = (double)largest[i];
-    return 1;
+    for (; i < n; i++) beyond |= (uint32_t)((sat__float_bits(p[i]) & 0x7fffffffu) > limit_bits);
+    return !beyond;
 }
 
-/* The rule for values no sum can hold: NaN becomes 0, infinity and what lies beyond the limit become +-limit. */
-static void sat__replace(float *p, int n, float limit, sat__tally *tally)
+/* The rule for values no sum can hold: NaN becomes 0, infinity +-limit; with SAT__CLAMP_ALL so does what lies beyond. */
+static void sat__replace(float *p, int n, float limit, int care, sat__tally *tally)
 {
     int i;
     for (i = 0; i < n; i++) {
         if (sat__is_nan(p[i])) {
             p[i] = 0;
             tally->nan++;
-        } else if (!(p[i] <= limit && p[i] >= -limit)) {
-            if (sat__is_finite(p[i])) tally->clamped++;
-            else tally->infinite++;
+        } else if (!sat__is_finite(p[i])) {
             p[i] = p[i] > 0 ? limit : -limit;
+            tally->infinite++;
+        } else if (care == SAT__CLAMP_ALL && !(p[i] <= limit && p[i] >= -limit)) {
+            p[i] = p[i] > 0 ? limit : -limit;
+            tally->clamped++;
         }
     }
 }
 
-/* Pixels [x0, x0 + n) of a row as floats that may be summed: a pointer into the image where nothing has to change. */
-static const float *sat__prepare(const sat_table *t, const sat_image *image, int y, int x0, int n, int channel, int worker, sat__tally *tally)
+/* Pixels [x0, x0 + n) of a row as floats: a pointer into the image where nothing has to change. */
+static const float *sat__prepare(const sat_table *t, const sat_image *image, int y, int x0, int n, int channel, int worker,
+                                 int care, sat__tally *tally)
 {
-    float *scratch = t->pixels + (size_t)worker * SAT__MAX_STRIP, limit = (float)t->limit, mean = t->mean[channel];
+    float *scratch = t->pixels + (size_t)worker * SAT__MAX_STRIP, mean = t->mean[channel];
     const float *p = scratch;
-    sat__tally unused;
     int i;
-    unused.largest = unused.sum_abs = unused.negative = 0;
     if (image->format == SAT_F32 && image->channels == 1) p = (const float *)sat__image_row(image, y) + x0;
     else sat__read_row(scratch, image, y, x0, x0 + n, channel);
-    if (!sat__measure(p, n, limit, t->options.subtract_mean ? &unused : tally)) {
+    if (care != SAT__TRUST && !sat__is_tame(p, n, care == SAT__CLAMP_ALL ? (float)t->limit : 3.4028235e38f)) {
         if (p != scratch) memcpy(scratch, p, (size_t)n * sizeof(float));
-        sat__replace(scratch, n, limit, tally);
-        sat__measure(scratch, n, limit, t->options.subtract_mean ? &unused : tally);
+        sat__replace(scratch, n, (float)t->limit, care, tally);
         p = scratch;
     }
     if (t->options.subtract_mean) {
         for (i = 0; i < n; i++) scratch[i] = p[i] - mean;
         p = scratch;
-        sat__measure(p, n, 3.4028235e38f, tally);
     }
     return p;
+}
+
+/* Images with negative pixels need the magnitudes for the error bound; those without have them in their corners. */
+static void sat__measure(const float *p, int n, sat__tally *tally)
+{
+    int i;
+    for (i = 0; i < n; i++) {
+        double magnitude = fabs((double)p[i]);
+        tally->sum_abs += magnitude;
+        if (magnitude > tally->largest) tally->largest = magnitude;
+    }
 }
 
 /* Rounds pixels / quantum to integers, modulo 2^32 or 2^64, ties to even: adding 1.5 * 2^52 leaves the integer in the
@@ -2299,60 +2337,83 @@ static void sat__quantise(const sat_table *t, uint64_t *out, const float *in, in
 typedef struct sat__build {
     sat_table *table;
     const sat_image *image;
-    int first_band, bands;                        /* tiled: tile rows to rebuild */
-    int channel, strips, block_rows, diagonal;    /* flat: a wavefront of blocks */
-    int first_strip_block;
-    int stream;                                   /* stores that bypass the cache: the table is larger than it */
+    int care;
+    int stream;                                        /* stores that bypass the cache: the table is larger than it */
+    int first_band, bands;                             /* tiled: tile rows to rebuild */
+    int channel, block_rows, diagonal, first_strip;    /* flat: a wavefront of blocks */
 } sat__build;
 
-/* One row of tiles' worth of pixels: local sums into `row`, sums of the tiles to the left into `left`. */
+/* One row of a tiled table: local sums into `row`, sums of the tiles to the left into `left`. */
 static void sat__tiled_row(const sat_table *t, const sat_image *image, int channel, int y, float *row, double *left,
-                           float *column, int worker, sat__tally *tally, int stream)
+                           float *column, int worker, int care, sat__tally *tally, int stream)
 {
     int x0, x, tile = t->options.tile;
+    int32_t signs = 0;
     double run = 0;
     for (x0 = 0; x0 < t->width; x0 += SAT__MAX_STRIP) {
         int n = sat__min_int(t->width - x0, SAT__MAX_STRIP);
-        const float *in = sat__prepare(t, image, y, x0, n, channel, worker, tally);
+        const float *in = sat__prepare(t, image, y, x0, n, channel, worker, care, tally);
         for (x = 0; x < n; x += tile) {
             left[(x0 + x) >> t->shift] = run;
-            run += (double)sat__sum_row_f32(row + 1 + x0 + x, column + x0 + x, in + x, sat__min_int(n - x, tile), 0, stream);
+            run += (double)sat__sum_row_f32(row + 1 + x0 + x, column + x0 + x, in + x, sat__min_int(n - x, tile), 0, stream, &signs);
         }
     }
+    tally->negative |= signs < 0;
+    tally->overflow |= !sat__is_finite_double(run);
 }
 
-/* Tile rows are independent but for the strips above, which are summed afterwards. */
+/* The largest tile sum of a tile row and the sum of their squares; magnitudes where pixels are negative. */
+static void sat__tally_band(const sat__build *b, int channel, int y0, int y1, int worker, sat__tally *tally)
+{
+    const sat_table *t = b->table;
+    const float *last = (const float *)(const void *)sat__row(t, channel, y1);
+    sat__tally ignored;
+    int x, y;
+    for (x = 0; x < t->tiles_x; x++) {
+        double corner = fabs((double)last[sat__min_int((x + 1) << t->shift, t->width)]);
+        if (corner > tally->tile_largest) tally->tile_largest = corner;
+        tally->tile_squares += corner * corner;
+        if (!tally->negative) tally->sum_abs += corner;
+    }
+    if (!tally->negative) return;
+    for (y = y0; y < y1; y++)
+        for (x = 0; x < t->width; x += SAT__MAX_STRIP) {
+            int n = sat__min_int(t->width - x, SAT__MAX_STRIP);
+            sat__measure(sat__prepare(t, b->image, y, x, n, channel, worker, SAT__CLAMP_ALL, &ignored), n, tally);
+        }
+}
+
+/* Tile rows are independent but for the strips above, which are summed afterwards. A row of tiles whose sums are not
+   finite is built again: first without NaN and infinity, then, if need be, with all values clamped. */
 static void sat__build_bands(int begin, int end, int worker, void *context)
 {
     const sat__build *b = (const sat__build *)context;
     const sat_table *t = b->table;
     float *column = (float *)(void *)(t->columns + (size_t)worker * t->columns_stride);
-    int job, y, tile_x;
+    int job, y, care;
     for (job = begin; job < end; job++) {
         int channel = job / b->bands, band = b->first_band + job % b->bands;
         int y0 = band << t->shift, y1 = sat__min_int(t->height - y0, t->options.tile) + y0;
         sat__tally *tally = t->tallies + channel * t->bands + band;
-        const float *last = (const float *)(const void *)sat__row(t, channel, y1);
-        memset(tally, 0, sizeof *tally);
-        memset(column, 0, t->columns_stride);
-        for (y = y0; y < y1; y++)
-            sat__tiled_row(t, b->image, channel, y, (float *)(void *)sat__row(t, channel, y + 1), sat__left(t, channel, y + 1),
-                           column, worker, tally, b->stream && y + 1 < y1);
-        for (tile_x = 1; tile_x <= t->tiles_x; tile_x++) {
-            double corner = fabs((double)last[sat__min_int(tile_x << t->shift, t->width)]);
-            if (corner > tally->tile_largest) tally->tile_largest = corner;
-            tally->tile_squares += corner * corner;
+        for (care = b->care; care <= SAT__CLAMP_ALL; care++) {
+            memset(tally, 0, sizeof *tally);
+            memset(column, 0, t->columns_stride);
+            for (y = y0; y < y1; y++)
+                sat__tiled_row(t, b->image, channel, y, (float *)(void *)sat__row(t, channel, y + 1), sat__left(t, channel, y + 1),
+                               column, worker, care, tally, b->stream && y + 1 < y1);
+            if (!tally->overflow) break;
         }
+        sat__tally_band(b, channel, y0, y1, worker, tally);
     }
 }
 
-/* next[X] = above[X] + the sum of this tile row left of X: corners [X0, X1) of the tile row's last corner row. */
-static void sat__add_above(const sat_table *t, double *next, const double *above, const float *local, const double *left, int X0, int X1)
+/* next[X] = above[X] + the sum of this tile row left of X, for corners [x0, x1) of the tile row's last corner row. */
+static void sat__add_above(const sat_table *t, double *next, const double *above, const float *local, const double *left, int x0, int x1)
 {
-    int X = X0;
-    while (X < X1) {
-        int tile = sat__tile_of(t, X), stop = sat__min_int(X1, ((tile + 1) << t->shift) + 1);
-        for (; X < stop; X++) next[X] = (left[tile] + (double)local[X]) + above[X];
+    int x = x0;
+    while (x < x1) {
+        int tile = sat__tile_of(t, x), stop = sat__min_int(x1, ((tile + 1) << t->shift) + 1);
+        for (; x < stop; x++) next[x] = (left[tile] + (double)local[x]) + above[x];
     }
 }
 
@@ -2365,42 +2426,62 @@ static void sat__build_above(int begin, int end, int worker, void *context)
     int job, band, pieces = t->width / SAT__ABOVE_PIECE + 1;
     (void)worker;
     for (job = begin; job < end; job++) {
-        int channel = job / pieces, X0 = job % pieces * SAT__ABOVE_PIECE, X1 = sat__min_int(t->width - X0, SAT__ABOVE_PIECE - 1) + X0 + 1;
+        int channel = job / pieces, x0 = job % pieces * SAT__ABOVE_PIECE, x1 = sat__min_int(t->width - x0, SAT__ABOVE_PIECE - 1) + x0 + 1;
         for (band = b->first_band; band + 1 < t->tiles_y; band++) {
-            int Y = (band + 1) << t->shift;
+            int y = (band + 1) << t->shift;
             sat__add_above(t, sat__above(t, channel, band + 1), sat__above(t, channel, band),
-                           (const float *)(const void *)sat__row(t, channel, Y), sat__left(t, channel, Y), X0, X1);
+                           (const float *)(const void *)sat__row(t, channel, y), sat__left(t, channel, y), x0, x1);
         }
     }
 }
 
-/* Row sums of pixels [x0, x0 + n) into a flat table, going on from corner x0 of the same row. */
-static void sat__flat_piece(const sat_table *t, const sat_image *image, int channel, int y, int x0, int n,
-                            unsigned char *row, unsigned char *columns, int worker, sat__tally *tally, int stream)
+/* The sum of a row so far, in the table's type. It travels in a variable: reading it back from the table would wait for
+   the stores that went past the cache. */
+typedef union sat__carry {
+    float f32;
+    double f64;
+    uint32_t u32;
+    uint64_t u64;
+} sat__carry;
+
+/* Row sums of pixels [x0, x0 + n) into a row of a flat table. */
+static void sat__flat_piece(const sat_table *t, const sat_image *image, int channel, int y, int x0, int n, unsigned char *row,
+                            sat__carry *carry, int worker, int care, sat__tally *tally, int stream)
 {
-    const float *in = sat__prepare(t, image, y, x0, n, channel, worker, tally);
+    const float *in = sat__prepare(t, image, y, x0, n, channel, worker, care, tally);
     uint64_t *integers = t->integers ? t->integers + (size_t)worker * SAT__MAX_STRIP : NULL;
-    void *out = row + (size_t)x0 * t->element, *column = columns + (size_t)x0 * t->element;
+    void *out = row + ((size_t)x0 + 1) * t->element, *column = t->columns + (size_t)channel * t->columns_stride + (size_t)x0 * t->element;
+    int32_t signs = 0;
     if (integers) sat__quantise(t, integers, in, n);
     switch (t->options.kind) {
-    case SAT_KIND_DOUBLE: sat__sum_row_f64((double *)out + 1, (double *)column, in, n, *(double *)out, stream); break;
-    case SAT_KIND_FIXED32: sat__sum_row_u32((uint32_t *)out + 1, (uint32_t *)column, (uint32_t *)(void *)integers, n, *(uint32_t *)out, stream); break;
-    case SAT_KIND_FIXED64: sat__sum_row_u64((uint64_t *)out + 1, (uint64_t *)column, integers, n, *(uint64_t *)out, stream); break;
+    case SAT_KIND_DOUBLE:
+        carry->f64 = sat__sum_row_f64((double *)out, (double *)column, in, n, carry->f64, stream, &signs);
+        tally->overflow |= !sat__is_finite_double(carry->f64);
+        break;
+    case SAT_KIND_FIXED32: carry->u32 = sat__sum_row_u32((uint32_t *)out, (uint32_t *)column, (uint32_t *)(void *)integers, n, carry->u32, stream, &signs); break;
+    case SAT_KIND_FIXED64: carry->u64 = sat__sum_row_u64((uint64_t *)out, (uint64_t *)column, integers, n, carry->u64, stream, &signs); break;
     case SAT_KIND_TILED:
-    case SAT_KIND_FLOAT: sat__sum_row_f32((float *)out + 1, (float *)column, in, n, *(float *)out, stream); break;
+    case SAT_KIND_FLOAT:
+        carry->f32 = sat__sum_row_f32((float *)out, (float *)column, in, n, carry->f32, stream, &signs);
+        tally->overflow |= !sat__is_finite(carry->f32);
+        break;
     }
+    tally->negative |= signs < 0;
 }
 
 /* Rows [y0, y1) of strips [strip0, strip1): what lies left of and above the block is finished. */
 static void sat__flat_block(const sat__build *b, int strip0, int strip1, int y0, int y1, int worker)
 {
     const sat_table *t = b->table;
-    unsigned char *columns = t->columns + (size_t)b->channel * t->columns_stride;
     int y, strip;
-    for (y = y0; y < y1; y++)
+    for (y = y0; y < y1; y++) {
+        unsigned char *row = sat__row(t, b->channel, y + 1);
+        sat__carry carry;
+        memcpy(&carry, row + (size_t)strip0 * SAT__STRIP * t->element, t->element);
         for (strip = strip0; strip < strip1; strip++)
             sat__flat_piece(t, b->image, b->channel, y, strip * SAT__STRIP, sat__min_int(SAT__STRIP, t->width - strip * SAT__STRIP),
-                            sat__row(t, b->channel, y + 1), columns, worker, t->tallies + b->channel * t->bands + strip, b->stream);
+                            row, &carry, worker, b->care, t->tallies + b->channel * t->bands + strip, b->stream);
+    }
 }
 
 static void sat__build_diagonal(int begin, int end, int worker, void *context)
@@ -2408,7 +2489,7 @@ static void sat__build_diagonal(int begin, int end, int worker, void *context)
     const sat__build *b = (const sat__build *)context;
     int i;
     for (i = begin; i < end; i++) {
-        int strip = b->first_strip_block + i, y0 = (b->diagonal - strip) * b->block_rows;
+        int strip = b->first_strip + i, y0 = (b->diagonal - strip) * b->block_rows;
         sat__flat_block(b, strip, strip + 1, y0, sat__min_int(b->block_rows, b->table->height - y0) + y0, worker);
     }
 }
@@ -2430,9 +2511,29 @@ static void sat__build_flat(sat__build *b)
             continue;
         }
         for (b->diagonal = 0; b->diagonal < t->bands + blocks - 1; b->diagonal++) {
-            b->first_strip_block = sat__max_int(0, b->diagonal - blocks + 1);
-            sat__parallel_for(&t->options.threads, sat__min_int(b->diagonal + 1, t->bands) - b->first_strip_block, sat__build_diagonal, b);
+            b->first_strip = sat__max_int(0, b->diagonal - blocks + 1);
+            sat__parallel_for(&t->options.threads, sat__min_int(b->diagonal + 1, t->bands) - b->first_strip, sat__build_diagonal, b);
         }
+    }
+}
+
+/* Magnitudes of a flat table: its last corner, or the pixels once more where some are negative. */
+static void sat__tally_flat(sat_table *t, const sat_image *image)
+{
+    sat__tally ignored;
+    int channel, x, y;
+    for (channel = 0; channel < t->channels; channel++) {
+        sat__tally *total = &t->total[channel];
+        if (!total->negative) {
+            const unsigned char *corner = sat__row(t, channel, t->height) + (size_t)t->width * t->element;
+            total->sum_abs = t->options.kind == SAT_KIND_FLOAT ? (double)*(const float *)(const void *)corner : *(const double *)(const void *)corner;
+            continue;
+        }
+        for (y = 0; y < t->height; y++)
+            for (x = 0; x < t->width; x += SAT__MAX_STRIP) {
+                int n = sat__min_int(t->width - x, SAT__MAX_STRIP);
+                sat__measure(sat__prepare(t, image, y, x, n, channel, 0, SAT__CLAMP_ALL, &ignored), n, total);
+            }
     }
 }
 
@@ -2451,8 +2552,10 @@ static double sat__largest_pixel(const sat_table *t, const sat_image *image)
     memset(&tally, 0, sizeof tally);
     for (channel = 0; channel < image->channels; channel++)
         for (y = 0; y < image->height; y++)
-            for (x = 0; x < image->width; x += SAT__MAX_STRIP)
-                sat__prepare(t, image, y, x, sat__min_int(image->width - x, SAT__MAX_STRIP), channel, 0, &tally);
+            for (x = 0; x < image->width; x += SAT__MAX_STRIP) {
+                int n = sat__min_int(image->width - x, SAT__MAX_STRIP);
+                sat__measure(sat__prepare(t, image, y, x, n, channel, 0, SAT__CLAMP_ALL, &tally), n, &tally);
+            }
     return tally.largest;
 }
 
@@ -2467,17 +2570,17 @@ static double sat__fixed_range(const sat_table *t)
 static sat_result sat__resolve(sat_table *t, const sat_image *image)
 {
     const double float_max = 3.4028234663852886e38, tile = t->options.tile;
-    double wanted = t->options.max_value > 0 ? t->options.max_value : float_max, range;
+    double range, largest;
     t->limit = t->options.kind == SAT_KIND_TILED ? float_max / (tile * tile) : t->options.kind == SAT_KIND_FLOAT ? float_max / 2147483648.0 : float_max;
     if (t->options.subtract_mean) t->limit /= 2;
-    if (wanted < t->limit) t->limit = wanted;
+    if (t->options.max_value > 0 && t->options.max_value < t->limit) t->limit = t->options.max_value;
     if (!sat__is_fixed(t->options.kind)) return SAT_OK;
     range = sat__fixed_range(t);
     if (range > 1125899906842624.0) range = 1125899906842624.0; /* 2^50: what sat__quantise can round */
     if (range < 1) return SAT_ERR_LIMIT;
     if (t->options.quantum > 0) t->quantum = t->options.quantum;
     if (!(t->quantum > 0)) {
-        double largest = t->limit;
+        largest = t->limit;
         if (image->format == SAT_U8 || image->format == SAT_U16) largest = image->format == SAT_U8 ? 255 : 65535;
         else if (!(t->options.max_value > 0)) largest = sat__largest_pixel(t, image);
         if (largest > t->limit) largest = t->limit;
@@ -2488,29 +2591,35 @@ static sat_result sat__resolve(sat_table *t, const sat_image *image)
     return SAT_OK;
 }
 
+/* Integers cannot show that they overflowed, and a stated largest value is to be kept. */
+static int sat__first_care(const sat_table *t)
+{
+    return sat__is_fixed(t->options.kind) || t->options.max_value > 0 || t->options.subtract_mean ? SAT__CLAMP_ALL : SAT__TRUST;
+}
+
 /* Hensley 2005: the mean of each channel, as the float that every pixel is lowered by. */
 static void sat__measure_means(sat_table *t, const sat_image *image)
 {
     sat__tally ignored;
     int channel, x, y, i;
-    memset(&ignored, 0, sizeof ignored);
+    t->options.subtract_mean = 0;
     for (channel = 0; channel < t->channels; channel++) {
         double total = 0;
-        t->mean[channel] = 0;
         for (y = 0; y < t->height; y++)
             for (x = 0; x < t->width; x += SAT__MAX_STRIP) {
                 int n = sat__min_int(t->width - x, SAT__MAX_STRIP);
-                const float *p = sat__prepare(t, image, y, x, n, channel, 0, &ignored);
+                const float *p = sat__prepare(t, image, y, x, n, channel, 0, SAT__CLAMP_ALL, &ignored);
                 for (i = 0; i < n; i++) total += (double)p[i];
             }
         t->mean[channel] = (float)(total / ((double)t->width * (double)t->height));
     }
+    t->options.subtract_mean = 1;
 }
 
-/* Sums the tallies in a fixed order. */
-static void sat__total(sat_table *t)
+/* Sums the tallies in a fixed order; 1 when some flat sum is not finite. */
+static int sat__total(sat_table *t)
 {
-    int channel, band;
+    int channel, band, overflow = 0;
     for (channel = 0; channel < t->channels; channel++) {
         sat__tally *total = &t->total[channel];
         memset(total, 0, sizeof *total);
@@ -2522,10 +2631,21 @@ static void sat__total(sat_table *t)
             total->sum_abs += tally->sum_abs;
             total->negative |= tally->negative;
             total->tile_squares += tally->tile_squares;
+            overflow |= tally->overflow;
             if (tally->largest > total->largest) total->largest = tally->largest;
             if (tally->tile_largest > total->tile_largest) total->tile_largest = tally->tile_largest;
         }
     }
+    return overflow;
+}
+
+static void sat__clear(sat_table *t)
+{
+    size_t border = SAT__LINE / t->element - 1;
+    memset(t->sums, 0, (t->plane * (size_t)t->channels - border) * t->element);
+    if (t->left) memset(t->left, 0, t->left_plane * (size_t)t->channels * sizeof(double));
+    if (t->above) memset(t->above, 0, t->above_plane * (size_t)t->channels * sizeof(double));
+    memset(t->mean, 0, sizeof t->mean);
 }
 
 /* Tile rows [first_band, last_band) anew, then the strips below; flat tables anew altogether. */
@@ -2536,26 +2656,29 @@ static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_b
     memset(&b, 0, sizeof b);
     b.table = t;
     b.image = image;
+    b.care = sat__first_care(t);
     b.first_band = first_band;
     b.bands = last_band - first_band;
     b.stream = t->plane * t->element > (size_t)4 << 20;
     if (t->options.kind == SAT_KIND_TILED) {
         sat__parallel_for(&t->options.threads, b.bands * t->channels, sat__build_bands, &b);
         sat__parallel_for(&t->options.threads, (t->width / SAT__ABOVE_PIECE + 1) * t->channels, sat__build_above, &b);
-    } else sat__build_flat(&b);
+        sat__total(t);
+    } else {
+        for (; b.care <= SAT__CLAMP_ALL; b.care++) {
+            sat__build_flat(&b);
+            if (!sat__total(t)) break;
+        }
+    }
 #ifdef SAT__SSE2
     _mm_sfence();
 #endif
-    sat__total(t);
-    if (t->options.non_finite != SAT_NON_FINITE_REFUSE) return SAT_OK;
+    t->refused = 0;
     for (channel = 0; channel < t->channels; channel++)
-        if (t->total[channel].nan || t->total[channel].infinite) t->build_failed = 1;
-    if (!t->build_failed) return SAT_OK;
-    for (channel = 0; channel < t->channels; channel++) memset(sat__row(t, channel, 0), 0, (t->plane - (SAT__LINE / t->element - 1)) * t->element);
-    if (t->left) memset(t->left, 0, t->left_plane * (size_t)t->channels * sizeof(double));
-    if (t->above) memset(t->above, 0, t->above_plane * (size_t)t->channels * sizeof(double));
-    memset(t->mean, 0, sizeof t->mean);
-    return SAT_ERR_NON_FINITE;
+        if (t->total[channel].nan || t->total[channel].infinite) t->refused = t->options.non_finite == SAT_NON_FINITE_REFUSE;
+    if (t->refused) sat__clear(t);
+    else if (t->options.kind == SAT_KIND_FLOAT || t->options.kind == SAT_KIND_DOUBLE) sat__tally_flat(t, image);
+    return t->refused ? SAT_ERR_NON_FINITE : SAT_OK;
 }
 
 static int sat__fits(const sat_table *t, const sat_image *image)
@@ -2568,15 +2691,10 @@ SAT_DEF sat_result sat_build(sat_table *table, const sat_image *image)
     sat_result result;
     if (!table || !sat__image_is_valid(image)) return SAT_ERR_ARGUMENT;
     if (!sat__fits(table, image)) return SAT_ERR_MISMATCH;
-    table->build_failed = 0;
-    if (table->options.subtract_mean) {
-        table->options.subtract_mean = 0;
-        sat__resolve(table, image);
-        sat__measure_means(table, image);
-        table->options.subtract_mean = 1;
-    }
     result = sat__resolve(table, image);
-    return result ? result : sat__rebuild(table, image, 0, table->tiles_y);
+    if (result) return result;
+    if (table->options.subtract_mean) sat__measure_means(table, image);
+    return sat__rebuild(table, image, 0, table->tiles_y);
 }
 
 SAT_DEF sat_result sat_update(sat_table *table, const sat_image *image, int x0, int y0, int x1, int y1)
@@ -2585,7 +2703,7 @@ SAT_DEF sat_result sat_update(sat_table *table, const sat_image *image, int x0, 
     if (!sat__fits(table, image)) return SAT_ERR_MISMATCH;
     if (x0 < 0 || y0 < 0 || x1 > table->width || y1 > table->height || x0 > x1 || y0 > y1) return SAT_ERR_ARGUMENT;
     if (x0 == x1 || y0 == y1) return SAT_OK;
-    if (table->options.kind != SAT_KIND_TILED || table->build_failed) return sat_build(table, image);
+    if (table->options.kind != SAT_KIND_TILED || table->refused) return sat_build(table, image);
     return sat__rebuild(table, image, y0 >> table->shift, ((y1 - 1) >> table->shift) + 1);
 }
 
@@ -2596,14 +2714,10 @@ SAT_DEF sat_statistics sat_get_statistics(const sat_table *table)
     memset(&s, 0, sizeof s);
     if (!table) return s;
     for (channel = 0; channel < table->channels; channel++) {
-        const sat__tally *total = &table->total[channel];
-        s.nan += total->nan;
-        s.infinite += total->infinite;
-        s.clamped += total->clamped;
-        s.mean_abs += total->sum_abs;
-        if (total->largest > s.largest) s.largest = total->largest;
+        s.nan += table->total[channel].nan;
+        s.infinite += table->total[channel].infinite;
+        s.clamped += table->total[channel].clamped;
     }
-    s.mean_abs /= (double)table->width * (double)table->height * (double)table->channels;
     s.quantum = table->quantum;
     s.bytes = table->block_bytes;
     return s;
@@ -2910,26 +3024,24 @@ static double sat__roundings(double rows, double columns) { return rows + 3 + co
 static double sat__tiles_touched(double pixels, double tile) { return floor((pixels + tile - 2) / tile) + 1; }
 
 /* Never below the error of a box sum. Every stored sum of non-negative pixels is off by at most (roundings) u times
-   itself, and a box adds four of them a tile it touches; signed pixels count with their magnitude. */
+   itself, and a box adds up to four of them a tile it touches; signed pixels count with their magnitude. */
 static double sat__sum_bound(const sat_table *t, const sat__tally *total, double box_width, double box_height)
 {
     const double u = 5.9604644775390625e-8, v = 1.1102230246251565e-16; /* 2^-24, 2^-53 */
     double width = t->width, height = t->height, tile = t->options.tile, area = box_width * box_height;
-    double all = total->sum_abs * (1 + 1e-3), strips = 16 * v * (width / tile + height / tile + 4) * all;
-    double lowered = t->options.subtract_mean ? u * area * total->largest : 0; /* pixel - mean is rounded once */
-    double touched, largest;
+    double all = total->sum_abs * 1.001, lowered = t->options.subtract_mean ? u * area * total->largest : 0;
+    double doubles = 16 * v * (width / tile + height / tile + 4) * all, touched, largest;
     switch (t->options.kind) {
-    case SAT_KIND_FLOAT: return 4 * u * 1.01 * sat__roundings(height, width) * all + lowered + strips;
-    case SAT_KIND_DOUBLE: return 4 * v * sat__roundings(height, width) * all + lowered + strips;
+    case SAT_KIND_FLOAT: return 4 * u * 1.01 * sat__roundings(height, width) * all + lowered + doubles;
+    case SAT_KIND_DOUBLE: return 4 * v * sat__roundings(height, width) * all + lowered + doubles;
     case SAT_KIND_FIXED32:
-    case SAT_KIND_FIXED64: return 0.5 * t->quantum * area + v * all;
+    case SAT_KIND_FIXED64: return area * (0.5 * t->quantum + v * t->limit);
     case SAT_KIND_TILED: break;
     }
     touched = sat__tiles_touched(box_width, tile) * sat__tiles_touched(box_height, tile);
     largest = total->negative ? tile * tile * total->largest : total->tile_largest * 1.001;
-    if (largest > all) largest = all;
-    largest = 4 * touched * largest < 4 * all * 4 ? 4 * touched * largest : 16 * all;
-    return u * 1.01 * sat__roundings(tile, tile) * largest + strips;
+    if (touched * largest > 4 * all) largest = 4 * all / touched; /* a tile counts once for each of its four corners */
+    return 4 * u * 1.01 * sat__roundings(tile, tile) * touched * largest + doubles;
 }
 
 SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_width, int box_height)
@@ -2976,9 +3088,10 @@ static void sat__survey(sat_table *t, const sat_image *image, double *tile_sums)
         for (y = 0; y < t->height; y++)
             for (x = 0; x < t->width; x += tile) {
                 int n = sat__min_int(tile, t->width - x);
-                const float *p = sat__prepare(t, image, y, x, n, channel, 0, total);
+                const float *p = sat__prepare(t, image, y, x, n, channel, 0, SAT__CLAMP_ALL, total);
                 double *sum = &tile_sums[x / tile];
                 if (y % tile == 0) *sum = 0;
+                sat__measure(p, n, total);
                 for (i = 0; i < n; i++) *sum += fabs((double)p[i]);
                 if (*sum > total->tile_largest) total->tile_largest = *sum;
             }
@@ -3090,17 +3203,20 @@ static void sat__stream_take(sat_stream *s, const sat_image *row)
     sat_table *t = s->table;
     uint64_t corner_row = s->taken + 1;
     int channel, x, slot = sat__ring_row(s, corner_row), tile = t->options.tile;
+    int care = sat__first_care(t) == SAT__TRUST ? SAT__REPLACE_NON_FINITE : SAT__CLAMP_ALL; /* no row can be built again */
     for (channel = 0; channel < t->channels; channel++) {
         unsigned char *sums = sat__row(t, channel, slot);
         unsigned char *columns = t->columns + (size_t)channel * t->columns_stride;
         memset(sums, 0, t->element);
         if (t->options.kind != SAT_KIND_TILED) {
+            sat__carry carry;
+            memset(&carry, 0, sizeof carry);
             for (x = 0; x < t->width; x += SAT__STRIP)
-                sat__flat_piece(t, row, channel, 0, x, sat__min_int(SAT__STRIP, t->width - x), sums, columns, 0, &t->total[channel], 0);
+                sat__flat_piece(t, row, channel, 0, x, sat__min_int(SAT__STRIP, t->width - x), sums, &carry, 0, care, &t->total[channel], 0);
             continue;
         }
         if (s->taken % (uint64_t)tile == 0) memset(columns, 0, t->columns_stride);
-        sat__tiled_row(t, row, channel, 0, (float *)(void *)sums, sat__left(t, channel, slot), (float *)(void *)columns, 0, &t->total[channel], 0);
+        sat__tiled_row(t, row, channel, 0, (float *)(void *)sums, sat__left(t, channel, slot), (float *)(void *)columns, 0, care, &t->total[channel], 0);
         if (corner_row % (uint64_t)tile == 0)
             sat__add_above(t, sat__above(t, channel, sat__ring_strip(s, corner_row + 1)), sat__above(t, channel, sat__ring_strip(s, corner_row)),
                            (float *)(void *)sums, sat__left(t, channel, slot), 0, t->width + 1);
