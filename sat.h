@@ -2306,10 +2306,16 @@ static void sat__quantise(const sat_table *t, uint64_t *out, const float *in, in
     const double magic = 6755399441055744.0, inverse = t->quantum > 0 ? 1 / t->quantum : 1;
     uint64_t magic_bits, bits;
     uint32_t *out32 = (uint32_t *)(void *)out;
-    int wide = t->options.kind == SAT_KIND_FIXED64, i = 0;
+    int wide = t->options.kind == SAT_KIND_FIXED64, i = 0, exponent;
     double shifted;
+    (void)exponent;
     memcpy(&magic_bits, &magic, sizeof magic);
 #ifdef SAT__SSE2
+    if (!wide && frexp(inverse, &exponent) == 0.5 && exponent > -100 && exponent < 100) { /* the product is exact in float, too */
+        __m128 scale = _mm_set1_ps((float)inverse);
+        for (; i + 4 <= n; i += 4)
+            _mm_storeu_si128((__m128i *)(void *)(out32 + i), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(in + i), scale)));
+    }
     for (; i + 4 <= n; i += 4) {
         __m128 v = _mm_loadu_ps(in + i);
         __m128d scale = _mm_set1_pd(inverse), shift = _mm_set1_pd(magic);
@@ -2494,20 +2500,19 @@ static void sat__build_diagonal(int begin, int end, int worker, void *context)
     }
 }
 
-/* Flat tables. One worker goes down strips whose column sums stay in the first-level cache. Several take the blocks of
-   one anti-diagonal after the other, each of which needs only blocks of the diagonal before. Same additions, same bits. */
+/* Flat tables. One worker goes down the rows. Several take the blocks of one anti-diagonal after the other, each of which
+   needs only blocks of the diagonal before. Same additions, same bits. */
 static void sat__build_flat(sat__build *b)
 {
     const sat_table *t = b->table;
-    int strip, group = sat__max_int(1, (int)(16384 / t->element / SAT__STRIP)), blocks;
+    int blocks;
     memset(t->columns, 0, t->columns_stride * (size_t)t->channels);
     memset(t->tallies, 0, sizeof *t->tallies * (size_t)t->bands * (size_t)t->channels);
     b->block_rows = 64;
     blocks = (t->height - 1) / b->block_rows + 1;
     for (b->channel = 0; b->channel < t->channels; b->channel++) {
         if (sat__worker_count(&t->options.threads) == 1) {
-            for (strip = 0; strip < t->bands; strip += group)
-                sat__flat_block(b, strip, sat__min_int(strip + group, t->bands), 0, t->height, 0);
+            sat__flat_block(b, 0, t->bands, 0, t->height, 0);
             continue;
         }
         for (b->diagonal = 0; b->diagonal < t->bands + blocks - 1; b->diagonal++) {
