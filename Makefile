@@ -4,7 +4,7 @@
 
 all: examples
 .PHONY: all examples demo test bench report size check check-strict check-variants check-asan check-tsan \
-        check-analyze check-compilers fuzz data install dist web gpu-bench deps help clean run-tests run-demo
+        check-analyze check-compilers fuzz data install dist gpu-bench deps help clean run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
@@ -30,31 +30,31 @@ B       ?= build
 DEFS    := -D_POSIX_C_SOURCE=200809L -I. -Itests -Iexamples
 LDLIBS  := -lm -lpthread -ldl
 
-# Optional packages; each gives flags only where its header is found.
+# Optional packages; each gives flags only where pkg-config or its header is found.
 PKG     := $(shell command -v pkg-config)
-has      = $(shell printf '\#include <$(1)>\n' | $(CC) $(2) -E -x c - >/dev/null 2>&1 && echo 1)
 pkg      = $(if $(PKG),$(shell $(PKG) $(1) 2>/dev/null))
-EXR_INC := $(patsubst -I%,-isystem %,$(filter-out -I/usr/include,$(filter -I%,$(call pkg,--cflags OpenEXR))))
-ifeq ($(call has,openexr.h,$(EXR_INC)),1)
-EXR     := -DHAVE_OPENEXR $(EXR_INC)
+found    = $(call pkg,--exists $(1) && echo 1)
+system   = $(patsubst -I%,-isystem %,$(filter-out -I/usr/include,$(filter -I%,$(call pkg,--cflags $(1)))))
+ifneq ($(call found,OpenEXR),)
+EXR     := -DHAVE_OPENEXR $(call system,OpenEXR)
 EXR_LIB := $(foreach l,$(call pkg,--libs OpenEXR),$(if $(findstring OpenEXRCore,$l),$l))
 endif
-ifeq ($(call has,stb/stb_image.h),1)
+ifneq ($(call found,stb),)
 STB     := -DHAVE_STB
 STB_LIB := $(call pkg,--libs stb)
 endif
 ifeq ($(shell echo 'int main(void){return 0;}' | $(CC) -fopenmp -x c - -o /dev/null >/dev/null 2>&1 && echo 1),1)
 OPENMP  := -fopenmp
 endif
-ifneq ($(call pkg,--exists glfw3 && echo 1),)
+ifneq ($(call found,glfw3),)
 GLFW    := $(call pkg,--cflags glfw3)
 GLFW_LIB:= $(call pkg,--libs glfw3)
 endif
-ifneq ($(call pkg,--exists opencv4 && echo 1),)
-OPENCV  := -DHAVE_OPENCV $(patsubst -I%,-isystem %,$(call pkg,--cflags opencv4))
+ifneq ($(call found,opencv4),)
+OPENCV  := -DHAVE_OPENCV $(call system,opencv4)
 OPENCV_LIB := -lopencv_photo -lopencv_imgproc -lopencv_core
 endif
-ifeq ($(call has,embree3/rtcore.h),1)
+ifeq ($(shell printf '\#include <embree3/rtcore.h>\n' | $(CC) -E -x c - >/dev/null 2>&1 && echo 1),1)
 EMBREE  := -DHAVE_EMBREE
 EMBREE_LIB := -lembree3
 endif
@@ -179,12 +179,22 @@ out/bench/%.tsv: build/bench/bench_% FORCE
 .PHONY: FORCE
 FORCE:
 
+# the same tables on the machine's GPU, through EGL
+GPU_BENCHES := $(patsubst tests/bench/gpu_%.c,%,$(wildcard $(if $(LIB),tests/bench/gpu_$(LIB).c,tests/bench/gpu_*.c)))
+build/bench/gpu_%: tests/bench/gpu_%.c
+	@mkdir -p $(@D)
+	$(COMPILE_C) -Itests/bench $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
+gpu-bench: $(GPU_BENCHES:%=out/bench/gpu_%.tsv)
+out/bench/gpu_%.tsv: build/bench/gpu_% FORCE
+	@mkdir -p $(@D)
+	@LIGHTSCAN_GL=$${LIGHTSCAN_GL:-egl} QUICK='$(QUICK)' $< $(ARGS) >$@.part && mv $@.part $@ && cat $@
+
 report:
 	@sh tests/deps.sh gnuplot-nox
 	@$(MAKE) --no-print-directory bench QUICK='$(QUICK)' >/dev/null
 	@mkdir -p out/bench report
 	@$(MAKE) --no-print-directory -s size >out/bench/size.tsv
-	@bash tests/report.sh $(patsubst %,out/bench/%.tsv,$(filter $(BENCHES),$(PICK)) $(filter-out $(PICK),$(BENCHES))) out/bench/size.tsv >report/index.html.part
+	@bash tests/report.sh $(patsubst %,out/bench/%.tsv,$(filter $(BENCHES),$(PICK)) $(filter-out $(PICK),$(BENCHES))) $(wildcard out/bench/gpu_*.tsv) out/bench/size.tsv >report/index.html.part
 	@mv report/index.html.part report/index.html
 	@echo report/index.html
 
@@ -203,10 +213,21 @@ help:
 	@echo 'make fuzz             libFuzzer on each header          [FUZZ_SECONDS=20]'
 	@echo 'make check            all of check-*; each takes LIB=sat'
 	@echo 'make deps      install missing packages (Debian)'
+	@echo 'make gpu-bench the OpenGL tables on the GPU (EGL), out/bench/gpu_*.tsv'
 	@echo 'make report    all tables and plots in report/index.html  [QUICK=1]'
 	@echo 'make data      fetch free environment maps and meshes into data/'
+	@echo 'make dist      one-file editions in dist/: each header with what it needs of sat.h inside'
 	@echo 'make install   headers and lightscan.pc                   [PREFIX=/usr/local] [DESTDIR=]'
 	@echo 'make clean     remove build/, out/, dist/ and report/'
+
+# one-file editions: each header with what it needs of sat.h inside
+dist: $(patsubst %,dist/%,$(wildcard $(FAMILY:=.h)))
+dist/sat.h: sat.h
+	@mkdir -p dist
+	cp $< $@
+dist/%.h: %.h sat.h tests/make_dist.awk
+	@mkdir -p dist
+	awk -f tests/make_dist.awk sat.h $< >$@
 
 # inputs for examples, into data/
 data:

@@ -196,11 +196,49 @@ check_family() {
 
 # ---- one-file editions -----------------------------------------------------------------------------------------
 
+# Each edition alone with strict warnings; all of them in one file; each implemented in a file of its own, linked into
+# one program whose main sees the interfaces only.
 check_dist() {
+    local a LIB GL text libs=() objects=() inc=build/check/strict/dist/include
     dir=build/check/strict/dist
-    rm -rf "$dir"; mkdir -p "$dir"
-    [ -f tests/make_dist.sh ] || { skip "there are no one-file editions yet"; finish; }
-    skip "not yet"
+    rm -rf "$dir"; mkdir -p "$inc"
+    for a in $family; do
+        [ -f "$a.h" ] && [ "$a" != sat ] || continue
+        libs+=("$a")
+        if text=$(awk -f tests/make_dist.awk sat.h "$a.h" 2>&1 >"$inc/$a.h"); then pass; else fail "$a: edition" "$text"; fi
+    done
+    for a in "${libs[@]}"; do
+        LIB=${a^^} GL=-D${a^^}_GL
+        # the interface first, as from a user's own header, then the implementation
+        printf '#include "%s.h"\n#define %s_IMPLEMENTATION\n#include "%s.h"\n' "$a" "$LIB" "$a" >"$dir/$a.c"
+        cp "$dir/$a.c" "$dir/$a.cpp"
+        printf '#include "%s.h"\n' "$a" >"$dir/api.c"
+        ok "$a: interface" ${CC:-cc} -std=c99 -O1 $WARN_C -I"$inc" $GL -c "$dir/api.c" -o "$dir/api.o"
+        empty "$a: the interface compiles to code" "$(nm "$dir/api.o" | awk '$2 ~ /^[tTdDbB]$/ { print $3 }')"
+        ok "$a: edition, plain" ${CC:-cc} -std=c99 -O1 $WARN_C -I"$inc" -c "$dir/$a.c" -o "$dir/$a.o"
+        ok "$a: edition" ${CC:-cc} -std=c99 -O1 $WARN_C -I"$inc" $GL -c "$dir/$a.c" -o "$dir/$a.o"
+        empty "$a: external symbols without the prefix" "$(nm -g --defined-only "$dir/$a.o" | awk -v p="^${a}_" '$3 !~ p { print $3 }')"
+        objects+=("$dir/$a.o")
+        ! have clang || ok "$a: edition, clang" clang -std=c99 -fsyntax-only $WARN_C -I"$inc" $GL "$dir/$a.c"
+        ! have "${CXX:-c++}" || ok "$a: edition, C++" ${CXX:-c++} -std=c++11 -fsyntax-only $WARN -I"$inc" $GL "$dir/$a.cpp"
+        if [ -f "tests/use_$a.c" ]; then
+            grep -vE '^ *# *(define *[A-Z_]*_IMPLEMENTATION|include *"sat.h")' "tests/use_$a.c" >"$dir/use.c"
+            ok "$a: program" ${CC:-cc} -std=c99 -O1 $WARN_C -I"$inc" -D${LIB}_IMPLEMENTATION= "$dir/use.c" -o "$dir/use" $LIBS
+            ok "$a: program runs" "./$dir/use"
+        fi
+    done
+    [ "${#libs[@]}" -gt 0 ] || { skip "no header besides sat.h"; finish; }
+    printf '#include "%s.h"\n' "${libs[@]}" >"$dir/main.c"
+    { printf 'int main(void) { return 0'; printf ' + !%s_version()' "${libs[@]}"; echo '; }'; } >>"$dir/main.c"
+    cp "$dir/main.c" "$dir/main.cpp"
+    ok "editions in files of one program" ${CC:-cc} -std=c99 $WARN_C -I"$inc" "$dir/main.c" "${objects[@]}" -o "$dir/many" $LIBS
+    ok "editions in files of one program, run" "./$dir/many"
+    ok "editions in one file" ${CC:-cc} -std=c99 $WARN_C -I"$inc" -DLIGHTSCAN_IMPLEMENTATION $(gl_macros "${libs[@]}") "$dir/main.c" -o "$dir/one" $LIBS
+    ok "editions in one file, run" "./$dir/one"
+    if have "${CXX:-c++}"; then
+        ok "editions in one C++ file" ${CXX:-c++} -std=c++11 $WARN -I"$inc" -DLIGHTSCAN_IMPLEMENTATION "$dir/main.cpp" -o "$dir/one" $LIBS
+        ok "editions in one C++ file, run" "./$dir/one"
+    fi
     finish
 }
 
