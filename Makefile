@@ -122,7 +122,7 @@ check: check-strict check-variants check-asan check-tsan check-analyze check-com
 
 # warnings in all languages and compilers, linkage, names, macros, options, order of inclusion
 check-strict:
-	@RUNNER='bash tests/check_strict.sh' tests/run.sh $(LIBS) $(if $(LIB),,family dist)
+	@RUNNER='bash tests/check_strict.sh' tests/run.sh $(LIBS) $(if $(LIB),,family dist examples)
 
 # the same tests compiled otherwise
 again = $(MAKE) --no-print-directory run-tests TESTS_CXX= B=build/$(1) OPT='$(or $(3),-O2)' CFLAGS='$(2)'

@@ -1,5 +1,7 @@
 #!/bin/bash
-# The compile-time promises of one header, or of all together. usage: tests/check_strict.sh NAME   (sat, ..., family)
+# The compile-time promises of one header, or of all together.
+# usage: tests/check_strict.sh NAME
+# NAME: sat, tonemap, ...; or family (all headers together), dist (one-file editions), examples
 #
 # tests/use_<lib>.c is a whole program that calls functions of the header and returns 0; lines of it that define
 # *_IMPLEMENTATION are taken out here, because who implements what is the subject of these checks.
@@ -242,8 +244,31 @@ check_dist() {
     finish
 }
 
+# ---- examples --------------------------------------------------------------------------------------------------
+
+# Each is one file that compiles without any package, answers --help, and refuses what it does not know with a sentence.
+check_examples() {
+    local source name program text
+    dir=build/check/strict/examples
+    rm -rf "$dir"; mkdir -p "$dir"
+    for source in examples/*.c; do
+        [ -f "$source" ] && [[ $source != *_view.c ]] || continue
+        name=$(basename "$source" .c) program=$dir/$(basename "$source" .c)
+        ok "$source compiles alone" ${CC:-cc} -std=c99 -O1 -D_POSIX_C_SOURCE=200809L $WARN_C "$source" -o "$program" $LIBS -lpthread -ldl
+        [ -x "$program" ] || continue
+        if text=$("./$program" --help 2>&1) && grep -q 'usage: ' <<<"$text"; then pass; else fail "$name --help" "$text"; fi
+        if text=$("./$program" --no-such-option 2>&1) || [ -z "$text" ]; then fail "$name takes --no-such-option" "$text"; else pass; fi
+        if text=$(timeout 60 "./$program" no/such/file.exr "$dir/$name.png" 2>&1) || [ -z "$text" ]; then
+            fail "$name takes a file that does not exist" "$text"
+        else pass; fi
+    done
+    [ $((passed + failed)) -gt 0 ] || skip "there are no examples"
+    finish
+}
+
 case $lib in
     family) check_family ;;
     dist) check_dist ;;
+    examples) check_examples ;;
     *) check_one ;;
 esac
