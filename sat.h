@@ -50,6 +50,7 @@ extern "C" {
     X(SAT_ERR_LIMIT, "no choice within the stated limits meets the request")                       \
     X(SAT_ERR_DATA, "the saved data is truncated, corrupted or of another version")                \
     X(SAT_ERR_VERSION, "the program was linked with another version of the header")                \
+    X(SAT_ERR_CANCELLED, "the progress callback asked to stop")                                    \
     X(SAT_ERR_GL_FUNCTION, "the OpenGL context lacks a function; the message names it")            \
     X(SAT_ERR_GL_SHADER, "a shader failed to compile or link; the message holds the log")          \
     X(SAT_ERR_GL_STATE, "OpenGL refused a texture, framebuffer or buffer; the message names it")
@@ -251,7 +252,82 @@ extern const int sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file;
 }
 #endif
 #endif /* SAT_H */
-/* @GL API@ */
+
+/* ------------------------------------------------------------------------------------------------
+   OpenGL: tables on the GPU, for GL 3.3 core and ES 3.0 / WebGL 2 (define SAT_GL)
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(SAT_GL) && !defined(SAT__GL_API)
+#define SAT__GL_API
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* How the table texture stores sums. */
+typedef enum sat_gl_format {
+    SAT_GL_TWO_FLOAT, /* RG32F: the sum of two floats, about 48 bits; for HDR */
+    SAT_GL_FLOAT,     /* R32F: as SAT_KIND_FLOAT, only for large boxes or small images */
+    SAT_GL_FIXED32    /* R32UI: the same integers as SAT_KIND_FIXED32, for any algorithm and k */
+} sat_gl_format;
+
+typedef struct sat_gl_options {
+    sat_gl_format format;         /* SAT_GL_TWO_FLOAT */
+    sat_scan_algorithm algorithm; /* SAT_SCAN_BALANCED_TREE; or RECURSIVE_DOUBLING: half the passes, log_k n times the
+                                     pixels, ahead for small tables only */
+    int k;                        /* 4; 2..64: texels read for one written */
+    int compute;                  /* 0; 1: the tree's second half by compute shaders where there is GL 4.3: one
+                                     invocation writes k texels, so that k = 32 or 64 is best */
+    int channel;                  /* 0; 0..3: the channel of the input texture */
+    int unsigned_input;           /* 0; 1 (FIXED32): the input is an unsigned integer texture and is summed as it is */
+    double quantum;               /* 0: the finest that max_value and max_box_area allow; else a power of two. FIXED32 only */
+    double max_value;             /* 1e30; > 0: pixels beyond +-max_value are clamped to it; NaN counts as 0. Lower it
+                                     for FIXED32: the quantum is proportional to it */
+    double max_box_area;          /* 0: the whole table; FIXED32: no larger box is ever asked for */
+    sat_allocator allocator;      /* malloc; used by create and destroy only */
+} sat_gl_options;
+SAT_DEF sat_gl_options sat_gl_defaults(void);
+
+/* Belongs to the context that is current in create: it must be current in every call. Textures are made by the
+   first build of a size. Every call leaves the OpenGL state as it was (but for pending errors, which are lost). */
+typedef struct sat_gl sat_gl;
+
+/* On an OpenGL error *out only answers sat_gl_message, and is to be destroyed; on the others it is NULL. */
+SAT_DEF sat_result sat_gl_create(sat_gl **out, sat_gl_get_proc *get_proc, const sat_gl_options *options);
+SAT_DEF void sat_gl_destroy(sat_gl *gl); /* NULL is fine */
+/* What the last SAT_ERR_GL_... was about; never NULL. */
+SAT_DEF const char *sat_gl_message(const sat_gl *gl);
+
+/* Inclusive sums of the first width x height texels of a 2D texture, level 0: texel (x, y) of the table is the sum over
+   [0,x] x [0,y]. `table` is a texture of the caller in the format above and at least of that size, or 0 for the
+   object's own, sat_gl_table(). The input is only read. Does not wait for the GPU. */
+SAT_DEF sat_result sat_gl_build(sat_gl *gl, unsigned table, unsigned texture, int width, int height);
+/* The same for each row alone: texel (x, y) is the sum over [0,x] of row y. */
+SAT_DEF sat_result sat_gl_scan(sat_gl *gl, unsigned table, unsigned texture, int width, int height);
+/* The texture that the last build or scan with table 0 wrote; another one when the size changes. 0 before. */
+SAT_DEF unsigned sat_gl_table(const sat_gl *gl);
+/* FIXED32: the value of 1 in the table, which the lookups ask for; 0 for the other formats. */
+SAT_DEF double sat_gl_quantum(const sat_gl *gl);
+
+/* The mean, after NaN and infinities were replaced, by a tree of two-float sums that takes k x k texels a step. It stays in
+   the texel of sat_gl_mean_texture (RG32F: the mean is x + y); with mean != NULL it comes back, which waits for the GPU. */
+SAT_DEF sat_result sat_gl_mean(sat_gl *gl, float *mean, unsigned texture, int width, int height);
+SAT_DEF unsigned sat_gl_mean_texture(const sat_gl *gl);
+
+/* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader; boxes are half-open and clipped, as in C:
+
+       float sat_sum(sampler2D table, ivec2 low, ivec2 high)               4 fetches
+       float sat_mean(sampler2D table, ivec2 low, ivec2 high)              by the clipped area; empty: 0
+       float sat_sum_fractional(sampler2D table, vec2 low, vec2 high)      16 fetches; texel i covers [i, i+1)
+
+   and the same for SAT_GL_FIXED32 with (usampler2D table, float quantum, ...). Tables are fetched, never filtered:
+   a GPU's GL_LINEAR has weights of 8 bits. */
+SAT_DEF const char *sat_gl_glsl(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SAT__GL_API */
 /* ------------------------------------------------------------------------------------------------
    Stop here if you only want to use the library.
    ------------------------------------------------------------------------------------------------ */
@@ -691,7 +767,7 @@ enum {
     SAT__GL_R8 = 0x8229, SAT__GL_RG8 = 0x822B, SAT__GL_RGBA8 = 0x8058, SAT__GL_SRGB8_ALPHA8 = 0x8C43,
     SAT__GL_R8UI = 0x8232, SAT__GL_R16F = 0x822D, SAT__GL_RG16F = 0x822F, SAT__GL_RGBA16F = 0x881A,
     SAT__GL_R32F = 0x822E, SAT__GL_RG32F = 0x8230, SAT__GL_RGB32F = 0x8815, SAT__GL_RGBA32F = 0x8814,
-    SAT__GL_R32I = 0x8235, SAT__GL_R32UI = 0x8236, SAT__GL_RG32UI = 0x823C, SAT__GL_RGBA32UI = 0x8D70,
+    SAT__GL_R32I = 0x8235, SAT__GL_RGBA32I = 0x8D82, SAT__GL_R32UI = 0x8236, SAT__GL_RG32UI = 0x823C, SAT__GL_RGBA32UI = 0x8D70,
     SAT__GL_R16UI = 0x8234, SAT__GL_DEPTH_COMPONENT24 = 0x81A6, SAT__GL_DEPTH_COMPONENT32F = 0x8CAC,
     SAT__GL_RENDERER = 0x1F01, SAT__GL_VERSION = 0x1F02, SAT__GL_FRAGMENT_SHADER = 0x8B30, SAT__GL_VERTEX_SHADER = 0x8B31,
     SAT__GL_COMPUTE_SHADER = 0x91B9, SAT__GL_COMPILE_STATUS = 0x8B81, SAT__GL_LINK_STATUS = 0x8B82,
@@ -1076,6 +1152,7 @@ static inline int sat__gl_transfer(unsigned internal, unsigned *format, unsigned
         {SAT__GL_RGB32F, SAT__GL_RGB, SAT__GL_FLOAT, 12}, /* not a render target everywhere */
         {SAT__GL_RGBA32F, SAT__GL_RGBA, SAT__GL_FLOAT, 16},
         {SAT__GL_R32I, SAT__GL_RED_INTEGER, SAT__GL_INT, 4},
+        {SAT__GL_RGBA32I, SAT__GL_RGBA_INTEGER, SAT__GL_INT, 16},
         {SAT__GL_R32UI, SAT__GL_RED_INTEGER, SAT__GL_UNSIGNED_INT, 4},
         {SAT__GL_RG32UI, SAT__GL_RG_INTEGER, SAT__GL_UNSIGNED_INT, 8},
         {SAT__GL_RGBA32UI, SAT__GL_RGBA_INTEGER, SAT__GL_UNSIGNED_INT, 16},
@@ -2311,7 +2388,7 @@ static void sat__quantise(const sat_table *t, uint64_t *out, const float *in, in
     (void)exponent;
     memcpy(&magic_bits, &magic, sizeof magic);
 #ifdef SAT__SSE2
-    if (!wide && frexp(inverse, &exponent) == 0.5 && exponent > -100 && exponent < 100) { /* the product is exact in float, too */
+    if (!wide && frexp(inverse, &exponent) <= 0.5 && exponent > -100 && exponent < 100) { /* the product is exact in float, too */
         __m128 scale = _mm_set1_ps((float)inverse);
         for (; i + 4 <= n; i += 4)
             _mm_storeu_si128((__m128i *)(void *)(out32 + i), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(in + i), scale)));
@@ -3277,4 +3354,740 @@ SAT_DEF sat_result sat_stream_push(sat_stream *stream, float *out_row, int *rows
 #endif
 #endif /* SAT_IMPLEMENTATION */
 
-/* @GL IMPLEMENTATION@ */
+/* ------------------------------------------------------------------------------------------------
+   Implementation: OpenGL
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(SAT_IMPLEMENTATION) && defined(SAT_GL) && !defined(SAT__GL_IMPLEMENTED)
+#define SAT__GL_IMPLEMENTED
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- shaders */
+
+/* Two-float sums: with the larger term first, the rounding error of a sum is exact (Dekker 1971). A compiler that takes
+   sums for associative would lose it, and GLSL 3.30 has no `precise`: so every rounded sum is multiplied by a 1 that the
+   compiler cannot see. An R32F table reads as two-floats with a low part of zero. Lookups follow Slomp 2012, eq 4.2 to
+   4.4: zero left and above, clamped right and below; they take differences of neighbours first. A fractional box is nine
+   boxes: the cells that its border cuts, weighted, and what lies between them. */
+SAT_DEF const char *sat_gl_glsl(void)
+{
+    return
+        "#ifdef GL_ES\n"
+        "precision highp float;\n"
+        "precision highp int;\n"
+        "precision highp sampler2D;\n"
+        "precision highp usampler2D;\n"
+        "#endif\n"
+        "vec2 sat_add(vec2 a, vec2 b, float one) {\n"
+        "    bool swap = abs(a.x) < abs(b.x);\n"
+        "    float big = swap ? b.x : a.x, small = swap ? a.x : b.x;\n"
+        "    float sum = (big + small) * one;\n"
+        "    float low = (small - (sum - big)) + (a.y + b.y);\n"
+        "    float high = (sum + low) * one;\n"
+        "    return vec2(high, low - (high - sum));\n"
+        "}\n"
+        "vec2 sat_corner(sampler2D table, int x, int y) {\n"
+        "    return x < 1 || y < 1 ? vec2(0.0) : texelFetch(table, ivec2(x, y) - 1, 0).xy;\n"
+        "}\n"
+        "uint sat_corner(usampler2D table, int x, int y) {\n"
+        "    return x < 1 || y < 1 ? 0u : texelFetch(table, ivec2(x, y) - 1, 0).x;\n"
+        "}\n"
+        "float sat_sum(sampler2D table, ivec2 low, ivec2 high) {\n"
+        "    ivec2 size = textureSize(table, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size);\n"
+        "    float one = size.x > 0 ? 1.0 : 0.0;\n"
+        "    if (any(lessThanEqual(b, a))) return 0.0;\n"
+        "    vec2 right = sat_add(sat_corner(table, b.x, b.y), -sat_corner(table, b.x, a.y), one);\n"
+        "    vec2 left = sat_add(sat_corner(table, a.x, b.y), -sat_corner(table, a.x, a.y), one);\n"
+        "    right = sat_add(right, -left, one);\n"
+        "    return right.x + right.y;\n"
+        "}\n"
+        "float sat_sum(usampler2D table, float quantum, ivec2 low, ivec2 high) {\n"
+        "    ivec2 size = textureSize(table, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size);\n"
+        "    if (any(lessThanEqual(b, a))) return 0.0;\n"
+        "    return quantum * float(int(sat_corner(table, b.x, b.y) - sat_corner(table, b.x, a.y) -\n"
+        "                               sat_corner(table, a.x, b.y) + sat_corner(table, a.x, a.y)));\n"
+        "}\n"
+        "float sat_area(ivec2 size, ivec2 low, ivec2 high) {\n"
+        "    ivec2 side = clamp(high, ivec2(0), size) - clamp(low, ivec2(0), size);\n"
+        "    return side.x > 0 && side.y > 0 ? float(side.x) * float(side.y) : 1.0;\n"
+        "}\n"
+        "float sat_mean(sampler2D table, ivec2 low, ivec2 high) {\n"
+        "    return sat_sum(table, low, high) / sat_area(textureSize(table, 0), low, high);\n"
+        "}\n"
+        "float sat_mean(usampler2D table, float quantum, ivec2 low, ivec2 high) {\n"
+        "    return sat_sum(table, quantum, low, high) / sat_area(textureSize(table, 0), low, high);\n"
+        "}\n"
+        "float sat_sum_fractional(sampler2D table, vec2 low, vec2 high) {\n"
+        "    ivec2 size = textureSize(table, 0);\n"
+        "    vec2 a = clamp(low, vec2(0.0), vec2(size)), b = clamp(high, vec2(0.0), vec2(size));\n"
+        "    float one = size.x > 0 ? 1.0 : 0.0, sum = 0.0;\n"
+        "    if (!all(lessThan(a, b))) return 0.0;\n"
+        "    ivec4 x = min(ivec4(int(a.x), int(a.x) + 1, int(b.x), int(b.x) + 1), size.x);\n"
+        "    ivec4 y = min(ivec4(int(a.y), int(a.y) + 1, int(b.y), int(b.y) + 1), size.y);\n"
+        "    vec3 u = vec3(1.0 - fract(a.x), 1.0, fract(b.x)), v = vec3(1.0 - fract(a.y), 1.0, fract(b.y));\n"
+        "    for (int i = 0; i < 3; i++) {\n"
+        "        vec2 left = sat_add(sat_corner(table, x[0], y[i + 1]), -sat_corner(table, x[0], y[i]), one);\n"
+        "        for (int j = 0; j < 3; j++) {\n"
+        "            vec2 right = sat_add(sat_corner(table, x[j + 1], y[i + 1]), -sat_corner(table, x[j + 1], y[i]), one);\n"
+        "            vec2 box = sat_add(right, -left, one);\n"
+        "            sum += v[i] * u[j] * (box.x + box.y);\n"
+        "            left = right;\n"
+        "        }\n"
+        "    }\n"
+        "    return sum;\n"
+        "}\n"
+        "float sat_sum_fractional(usampler2D table, float quantum, vec2 low, vec2 high) {\n"
+        "    ivec2 size = textureSize(table, 0);\n"
+        "    vec2 a = clamp(low, vec2(0.0), vec2(size)), b = clamp(high, vec2(0.0), vec2(size));\n"
+        "    float sum = 0.0;\n"
+        "    if (!all(lessThan(a, b))) return 0.0;\n"
+        "    ivec4 x = min(ivec4(int(a.x), int(a.x) + 1, int(b.x), int(b.x) + 1), size.x);\n"
+        "    ivec4 y = min(ivec4(int(a.y), int(a.y) + 1, int(b.y), int(b.y) + 1), size.y);\n"
+        "    vec3 u = vec3(1.0 - fract(a.x), 1.0, fract(b.x)), v = vec3(1.0 - fract(a.y), 1.0, fract(b.y));\n"
+        "    for (int i = 0; i < 3; i++) {\n"
+        "        uint left = sat_corner(table, x[0], y[i + 1]) - sat_corner(table, x[0], y[i]);\n"
+        "        for (int j = 0; j < 3; j++) {\n"
+        "            uint right = sat_corner(table, x[j + 1], y[i + 1]) - sat_corner(table, x[j + 1], y[i]);\n"
+        "            sum += v[i] * u[j] * float(int(right - left));\n"
+        "            left = right;\n"
+        "        }\n"
+        "    }\n"
+        "    return quantum * sum;\n"
+        "}\n";
+}
+
+/* What the passes share. INPUT: 0 reads sums, 1 the caller's float texture, 2 the caller's unsigned one. The bits are
+   asked for NaN, because compilers may assume that there is none. Rounding to nearest, ties to even, as the CPU does. */
+static const char sat__glsl_values[] =
+    "#if FORMAT == 0\n"
+    "#define VALUE vec2\n"
+    "#define ADD(a, b) sat_add(a, b, one)\n"
+    "#define FETCH(t, p) texelFetch(t, p, 0).xy\n"
+    "#define STORED(v) vec4(v, 0.0, 0.0)\n"
+    "#else\n"
+    "#define ADD(a, b) ((a) + (b))\n"
+    "#define FETCH(t, p) texelFetch(t, p, 0).x\n"
+    "#if FORMAT == 1\n"
+    "#define VALUE float\n"
+    "#define STORED(v) vec4(v, 0.0, 0.0, 0.0)\n"
+    "#else\n"
+    "#define VALUE uint\n"
+    "#define STORED(v) uvec4(v, 0u, 0u, 0u)\n"
+    "#endif\n"
+    "#endif\n"
+    "#if FORMAT == 2\n"
+    "#define SUMS usampler2D\n"
+    "#else\n"
+    "#define SUMS sampler2D\n"
+    "#endif\n"
+    "#if INPUT == 1\n"
+    "uniform sampler2D source;\n"
+    "#elif INPUT == 2\n"
+    "uniform usampler2D source;\n"
+    "#else\n"
+    "uniform SUMS source;\n"
+    "#endif\n"
+    "uniform float limit, scale;\n"
+    "uniform ivec2 axis;\n"
+    "uniform int size;\n"
+    "float one;\n"
+    "#if INPUT == 1\n"
+    "VALUE load(ivec2 p) {\n"
+    "    float v = texelFetch(source, p, 0)[CHANNEL];\n"
+    "    v = (floatBitsToUint(v) & 0x7fffffffu) > 0x7f800000u ? 0.0 : clamp(v, -limit, limit);\n"
+    "#if FORMAT == 0\n"
+    "    return vec2(v, 0.0);\n"
+    "#elif FORMAT == 1\n"
+    "    return v;\n"
+    "#else\n"
+    "    uint n = uint(roundEven(abs(v) * scale));\n"
+    "    return v < 0.0 ? 0u - n : n;\n"
+    "#endif\n"
+    "}\n"
+    "#elif INPUT == 2\n"
+    "uint load(ivec2 p) { return texelFetch(source, p, 0)[CHANNEL]; }\n"
+    "#else\n"
+    "VALUE load(ivec2 p) { return FETCH(source, p); }\n"
+    "#endif\n"
+    "void start() { one = textureSize(source, 0).x > 0 ? 1.0 : 0.0; }\n";
+
+static const char sat__glsl_output[] =
+    "#if FORMAT == 2\n"
+    "layout(location = 0) out uvec4 result;\n"
+    "#else\n"
+    "layout(location = 0) out vec4 result;\n"
+    "#endif\n";
+
+/* Slomp 2012, section 4.4: `size` is the distance k^(i-1) of the neighbours; those left of the border are zero. */
+static const char sat__glsl_double[] =
+    "void main() {\n"
+    "    start();\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+    "    int x = p.x * axis.x + p.y * axis.y;\n"
+    "    VALUE sum = load(p);\n"
+    "    for (int j = 1; j < K; j++)\n"
+    "        if (x >= j * size) sum = ADD(sum, load(p - j * size * axis));\n"
+    "    result = STORED(sum);\n"
+    "}\n";
+
+/* Slomp 2012, section 4.5, towards the root: the sum of k neighbours; `size` is the length that is read. */
+static const char sat__glsl_reduce[] =
+    "void main() {\n"
+    "    start();\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy) * (1 + (K - 1) * axis);\n"
+    "    int x = p.x * axis.x + p.y * axis.y;\n"
+    "    VALUE sum = load(p);\n"
+    "    for (int j = 1; j < K; j++)\n"
+    "        if (x + j < size) sum = ADD(sum, load(p + j * axis));\n"
+    "    result = STORED(sum);\n"
+    "}\n";
+
+/* The same section, towards the leaves, inclusive: the uncle to the left, which holds the sum of all before this group,
+   plus the node itself and its siblings to the left. The root's children have no uncle. */
+static const char sat__glsl_expand[] =
+    "uniform SUMS uncles;\n"
+    "void main() {\n"
+    "    start();\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+    "    int x = p.x * axis.x + p.y * axis.y, group = x / K;\n"
+    "    VALUE sum = load(p - (x - group * K) * axis);\n"
+    "    for (int j = 1; j < K; j++)\n"
+    "        if (group * K + j <= x) sum = ADD(sum, load(p + (group * K + j - x) * axis));\n"
+    "    if (group > 0) sum = ADD(FETCH(uncles, p + (group - 1 - x) * axis), sum);\n"
+    "    result = STORED(sum);\n"
+    "}\n";
+
+/* The same by compute shader: an invocation writes a whole group and adds k times instead of k (k + 1) / 2. */
+static const char sat__glsl_expand_groups[] =
+    "layout(local_size_x = 64) in;\n"
+    "#if FORMAT == 0\n"
+    "layout(binding = 0, rg32f) writeonly uniform image2D target;\n"
+    "#elif FORMAT == 1\n"
+    "layout(binding = 0, r32f) writeonly uniform image2D target;\n"
+    "#else\n"
+    "layout(binding = 0, r32ui) writeonly uniform uimage2D target;\n"
+    "#endif\n"
+    "uniform SUMS uncles;\n"
+    "uniform int across;\n"
+    "void main() {\n"
+    "    start();\n"
+    "    int group = int(gl_GlobalInvocationID.y);\n"
+    "    ivec2 line = int(gl_GlobalInvocationID.x) * (1 - axis);\n"
+    "    if (int(gl_GlobalInvocationID.x) >= across) return;\n"
+    "    VALUE sum = VALUE(0);\n"
+    "    if (group > 0) sum = FETCH(uncles, line + (group - 1) * axis);\n"
+    "    for (int x = group * K; x < min(group * K + K, size); x++) {\n"
+    "        sum = ADD(sum, load(line + x * axis));\n"
+    "        imageStore(target, line + x * axis, STORED(sum));\n"
+    "    }\n"
+    "}\n";
+
+/* The mean: k x k texels a step, always two-float. `bounds` is the size that is read. */
+static const char sat__glsl_mean[] =
+    "uniform ivec2 bounds;\n"
+    "uniform float factor;\n"
+    "void main() {\n"
+    "    start();\n"
+    "    ivec2 first = ivec2(gl_FragCoord.xy) * K, last = min(first + K, bounds);\n"
+    "    vec2 sum = vec2(0.0);\n"
+    "    for (int y = first.y; y < last.y; y++)\n"
+    "        for (int x = first.x; x < last.x; x++) sum = sat_add(sum, load(ivec2(x, y)), one);\n"
+    "    result = STORED(sum * factor);\n"
+    "}\n";
+
+/* ---- the object */
+
+enum { SAT__GL_LEVELS = 32 };
+
+/* A program, and where its uniforms are (-1 where it has none). */
+typedef struct sat__gl_kernel {
+    unsigned program;
+    int axis, size, across, bounds, factor, limit, scale;
+} sat__gl_kernel;
+
+typedef struct sat__gl_target {
+    unsigned texture, framebuffer;
+} sat__gl_target;
+
+/* One level of the tree along an axis: sums of groups, then their scan. */
+typedef struct sat__gl_level {
+    sat__gl_target sums, scan;
+    int width, height;
+} sat__gl_level;
+
+struct sat_gl {
+    sat__gl gl;
+    sat_gl_options options;
+    sat__gl_kernel reduce[2], expand[2], doubling[2], mean[2]; /* [1] reads the caller's texture */
+    int ready;   /* all programs are there */
+    int compute, mean_k;
+    int width, height; /* of the textures below; 0: there are none */
+    int mean_width, mean_height, mean_levels;
+    float limit;
+    double quantum;
+    sat__gl_target table, partial;                  /* partial: the rows' scans, and recursive doubling's other half */
+    sat__gl_level levels[2][SAT__GL_LEVELS];
+    int depth[2];                                   /* levels of the rows' tree and of the columns' */
+    sat__gl_level means[SAT__GL_LEVELS];
+    unsigned borrowed;                              /* framebuffer for a table of the caller */
+};
+
+SAT_DEF sat_gl_options sat_gl_defaults(void)
+{
+    sat_gl_options options;
+    memset(&options, 0, sizeof options);
+    options.format = SAT_GL_TWO_FLOAT;
+    options.algorithm = SAT_SCAN_BALANCED_TREE;
+    options.k = 4;
+    options.max_value = 1e30;
+    return options;
+}
+
+static int sat__gl_options_are_valid(const sat_gl_options *o)
+{
+    int exponent;
+    if ((unsigned)o->format > (unsigned)SAT_GL_FIXED32 || o->k < 2 || o->k > 64 || o->channel < 0 || o->channel > 3) return 0;
+    if (o->algorithm != SAT_SCAN_BALANCED_TREE && o->algorithm != SAT_SCAN_RECURSIVE_DOUBLING) return 0;
+    if (o->unsigned_input && o->format != SAT_GL_FIXED32) return 0;
+    if (!sat__is_finite_double(o->max_value) || !sat__is_finite_double(o->quantum) || !sat__is_finite_double(o->max_box_area)) return 0;
+    if (!(o->max_value > 0) || !(o->max_box_area >= 0) || !(o->quantum >= 0)) return 0;
+    if (!(o->quantum > 0)) return 1;
+    return frexp(o->quantum, &exponent) <= 0.5 && exponent > -120 && exponent < 120;
+}
+
+static unsigned sat__gl_internal(sat_gl_format format)
+{
+    return format == SAT_GL_TWO_FLOAT ? SAT__GL_RG32F : format == SAT_GL_FLOAT ? SAT__GL_R32F : SAT__GL_R32UI;
+}
+
+/* ---- programs */
+
+static sat_result sat__gl_make_kernel(sat_gl *g, sat__gl_kernel *kernel, const char *name, const char *body, int reads_input,
+                                      sat_gl_format format, int k)
+{
+    sat__gl *gl = &g->gl;
+    const char *library[3], *text[3];
+    sat__gl_shaders shaders;
+    sat_result result;
+    int compute = body == sat__glsl_expand_groups;
+    memset(&shaders, 0, sizeof shaders);
+    library[0] = sat_gl_glsl();
+    library[1] = sat__glsl_values;
+    library[2] = NULL;
+    text[0] = compute ? body : sat__glsl_output;
+    text[1] = compute ? NULL : body;
+    text[2] = NULL;
+    shaders.name = name;
+    shaders.library = library;
+    if (compute) shaders.compute = text;
+    else shaders.fragment = text;
+    sat__gl_define(gl, "FORMAT", (int)format);
+    sat__gl_define(gl, "K", k);
+    sat__gl_define(gl, "CHANNEL", g->options.channel);
+    sat__gl_define(gl, "INPUT", !reads_input ? 0 : g->options.unsigned_input && format == SAT_GL_FIXED32 ? 2 : 1);
+    result = sat__gl_build(gl, &kernel->program, &shaders);
+    if (result != SAT_OK) return result;
+    kernel->axis = gl->GetUniformLocation(kernel->program, "axis");
+    kernel->size = gl->GetUniformLocation(kernel->program, "size");
+    kernel->across = gl->GetUniformLocation(kernel->program, "across");
+    kernel->bounds = gl->GetUniformLocation(kernel->program, "bounds");
+    kernel->factor = gl->GetUniformLocation(kernel->program, "factor");
+    kernel->limit = gl->GetUniformLocation(kernel->program, "limit");
+    kernel->scale = gl->GetUniformLocation(kernel->program, "scale");
+    gl->UseProgram(kernel->program);
+    sat__gl_set_int(gl, kernel->program, "source", 0);
+    sat__gl_set_int(gl, kernel->program, "uncles", 1);
+    return SAT_OK;
+}
+
+static sat_result sat__gl_make_kernels(sat_gl *g)
+{
+    const sat_gl_options *o = &g->options;
+    sat_result result = SAT_OK;
+    int i;
+    for (i = 0; i < 2 && result == SAT_OK; i++) {
+        if (o->algorithm == SAT_SCAN_RECURSIVE_DOUBLING) {
+            result = sat__gl_make_kernel(g, &g->doubling[i], "sat: recursive doubling", sat__glsl_double, i, o->format, o->k);
+        } else {
+            result = sat__gl_make_kernel(g, &g->reduce[i], "sat: reduction", sat__glsl_reduce, i, o->format, o->k);
+            if (result == SAT_OK)
+                result = sat__gl_make_kernel(g, &g->expand[i], "sat: expansion", g->compute ? sat__glsl_expand_groups : sat__glsl_expand,
+                                             i, o->format, o->k);
+        }
+        if (result == SAT_OK && !o->unsigned_input)
+            result = sat__gl_make_kernel(g, &g->mean[i], "sat: mean", sat__glsl_mean, i, SAT_GL_TWO_FLOAT, g->mean_k);
+    }
+    return result;
+}
+
+/* ---- textures of one size */
+
+static void sat__gl_free_target(sat__gl *gl, sat__gl_target *target)
+{
+    if (target->framebuffer) gl->DeleteFramebuffers(1, &target->framebuffer);
+    if (target->texture) gl->DeleteTextures(1, &target->texture);
+    target->texture = target->framebuffer = 0;
+}
+
+static void sat__gl_free_levels(sat__gl *gl, sat__gl_level *levels)
+{
+    int i;
+    for (i = 0; i < SAT__GL_LEVELS; i++) {
+        sat__gl_free_target(gl, &levels[i].sums);
+        sat__gl_free_target(gl, &levels[i].scan);
+    }
+}
+
+static void sat__gl_free_textures(sat_gl *g)
+{
+    sat__gl_free_target(&g->gl, &g->table);
+    sat__gl_free_target(&g->gl, &g->partial);
+    sat__gl_free_levels(&g->gl, g->levels[0]);
+    sat__gl_free_levels(&g->gl, g->levels[1]);
+    g->width = g->height = 0;
+}
+
+static void sat__gl_free_means(sat_gl *g)
+{
+    sat__gl_free_levels(&g->gl, g->means);
+    g->mean_width = g->mean_height = 0;
+}
+
+static sat_result sat__gl_make_target(sat__gl *gl, sat__gl_target *target, unsigned internal, int width, int height)
+{
+    sat_result result = sat__gl_texture(gl, &target->texture, internal, width, height, NULL);
+    if (result == SAT_OK) result = sat__gl_framebuffer(gl, &target->framebuffer, &target->texture, 1, 0);
+    return result;
+}
+
+/* The tree along one axis ends above the level that one group can hold: its root is never asked for. */
+static sat_result sat__gl_make_tree(sat_gl *g, int axis)
+{
+    unsigned internal = sat__gl_internal(g->options.format);
+    int k = g->options.k, width = g->width, height = g->height;
+    sat_result result = SAT_OK;
+    g->depth[axis] = 0;
+    while (result == SAT_OK && (axis ? height : width) > k) {
+        sat__gl_level *level = &g->levels[axis][g->depth[axis]++];
+        if (axis) height = (height + k - 1) / k;
+        else width = (width + k - 1) / k;
+        level->width = width;
+        level->height = height;
+        result = sat__gl_make_target(&g->gl, &level->sums, internal, width, height);
+        if (result == SAT_OK) result = sat__gl_make_target(&g->gl, &level->scan, internal, width, height);
+    }
+    return result;
+}
+
+/* The largest pixel that leaves every float sum finite. */
+static double sat__gl_largest(const sat_gl *g)
+{
+    double largest = 3.4028234663852886e38 / 2147483648.0;
+    return g->options.max_value < largest ? g->options.max_value : largest;
+}
+
+/* The largest pixel and the quantum for this size, as SAT_KIND_FLOAT and SAT_KIND_FIXED32 choose them: every
+   box that may be asked for must fit into 31 bits. */
+static sat_result sat__gl_settle(sat_gl *g, int width, int height)
+{
+    const sat_gl_options *o = &g->options;
+    double largest = sat__gl_largest(g), range;
+    g->quantum = 0;
+    if (o->format == SAT_GL_FIXED32) {
+        largest = o->max_value < 3.4028234663852886e38 ? o->max_value : 3.4028234663852886e38;
+        range = 2147483647.0 / (o->max_box_area > 0 ? o->max_box_area : (double)width * (double)height) - 0.5;
+        g->quantum = o->unsigned_input && !(o->quantum > 0) ? 1 : o->quantum;
+        if (!o->unsigned_input && range < 1) return sat__gl_fail(&g->gl, SAT_ERR_LIMIT, "max_box_area leaves a pixel less than one quantum", NULL);
+        if (!(g->quantum > 0)) {
+            int exponent;
+            double fraction = frexp(largest / range, &exponent);
+            g->quantum = ldexp(1.0, fraction > 0.5 ? exponent : exponent - 1);
+            if (g->quantum < 1e-36) g->quantum = ldexp(1.0, -119); /* the shader's 1 / quantum must be finite */
+        }
+        if (range * g->quantum < largest) largest = range * g->quantum;
+    }
+    g->limit = (float)largest;
+    return SAT_OK;
+}
+
+static sat_result sat__gl_fit(sat_gl *g, int width, int height)
+{
+    unsigned internal = sat__gl_internal(g->options.format);
+    sat_result result = SAT_OK;
+    if (g->width == width && g->height == height) return SAT_OK;
+    sat__gl_free_textures(g);
+    result = sat__gl_settle(g, width, height);
+    if (result != SAT_OK) return result;
+    g->width = width;
+    g->height = height;
+    result = sat__gl_make_target(&g->gl, &g->table, internal, width, height);
+    if (result == SAT_OK) result = sat__gl_make_target(&g->gl, &g->partial, internal, width, height);
+    if (result == SAT_OK && g->options.algorithm == SAT_SCAN_BALANCED_TREE) {
+        result = sat__gl_make_tree(g, 0);
+        if (result == SAT_OK) result = sat__gl_make_tree(g, 1);
+    }
+    if (result != SAT_OK) sat__gl_free_textures(g);
+    return result;
+}
+
+/* ---- passes */
+
+/* Everything of a pass but where it draws. */
+static void sat__gl_start(sat_gl *g, const sat__gl_kernel *kernel, int axis, int size, unsigned source, unsigned uncles)
+{
+    sat__gl *gl = &g->gl;
+    gl->UseProgram(kernel->program);
+    gl->Uniform2i(kernel->axis, axis == 0, axis == 1);
+    gl->Uniform1i(kernel->size, size);
+    gl->Uniform1f(kernel->limit, g->limit);
+    if (g->quantum > 0) gl->Uniform1f(kernel->scale, (float)(1 / g->quantum));
+    gl->ActiveTexture(SAT__GL_TEXTURE0);
+    gl->BindTexture(SAT__GL_TEXTURE_2D, source);
+    gl->BindSampler(0, 0);
+    gl->ActiveTexture(SAT__GL_TEXTURE0 + 1);
+    gl->BindTexture(SAT__GL_TEXTURE_2D, uncles);
+    gl->BindSampler(1, 0);
+}
+
+static void sat__gl_expand(sat_gl *g, int axis, sat__gl_target target, int width, int height, unsigned source, int is_input, unsigned uncles)
+{
+    sat__gl *gl = &g->gl;
+    const sat__gl_kernel *kernel = &g->expand[is_input];
+    int size = axis ? height : width, across = axis ? width : height, k = g->options.k;
+    sat__gl_start(g, kernel, axis, size, source, uncles);
+    if (g->compute) {
+        gl->Uniform1i(kernel->across, across);
+        gl->BindImageTexture(0, target.texture, 0, 0, 0, SAT__GL_WRITE_ONLY, sat__gl_internal(g->options.format));
+        gl->DispatchCompute((unsigned)(across + 63) / 64, (unsigned)((size + k - 1) / k), 1);
+        gl->MemoryBarrier(SAT__GL_TEXTURE_FETCH_BARRIER_BIT | SAT__GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
+                          SAT__GL_TEXTURE_UPDATE_BARRIER_BIT | SAT__GL_FRAMEBUFFER_BARRIER_BIT);
+    } else {
+        gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, target.framebuffer);
+        gl->Viewport(0, 0, width, height);
+        sat__gl_draw(gl);
+    }
+}
+
+/* Up the tree and down again, along one axis. */
+static void sat__gl_tree(sat_gl *g, int axis, sat__gl_target target, unsigned source, int is_input)
+{
+    sat__gl *gl = &g->gl;
+    sat__gl_level *levels = g->levels[axis];
+    int i, depth = g->depth[axis], length = axis ? g->height : g->width;
+    for (i = 0; i < depth; i++) {
+        sat__gl_start(g, &g->reduce[is_input && i == 0], axis, length, i ? levels[i - 1].sums.texture : source, 0);
+        gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, levels[i].sums.framebuffer);
+        gl->Viewport(0, 0, levels[i].width, levels[i].height);
+        sat__gl_draw(gl);
+        length = axis ? levels[i].height : levels[i].width;
+    }
+    for (i = depth - 1; i >= 0; i--)
+        sat__gl_expand(g, axis, levels[i].scan, levels[i].width, levels[i].height, levels[i].sums.texture, 0,
+                       i + 1 < depth ? levels[i + 1].scan.texture : 0);
+    sat__gl_expand(g, axis, target, g->width, g->height, source, is_input, depth ? levels[0].scan.texture : 0);
+}
+
+static int sat__gl_doubling_passes(int n, int k)
+{
+    int passes = 0, reach = 1;
+    for (; reach < n; passes++) reach *= k;
+    return passes;
+}
+
+/* All passes of both axes alternate between two textures so that the last one writes the target. From the third pass
+   along an axis on, the first k^(i-2) elements are left alone: they were complete two passes ago, in the same texture. */
+static void sat__gl_double(sat_gl *g, int axes, sat__gl_target target, unsigned source)
+{
+    sat__gl *gl = &g->gl;
+    sat__gl_target halves[2];
+    int axis, i, done = 0, passes[2], total;
+    passes[0] = sat__max_int(1, sat__gl_doubling_passes(g->width, g->options.k)); /* at least one reads the input */
+    passes[1] = axes == 2 ? sat__gl_doubling_passes(g->height, g->options.k) : 0;
+    total = passes[0] + passes[1];
+    halves[0] = g->partial;
+    halves[1] = target;
+    for (axis = 0; axis < axes; axis++) {
+        int distance = 1, skip = 0;
+        for (i = 0; i < passes[axis]; i++, done++) {
+            const sat__gl_target *to = &halves[(total - done) & 1];
+            sat__gl_start(g, &g->doubling[done == 0], axis, distance, done ? halves[(total - done + 1) & 1].texture : source, 0);
+            gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, to->framebuffer);
+            if (axis) gl->Viewport(0, skip, g->width, g->height - skip);
+            else gl->Viewport(skip, 0, g->width - skip, g->height);
+            sat__gl_draw(gl);
+            if (i > 0) skip = distance;
+            distance *= g->options.k;
+        }
+    }
+}
+
+static void sat__gl_scan_axes(sat_gl *g, int axes, sat__gl_target target, unsigned source)
+{
+    if (g->options.algorithm == SAT_SCAN_RECURSIVE_DOUBLING) {
+        sat__gl_double(g, axes, target, source);
+    } else if (axes == 1 || g->height == 1) {
+        sat__gl_tree(g, 0, target, source, 1);
+    } else {
+        sat__gl_tree(g, 0, g->partial, source, 1);
+        sat__gl_tree(g, 1, target, g->partial.texture, 0);
+    }
+}
+
+static sat_result sat__gl_run(sat_gl *g, int axes, unsigned table, unsigned texture, int width, int height)
+{
+    sat__gl_state state;
+    sat__gl_target target;
+    sat_result result;
+    if (!g || !g->ready || !texture || texture == table || width < 1 || height < 1) return SAT_ERR_ARGUMENT;
+    sat__gl_begin(&g->gl, &state, 2);
+    result = sat__gl_fit(g, width, height);
+    target = g->table;
+    if (result == SAT_OK && table) {
+        target.texture = table;
+        target.framebuffer = g->borrowed;
+        result = sat__gl_attach(&g->gl, g->borrowed, &table, 1, 0);
+    }
+    if (result == SAT_OK) sat__gl_scan_axes(g, axes, target, texture);
+    sat__gl_end(&g->gl, &state);
+    return result;
+}
+
+SAT_DEF sat_result sat_gl_build(sat_gl *gl, unsigned table, unsigned texture, int width, int height)
+{
+    return sat__gl_run(gl, 2, table, texture, width, height);
+}
+
+SAT_DEF sat_result sat_gl_scan(sat_gl *gl, unsigned table, unsigned texture, int width, int height)
+{
+    return sat__gl_run(gl, 1, table, texture, width, height);
+}
+
+SAT_DEF unsigned sat_gl_table(const sat_gl *gl) { return gl ? gl->table.texture : 0; }
+SAT_DEF double sat_gl_quantum(const sat_gl *gl) { return gl ? gl->quantum : 0; }
+
+/* ---- mean */
+
+static sat_result sat__gl_fit_means(sat_gl *g, int width, int height)
+{
+    sat_result result = SAT_OK;
+    int k = g->mean_k;
+    if (g->mean_width == width && g->mean_height == height) return SAT_OK;
+    sat__gl_free_means(g);
+    g->mean_width = width;
+    g->mean_height = height;
+    g->mean_levels = 0;
+    do {
+        sat__gl_level *level = &g->means[g->mean_levels++];
+        level->width = width = (width + k - 1) / k;
+        level->height = height = (height + k - 1) / k;
+        result = sat__gl_make_target(&g->gl, &level->sums, SAT__GL_RG32F, width, height);
+    } while (result == SAT_OK && (width > 1 || height > 1));
+    if (result != SAT_OK) sat__gl_free_means(g);
+    return result;
+}
+
+static void sat__gl_reduce_mean(sat_gl *g, unsigned source, int width, int height)
+{
+    sat__gl *gl = &g->gl;
+    double area = (double)width * (double)height, largest = sat__gl_largest(g);
+    int i;
+    for (i = 0; i < g->mean_levels; i++) {
+        const sat__gl_kernel *kernel = &g->mean[i == 0];
+        const sat__gl_level *level = &g->means[i];
+        sat__gl_start(g, kernel, 0, 0, source, 0);
+        gl->Uniform2i(kernel->bounds, width, height);
+        gl->Uniform1f(kernel->limit, (float)largest);
+        gl->Uniform1f(kernel->factor, i + 1 < g->mean_levels ? 1.0f : (float)(1 / area));
+        gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, level->sums.framebuffer);
+        gl->Viewport(0, 0, level->width, level->height);
+        sat__gl_draw(gl);
+        source = level->sums.texture;
+        width = level->width;
+        height = level->height;
+    }
+}
+
+SAT_DEF sat_result sat_gl_mean(sat_gl *gl, float *mean, unsigned texture, int width, int height)
+{
+    sat__gl_state state;
+    sat_result result;
+    float texel[2] = {0, 0};
+    if (!gl || !gl->ready || !texture || width < 1 || height < 1 || gl->options.unsigned_input) return SAT_ERR_ARGUMENT;
+    sat__gl_begin(&gl->gl, &state, 2);
+    result = sat__gl_fit_means(gl, width, height);
+    if (result == SAT_OK) {
+        sat__gl_reduce_mean(gl, texture, width, height);
+        if (mean) {
+            result = sat__gl_read(&gl->gl, texel, sat_gl_mean_texture(gl), SAT__GL_RG32F, 1, 1);
+            if (result == SAT_OK) *mean = texel[0] + texel[1];
+        }
+    }
+    sat__gl_end(&gl->gl, &state);
+    return result;
+}
+
+SAT_DEF unsigned sat_gl_mean_texture(const sat_gl *gl)
+{
+    return gl && gl->mean_width ? gl->means[gl->mean_levels - 1].sums.texture : 0;
+}
+
+/* ---- creation */
+
+SAT_DEF sat_result sat_gl_create(sat_gl **out, sat_gl_get_proc *get_proc, const sat_gl_options *options)
+{
+    sat_gl_options chosen = options ? *options : sat_gl_defaults();
+    sat__gl_state state;
+    sat_allocator allocator;
+    sat_result result;
+    sat_gl *g;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!get_proc || !sat__gl_options_are_valid(&chosen) || !sat__resolve_allocator(&allocator, &chosen.allocator)) return SAT_ERR_ARGUMENT;
+    g = (sat_gl *)sat__alloc(&allocator, sizeof *g);
+    if (!g) return SAT_ERR_MEMORY;
+    memset(g, 0, sizeof *g);
+    g->options = chosen;
+    g->options.allocator = allocator;
+    *out = g;
+    result = sat__gl_open(&g->gl, get_proc);
+    if (result != SAT_OK) return result;
+    g->compute = chosen.compute && g->gl.has_compute;
+    g->mean_k = sat__min_int(chosen.k, 8); /* squared */
+    sat__gl_begin(&g->gl, &state, 2);
+    g->gl.GenFramebuffers(1, &g->borrowed);
+    result = sat__gl_make_kernels(g);
+    g->ready = result == SAT_OK;
+    sat__gl_end(&g->gl, &state);
+    return result;
+}
+
+SAT_DEF void sat_gl_destroy(sat_gl *gl)
+{
+    sat_allocator allocator;
+    int i;
+    if (!gl) return;
+    if (gl->gl.vertex_array) {
+        sat__gl_free_textures(gl);
+        sat__gl_free_means(gl);
+        for (i = 0; i < 2; i++) { /* 0 is ignored */
+            gl->gl.DeleteProgram(gl->reduce[i].program);
+            gl->gl.DeleteProgram(gl->expand[i].program);
+            gl->gl.DeleteProgram(gl->doubling[i].program);
+            gl->gl.DeleteProgram(gl->mean[i].program);
+        }
+        gl->gl.DeleteFramebuffers(1, &gl->borrowed);
+        sat__gl_close(&gl->gl);
+    }
+    allocator = gl->options.allocator;
+    sat__release(&allocator, gl, sizeof *gl);
+}
+
+SAT_DEF const char *sat_gl_message(const sat_gl *gl) { return gl ? gl->gl.message : ""; }
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SAT__GL_IMPLEMENTED */
