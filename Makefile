@@ -4,7 +4,7 @@
 
 all: examples
 .PHONY: all examples demo test bench report size check check-strict check-variants check-asan check-tsan \
-        check-analyze check-compilers fuzz data install dist gpu-bench deps help clean run-tests run-demo
+        check-analyze check-compilers fuzz data install dist gpu-bench deps help clean build-tests run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
@@ -61,8 +61,10 @@ endif
 PICTURES     := $(EXR) $(STB) $(OPENMP)
 PICTURE_LIBS := $(EXR_LIB) $(STB_LIB)
 
-COMPILE_C   = $(CC) -std=c99 $(OPT) $(WARN_C) $(DEFS) $(CFLAGS) -MMD -MP
-COMPILE_CXX = $(CXX) -std=c++11 $(OPT) $(WARN) $(DEFS) $(CFLAGS) -MMD -MP
+# V=1 shows the commands. The old program goes first, lest it be taken for the result of a failed compilation.
+SAY         = $(if $(V),,@echo '  $@';) rm -f $@; mkdir -p $(@D);
+COMPILE_C   = $(SAY) $(CC) -std=c99 $(OPT) $(WARN_C) $(DEFS) $(CFLAGS) -MMD -MP
+COMPILE_CXX = $(SAY) $(CXX) -std=c++11 $(OPT) $(WARN) $(DEFS) $(CFLAGS) -MMD -MP
 
 # Missing packages are installed by the first `make demo` or `make test` that may do so; NO_DEPS=1 says no.
 deps: build/.deps
@@ -80,10 +82,8 @@ EXAMPLES := $(EXAMPLE_SOURCES:examples/%.c=build/%) $(VIEW_SOURCES:examples/%.c=
 examples: $(EXAMPLES)
 
 build/%_view: examples/%_view.c
-	@mkdir -p $(@D)
 	$(COMPILE_C) $(PICTURES) $(GLFW) $< -o $@ $(PICTURE_LIBS) $(GLFW_LIB) $(LDLIBS)
 build/%: examples/%.c
-	@mkdir -p $(@D)
 	$(COMPILE_C) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
 
 # make demo [IN=picture.exr] [ARGS='--gl ...']
@@ -103,16 +103,17 @@ TESTS_CXX    := $(if $(HAVE_CXX),$(filter %.cpp,$(TEST_SOURCES)))
 TESTS        := $(TESTS_C:tests/%.c=$(B)/test/%_c) $(TESTS_CXX:tests/%.cpp=$(B)/test/%_cpp)
 
 $(B)/test/%_c: tests/%.c
-	@mkdir -p $(@D)
 	$(COMPILE_C) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
 $(B)/test/%_cpp: tests/%.cpp
-	@mkdir -p $(@D)
 	$(COMPILE_CXX) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
 
 test: deps
 	@$(MAKE) --no-print-directory run-tests
-run-tests: $(TESTS)
+build-tests: $(TESTS)
+	@:
+run-tests:
 	$(if $(HAVE_CXX),,@echo "no C++ compiler (g++): the C++ twins of the tests are left out")
+	+@$(MAKE) --no-print-directory -k $(if $(filter -j%,$(MAKEFLAGS)),,-j2) build-tests || true
 	@TEST_ARGS='$(ARGS)' tests/run.sh $(TESTS)
 
 # ---- checks ----------------------------------------------------------------------------------------------------
@@ -166,10 +167,8 @@ BENCHES       := $(patsubst tests/bench/bench_%.c,%,$(patsubst tests/bench/bench
 PEERS         := $(OPENCV) $(EMBREE)
 
 build/bench/bench_%: tests/bench/bench_%.c
-	@mkdir -p $(@D)
 	$(COMPILE_C) -Itests/bench $(PICTURES) $(EMBREE) $< -o $@ $(PICTURE_LIBS) $(EMBREE_LIB) $(LDLIBS)
 build/bench/bench_%: tests/bench/bench_%.cpp
-	@mkdir -p $(@D)
 	$(COMPILE_CXX) -Itests/bench $(PICTURES) $(PEERS) $< -o $@ $(PICTURE_LIBS) $(OPENCV_LIB) $(EMBREE_LIB) $(LDLIBS)
 
 bench: $(BENCHES:%=out/bench/%.tsv)
@@ -182,7 +181,6 @@ FORCE:
 # the same tables on the machine's GPU, through EGL
 GPU_BENCHES := $(patsubst tests/bench/gpu_%.c,%,$(wildcard $(if $(LIB),tests/bench/gpu_$(LIB).c,tests/bench/gpu_*.c)))
 build/bench/gpu_%: tests/bench/gpu_%.c
-	@mkdir -p $(@D)
 	$(COMPILE_C) -Itests/bench $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
 gpu-bench: $(GPU_BENCHES:%=out/bench/gpu_%.tsv)
 out/bench/gpu_%.tsv: build/bench/gpu_% FORCE
