@@ -223,7 +223,8 @@ SAT_DEF sat_result sat_box_filter_variable(float *out, ptrdiff_t out_stride, con
 /* Never below the absolute error of a box mean of that size anywhere in the table, against exact sums of the
    replaced pixels. Worst case, not typical: see sat_error_rms. */
 SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_width, int box_height);
-/* The root-mean-square error to expect over boxes of that size, within a factor of 3 on images that are not constant. */
+/* The root-mean-square error to expect over boxes of that size: within a factor of 3 on non-negative images whose pixels
+   are not round numbers and, for FIXED kinds, not mostly below the quantum; an upper estimate on others. */
 SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width, int box_height);
 
 /* The cheapest kind whose worst error on box means of that size stays below max_relative_error times the mean
@@ -3135,8 +3136,8 @@ SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_widt
     return sat__sum_bound(table, &table->total[channel], w, h) / (w * h);
 }
 
-/* Roundings are taken as independent, so that their squares add. The factors are fitted to measured errors
-   (bench_sat, table "bound"). */
+/* The last rounding of each corner is independent of the others, and so are those that the corners of a box do not share:
+   squares add. The factors are fitted to measured errors (bench_sat, table "Expected error"). */
 SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width, int box_height)
 {
     const double u = 5.9604644775390625e-8, v = 1.1102230246251565e-16; /* 2^-24, 2^-53 */
@@ -3153,10 +3154,10 @@ SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width,
     if (table->options.kind == SAT_KIND_TILED) {
         tiles = (double)table->tiles_x * ((height - 1) / tile + 1);
         stored = sqrt(total->tile_squares / tiles);
-        return 0.5 * u * stored * sqrt(sat__tiles_touched(w, tile) * sat__tiles_touched(h, tile)) / (w * h);
+        return 0.5 * u * stored * sqrt((1 + (w - 1) / tile) * (1 + (h - 1) / tile)) / (w * h);
     }
     stored = total->sum_abs / (table->options.subtract_mean ? sqrt(width * height) : 1);
-    return 0.3 * (table->options.kind == SAT_KIND_FLOAT ? u : v) * stored * sqrt(sat__roundings(height, width)) / (w * h);
+    return 0.33 * (table->options.kind == SAT_KIND_FLOAT ? u : v) * stored * sqrt(1 + 0.15 * (w + h)) / (w * h);
 }
 
 /* ---- choosing a kind */
@@ -3372,92 +3373,91 @@ extern "C" {
    compiler cannot see. An R32F table reads as two-floats with a low part of zero. Lookups follow Slomp 2012, eq 4.2 to
    4.4: zero left and above, clamped right and below; they take differences of neighbours first. A fractional box is nine
    boxes: the cells that its border cuts, weighted, and what lies between them. */
-SAT_DEF const char *sat_gl_glsl(void)
-{
-    return
-        "#ifdef GL_ES\n"
-        "precision highp float;\n"
-        "precision highp int;\n"
-        "precision highp sampler2D;\n"
-        "precision highp usampler2D;\n"
-        "#endif\n"
-        "vec2 sat_add(vec2 a, vec2 b, float one) {\n"
-        "    bool swap = abs(a.x) < abs(b.x);\n"
-        "    float big = swap ? b.x : a.x, small = swap ? a.x : b.x;\n"
-        "    float sum = (big + small) * one;\n"
-        "    float low = (small - (sum - big)) + (a.y + b.y);\n"
-        "    float high = (sum + low) * one;\n"
-        "    return vec2(high, low - (high - sum));\n"
-        "}\n"
-        "vec2 sat_corner(sampler2D table, int x, int y) {\n"
-        "    return x < 1 || y < 1 ? vec2(0.0) : texelFetch(table, ivec2(x, y) - 1, 0).xy;\n"
-        "}\n"
-        "uint sat_corner(usampler2D table, int x, int y) {\n"
-        "    return x < 1 || y < 1 ? 0u : texelFetch(table, ivec2(x, y) - 1, 0).x;\n"
-        "}\n"
-        "float sat_sum(sampler2D table, ivec2 low, ivec2 high) {\n"
-        "    ivec2 size = textureSize(table, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size);\n"
-        "    float one = size.x > 0 ? 1.0 : 0.0;\n"
-        "    if (any(lessThanEqual(b, a))) return 0.0;\n"
-        "    vec2 right = sat_add(sat_corner(table, b.x, b.y), -sat_corner(table, b.x, a.y), one);\n"
-        "    vec2 left = sat_add(sat_corner(table, a.x, b.y), -sat_corner(table, a.x, a.y), one);\n"
-        "    right = sat_add(right, -left, one);\n"
-        "    return right.x + right.y;\n"
-        "}\n"
-        "float sat_sum(usampler2D table, float quantum, ivec2 low, ivec2 high) {\n"
-        "    ivec2 size = textureSize(table, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size);\n"
-        "    if (any(lessThanEqual(b, a))) return 0.0;\n"
-        "    return quantum * float(int(sat_corner(table, b.x, b.y) - sat_corner(table, b.x, a.y) -\n"
-        "                               sat_corner(table, a.x, b.y) + sat_corner(table, a.x, a.y)));\n"
-        "}\n"
-        "float sat_area(ivec2 size, ivec2 low, ivec2 high) {\n"
-        "    ivec2 side = clamp(high, ivec2(0), size) - clamp(low, ivec2(0), size);\n"
-        "    return side.x > 0 && side.y > 0 ? float(side.x) * float(side.y) : 1.0;\n"
-        "}\n"
-        "float sat_mean(sampler2D table, ivec2 low, ivec2 high) {\n"
-        "    return sat_sum(table, low, high) / sat_area(textureSize(table, 0), low, high);\n"
-        "}\n"
-        "float sat_mean(usampler2D table, float quantum, ivec2 low, ivec2 high) {\n"
-        "    return sat_sum(table, quantum, low, high) / sat_area(textureSize(table, 0), low, high);\n"
-        "}\n"
-        "float sat_sum_fractional(sampler2D table, vec2 low, vec2 high) {\n"
-        "    ivec2 size = textureSize(table, 0);\n"
-        "    vec2 a = clamp(low, vec2(0.0), vec2(size)), b = clamp(high, vec2(0.0), vec2(size));\n"
-        "    float one = size.x > 0 ? 1.0 : 0.0, sum = 0.0;\n"
-        "    if (!all(lessThan(a, b))) return 0.0;\n"
-        "    ivec4 x = min(ivec4(int(a.x), int(a.x) + 1, int(b.x), int(b.x) + 1), size.x);\n"
-        "    ivec4 y = min(ivec4(int(a.y), int(a.y) + 1, int(b.y), int(b.y) + 1), size.y);\n"
-        "    vec3 u = vec3(1.0 - fract(a.x), 1.0, fract(b.x)), v = vec3(1.0 - fract(a.y), 1.0, fract(b.y));\n"
-        "    for (int i = 0; i < 3; i++) {\n"
-        "        vec2 left = sat_add(sat_corner(table, x[0], y[i + 1]), -sat_corner(table, x[0], y[i]), one);\n"
-        "        for (int j = 0; j < 3; j++) {\n"
-        "            vec2 right = sat_add(sat_corner(table, x[j + 1], y[i + 1]), -sat_corner(table, x[j + 1], y[i]), one);\n"
-        "            vec2 box = sat_add(right, -left, one);\n"
-        "            sum += v[i] * u[j] * (box.x + box.y);\n"
-        "            left = right;\n"
-        "        }\n"
-        "    }\n"
-        "    return sum;\n"
-        "}\n"
-        "float sat_sum_fractional(usampler2D table, float quantum, vec2 low, vec2 high) {\n"
-        "    ivec2 size = textureSize(table, 0);\n"
-        "    vec2 a = clamp(low, vec2(0.0), vec2(size)), b = clamp(high, vec2(0.0), vec2(size));\n"
-        "    float sum = 0.0;\n"
-        "    if (!all(lessThan(a, b))) return 0.0;\n"
-        "    ivec4 x = min(ivec4(int(a.x), int(a.x) + 1, int(b.x), int(b.x) + 1), size.x);\n"
-        "    ivec4 y = min(ivec4(int(a.y), int(a.y) + 1, int(b.y), int(b.y) + 1), size.y);\n"
-        "    vec3 u = vec3(1.0 - fract(a.x), 1.0, fract(b.x)), v = vec3(1.0 - fract(a.y), 1.0, fract(b.y));\n"
-        "    for (int i = 0; i < 3; i++) {\n"
-        "        uint left = sat_corner(table, x[0], y[i + 1]) - sat_corner(table, x[0], y[i]);\n"
-        "        for (int j = 0; j < 3; j++) {\n"
-        "            uint right = sat_corner(table, x[j + 1], y[i + 1]) - sat_corner(table, x[j + 1], y[i]);\n"
-        "            sum += v[i] * u[j] * float(int(right - left));\n"
-        "            left = right;\n"
-        "        }\n"
-        "    }\n"
-        "    return quantum * sum;\n"
-        "}\n";
-}
+static const char sat__glsl_lookups[] =
+    "#ifdef GL_ES\n"
+    "precision highp float;\n"
+    "precision highp int;\n"
+    "precision highp sampler2D;\n"
+    "precision highp usampler2D;\n"
+    "#endif\n"
+    "vec2 sat_add(vec2 a, vec2 b, float one) {\n"
+    "    bool swap = abs(a.x) < abs(b.x);\n"
+    "    float big = swap ? b.x : a.x, small = swap ? a.x : b.x;\n"
+    "    float sum = (big + small) * one;\n"
+    "    float low = (small - (sum - big)) + (a.y + b.y);\n"
+    "    float high = (sum + low) * one;\n"
+    "    return vec2(high, low - (high - sum));\n"
+    "}\n"
+    "vec2 sat_corner(sampler2D table, int x, int y) {\n"
+    "    return x < 1 || y < 1 ? vec2(0.0) : texelFetch(table, ivec2(x, y) - 1, 0).xy;\n"
+    "}\n"
+    "uint sat_corner(usampler2D table, int x, int y) {\n"
+    "    return x < 1 || y < 1 ? 0u : texelFetch(table, ivec2(x, y) - 1, 0).x;\n"
+    "}\n"
+    "float sat_sum(sampler2D table, ivec2 low, ivec2 high) {\n"
+    "    ivec2 size = textureSize(table, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size);\n"
+    "    float one = size.x > 0 ? 1.0 : 0.0;\n"
+    "    if (any(lessThanEqual(b, a))) return 0.0;\n"
+    "    vec2 right = sat_add(sat_corner(table, b.x, b.y), -sat_corner(table, b.x, a.y), one);\n"
+    "    vec2 left = sat_add(sat_corner(table, a.x, b.y), -sat_corner(table, a.x, a.y), one);\n"
+    "    right = sat_add(right, -left, one);\n"
+    "    return right.x + right.y;\n"
+    "}\n"
+    "float sat_sum(usampler2D table, float quantum, ivec2 low, ivec2 high) {\n"
+    "    ivec2 size = textureSize(table, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size);\n"
+    "    if (any(lessThanEqual(b, a))) return 0.0;\n"
+    "    return quantum * float(int(sat_corner(table, b.x, b.y) - sat_corner(table, b.x, a.y) -\n"
+    "                               sat_corner(table, a.x, b.y) + sat_corner(table, a.x, a.y)));\n"
+    "}\n"
+    "float sat_area(ivec2 size, ivec2 low, ivec2 high) {\n"
+    "    ivec2 side = clamp(high, ivec2(0), size) - clamp(low, ivec2(0), size);\n"
+    "    return side.x > 0 && side.y > 0 ? float(side.x) * float(side.y) : 1.0;\n"
+    "}\n"
+    "float sat_mean(sampler2D table, ivec2 low, ivec2 high) {\n"
+    "    return sat_sum(table, low, high) / sat_area(textureSize(table, 0), low, high);\n"
+    "}\n"
+    "float sat_mean(usampler2D table, float quantum, ivec2 low, ivec2 high) {\n"
+    "    return sat_sum(table, quantum, low, high) / sat_area(textureSize(table, 0), low, high);\n"
+    "}\n"
+    "float sat_sum_fractional(sampler2D table, vec2 low, vec2 high) {\n"
+    "    ivec2 size = textureSize(table, 0);\n"
+    "    vec2 a = clamp(low, vec2(0.0), vec2(size)), b = clamp(high, vec2(0.0), vec2(size));\n"
+    "    float one = size.x > 0 ? 1.0 : 0.0, sum = 0.0;\n"
+    "    if (!all(lessThan(a, b))) return 0.0;\n"
+    "    ivec4 x = min(ivec4(int(a.x), int(a.x) + 1, int(b.x), int(b.x) + 1), size.x);\n"
+    "    ivec4 y = min(ivec4(int(a.y), int(a.y) + 1, int(b.y), int(b.y) + 1), size.y);\n"
+    "    vec3 u = vec3(1.0 - fract(a.x), 1.0, fract(b.x)), v = vec3(1.0 - fract(a.y), 1.0, fract(b.y));\n"
+    "    for (int i = 0; i < 3; i++) {\n"
+    "        vec2 left = sat_add(sat_corner(table, x[0], y[i + 1]), -sat_corner(table, x[0], y[i]), one);\n"
+    "        for (int j = 0; j < 3; j++) {\n"
+    "            vec2 right = sat_add(sat_corner(table, x[j + 1], y[i + 1]), -sat_corner(table, x[j + 1], y[i]), one);\n"
+    "            vec2 box = sat_add(right, -left, one);\n"
+    "            sum += v[i] * u[j] * (box.x + box.y);\n"
+    "            left = right;\n"
+    "        }\n"
+    "    }\n"
+    "    return sum;\n"
+    "}\n"
+    "float sat_sum_fractional(usampler2D table, float quantum, vec2 low, vec2 high) {\n"
+    "    ivec2 size = textureSize(table, 0);\n"
+    "    vec2 a = clamp(low, vec2(0.0), vec2(size)), b = clamp(high, vec2(0.0), vec2(size));\n"
+    "    float sum = 0.0;\n"
+    "    if (!all(lessThan(a, b))) return 0.0;\n"
+    "    ivec4 x = min(ivec4(int(a.x), int(a.x) + 1, int(b.x), int(b.x) + 1), size.x);\n"
+    "    ivec4 y = min(ivec4(int(a.y), int(a.y) + 1, int(b.y), int(b.y) + 1), size.y);\n"
+    "    vec3 u = vec3(1.0 - fract(a.x), 1.0, fract(b.x)), v = vec3(1.0 - fract(a.y), 1.0, fract(b.y));\n"
+    "    for (int i = 0; i < 3; i++) {\n"
+    "        uint left = sat_corner(table, x[0], y[i + 1]) - sat_corner(table, x[0], y[i]);\n"
+    "        for (int j = 0; j < 3; j++) {\n"
+    "            uint right = sat_corner(table, x[j + 1], y[i + 1]) - sat_corner(table, x[j + 1], y[i]);\n"
+    "            sum += v[i] * u[j] * float(int(right - left));\n"
+    "            left = right;\n"
+    "        }\n"
+    "    }\n"
+    "    return quantum * sum;\n"
+    "}\n";
+
+SAT_DEF const char *sat_gl_glsl(void) { return sat__glsl_lookups; }
 
 /* What the passes share. INPUT: 0 reads sums, 1 the caller's float texture, 2 the caller's unsigned one. The bits are
    asked for NaN, because compilers may assume that there is none. Rounding to nearest, ties to even, as the CPU does. */

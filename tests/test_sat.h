@@ -1,0 +1,1083 @@
+/* Tests of sat.h on the CPU. References: long double sums of the pixels of each box, one by one. */
+
+/* ---- scans */
+
+static const sat_scan_algorithm scan_algorithms[] = {SAT_SCAN_SEQUENTIAL, SAT_SCAN_RECURSIVE_DOUBLING, SAT_SCAN_BALANCED_TREE};
+static const int scan_ks[] = {2, 3, 4, 5, 6, 7, 8, 16, 64};
+static const size_t scan_sizes[] = {0, 1, 2, 3, 4, 5, 7, 8, 9, 15, 16, 17, 27, 31, 64, 65, 100, 243, 255, 256, 257, 1000, 4099};
+enum { SCAN_KS = sizeof scan_ks / sizeof *scan_ks, SCAN_SIZES = sizeof scan_sizes / sizeof *scan_sizes };
+
+static int scan_is_right(size_t n, const sat_scan_options *o, int in_place)
+{
+    uint32_t *in = (uint32_t *)malloc((n + 1) * 4), *out = (uint32_t *)malloc((n + 1) * 4), sum = 0;
+    uint64_t state = n + 1;
+    size_t i, wrong = 0;
+    for (i = 0; i < n; i++) in[i] = (uint32_t)support_random(&state);
+    if (in_place) memcpy(out, in, n * 4);
+    if (sat_scan_u32(out, in_place ? out : in, n, o) != SAT_OK) wrong++;
+    for (i = 0; i < n; i++) {
+        if (!o->exclusive) sum += in[i];
+        wrong += out[i] != sum;
+        if (o->exclusive) sum += in[i];
+    }
+    free(in);
+    free(out);
+    return wrong == 0;
+}
+
+TEST(scan_every_algorithm_k_and_length)
+{
+    int a, k, n, variant;
+    for (a = 0; a < 3; a++)
+        for (k = 0; k < SCAN_KS; k++)
+            for (n = 0; n < SCAN_SIZES; n++)
+                for (variant = 0; variant < 4; variant++) {
+                    sat_scan_options o = sat_scan_defaults();
+                    o.algorithm = scan_algorithms[a];
+                    o.k = scan_ks[k];
+                    o.exclusive = variant & 1;
+                    if (!EXPECT(scan_is_right(scan_sizes[n], &o, variant >> 1))) printf("algorithm %d k %d n %d variant %d\n", a, o.k, (int)scan_sizes[n], variant);
+                }
+}
+
+TEST(scan_counters_equal_the_closed_formulas)
+{
+    static const int ks[] = {2, 3, 4, 6, 8};
+    uint64_t *values = (uint64_t *)calloc(40000, 8);
+    int i;
+    for (i = 0; i < 5; i++) {
+        size_t k = (size_t)ks[i], m = 0, n = 1, offset, adds = 0, copies = 0, j;
+        sat_scan_counters c;
+        sat_scan_options o = sat_scan_defaults();
+        while (n * k < 40000) {
+            n *= k;
+            m++;
+        }
+        o.k = ks[i];
+        o.counters = &c;
+        o.algorithm = SAT_SCAN_BALANCED_TREE;
+        EXPECT_EQ(sat_scan_u64(values, values, n, &o), SAT_OK);
+        EXPECT_EQ(c.passes, 2 * m - 1);
+        EXPECT_EQ(c.nodes, (n * (k + 1) - 2 * k) / (k - 1)); /* eq 4.33 less the two roots */
+        EXPECT_EQ(c.writes, c.nodes);
+        EXPECT_EQ(c.copies, 0);
+        /* accesses n (k^2/2 + 7k/2 + 1) / (k - 1), smallest at k = 4, up to the top of the tree */
+        EXPECT_REL((double)(c.reads + c.writes), (double)n * ((double)(k * k) / 2 + 3.5 * (double)k + 1) / (double)(k - 1), 0.02);
+
+        o.algorithm = SAT_SCAN_RECURSIVE_DOUBLING;
+        EXPECT_EQ(sat_scan_u64(values, values, n, &o), SAT_OK);
+        EXPECT_EQ(c.passes, m);
+        for (offset = 1; offset < n; offset *= k) {
+            copies += offset - offset / k; /* 1, then (k-1) k^(i-2) */
+            for (j = 1; j < k; j++) adds += n - j * offset;
+        }
+        EXPECT_EQ(c.copies, copies);
+        EXPECT_EQ(c.adds, adds);
+        o.algorithm = SAT_SCAN_SEQUENTIAL;
+        EXPECT_EQ(sat_scan_u64(values, values, n, &o), SAT_OK);
+        EXPECT_EQ(c.adds, n - 1);
+    }
+    free(values);
+}
+
+TEST(scan_types_and_floats)
+{
+    enum { N = 3000 };
+    float *f = (float *)malloc(N * 4), *g = (float *)malloc(N * 4);
+    double *d = (double *)malloc(N * 8);
+    int32_t *s = (int32_t *)malloc(N * 4);
+    int a, i;
+    support_fill(f, N, 0, 1, 5);
+    for (a = 0; a < 3; a++) {
+        long double exact = 0;
+        int32_t sum = 0;
+        sat_scan_options o = sat_scan_defaults();
+        o.algorithm = scan_algorithms[a];
+        for (i = 0; i < N; i++) d[i] = (double)f[i], s[i] = i % 7 - 3;
+        EXPECT_EQ(sat_scan_f32(g, f, N, &o), SAT_OK);
+        EXPECT_EQ(sat_scan_f64(d, d, N, &o), SAT_OK);
+        EXPECT_EQ(sat_scan_i32(s, s, N, &o), SAT_OK);
+        for (i = 0; i < N; i++) {
+            exact += (long double)f[i];
+            sum += i % 7 - 3;
+            /* depth of the sum: i additions one after the other, else (k - 1) log_k n, twice for the tree */
+            EXPECT_REL(g[i], (double)exact, (a == 0 ? i + 1 : 40) * 6e-8);
+            EXPECT_REL(d[i], (double)exact, (a == 0 ? i + 1 : 40) * 1.2e-16);
+            EXPECT_EQ(s[i], sum);
+        }
+    }
+    free(f);
+    free(g);
+    free(d);
+    free(s);
+}
+
+/* 2x2 integer matrices: associative, not commutative */
+static void multiply_matrices(void *out, const void *left, const void *right, void *user)
+{
+    const uint32_t *a = (const uint32_t *)left, *b = (const uint32_t *)right;
+    uint32_t *c = (uint32_t *)out;
+    c[0] = a[0] * b[0] + a[1] * b[2];
+    c[1] = a[0] * b[1] + a[1] * b[3];
+    c[2] = a[2] * b[0] + a[3] * b[2];
+    c[3] = a[2] * b[1] + a[3] * b[3];
+    ++*(size_t *)user;
+}
+
+TEST(scan_any_operation_keeps_the_order)
+{
+    enum { N = 777 };
+    static uint32_t in[N][4], out[N][4], expected[N][4];
+    const uint32_t identity[4] = {1, 0, 0, 1};
+    uint64_t state = 3;
+    size_t calls = 0;
+    int i, a, k;
+    for (i = 0; i < N * 4; i++) in[i / 4][i % 4] = (uint32_t)support_random(&state);
+    memcpy(expected[0], in[0], 16);
+    for (i = 1; i < N; i++) multiply_matrices(expected[i], expected[i - 1], in[i], &calls);
+    for (a = 0; a < 3; a++)
+        for (k = 2; k < 10; k++) {
+            sat_scan_options o = sat_scan_defaults();
+            o.algorithm = scan_algorithms[a];
+            o.k = k;
+            EXPECT_EQ(sat_scan_any(out, in, N, 16, multiply_matrices, identity, &calls, &o), SAT_OK);
+            EXPECT(memcmp(out, expected, sizeof out) == 0);
+            o.exclusive = 1;
+            EXPECT_EQ(sat_scan_any(out, in, N, 16, multiply_matrices, identity, &calls, &o), SAT_OK);
+            EXPECT(memcmp(out[0], identity, 16) == 0 && memcmp(out[1], expected, sizeof out - 16) == 0);
+        }
+}
+
+TEST(scan_same_bits_for_any_worker_count)
+{
+    enum { N = 100003 };
+    static const int workers[] = {1, 2, 3, 7};
+    float *in = (float *)malloc(N * 4), *out = (float *)malloc(N * 4);
+    int a, w;
+    support_hdr_image(in, N, 1, 1, 9);
+    for (a = 1; a < 3; a++) {
+        uint64_t hash = 0;
+        for (w = 0; w < 8; w++) {
+            sat_scan_options o = sat_scan_defaults();
+            o.algorithm = scan_algorithms[a];
+            o.threads = w < 4 ? support_threads(workers[w]) : support_odd_threads(workers[w - 4]);
+            EXPECT_EQ(sat_scan_f32(out, in, N, &o), SAT_OK);
+            if (w == 0) hash = support_hash(out, N * 4);
+            EXPECT(support_hash(out, N * 4) == hash);
+        }
+    }
+    free(in);
+    free(out);
+}
+
+TEST(scan_refuses_bad_arguments_and_survives_a_failing_allocator)
+{
+    float v[4] = {1, 2, 3, 4};
+    support_memory m;
+    sat_scan_options o = sat_scan_defaults();
+    EXPECT_EQ(sat_scan_f32(NULL, v, 4, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_scan_f32(v, NULL, 4, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_scan_f32(NULL, NULL, 0, NULL), SAT_OK);
+    o.k = 1;
+    EXPECT_EQ(sat_scan_f32(v, v, 4, &o), SAT_ERR_ARGUMENT);
+    o.k = 65;
+    EXPECT_EQ(sat_scan_f32(v, v, 4, &o), SAT_ERR_ARGUMENT);
+    o = sat_scan_defaults();
+    o.threads.workers = 3;
+    EXPECT_EQ(sat_scan_f32(v, v, 4, &o), SAT_ERR_ARGUMENT);
+    o = sat_scan_defaults();
+    EXPECT_EQ(sat_scan_any(v, v, 4, 0, multiply_matrices, NULL, NULL, &o), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_scan_any(v, v, 4, 4, NULL, NULL, NULL, &o), SAT_ERR_ARGUMENT);
+    o.algorithm = SAT_SCAN_BALANCED_TREE;
+    o.allocator = support_allocator(&m);
+    m.fail_at = 1;
+    EXPECT_EQ(sat_scan_f32(v, v, 4, &o), SAT_ERR_MEMORY);
+    EXPECT(support_memory_clean(&m));
+    m.fail_at = 0;
+    EXPECT_EQ(sat_scan_f32(v, v, 4, &o), SAT_OK);
+    EXPECT(support_memory_clean(&m));
+    EXPECT_NEAR(v[3], 10, 0);
+}
+
+TEST(reduction_in_a_fixed_order)
+{
+    enum { N = 50021 };
+    float *v = (float *)malloc(3 * N * 4);
+    int k, i;
+    support_hdr_image(v, N, 1, 3, 4);
+    for (k = 2; k <= 16; k++) {
+        long double exact = 0;
+        for (i = 0; i < N; i++) exact += (long double)v[3 * i + 1];
+        EXPECT_REL(sat_reduce_f32(v + 1, N, 12, k), (double)exact, 17.0 * (k - 1) * 1.2e-16);
+        exact = 0;
+        for (i = 0; i < N; i++) exact += (long double)v[i];
+        EXPECT_REL(sat_reduce_f32(v, N, 4, k), (double)exact, 17.0 * (k - 1) * 1.2e-16);
+    }
+    EXPECT_NEAR(sat_reduce_f32(v, 0, 4, 4), 0, 0);
+    EXPECT_NEAR(sat_reduce_f32(v + 9, 10, -4, 4), sat_reduce_f32(v, 10, 4, 4), 1e-6 * sat_reduce_f32(v, 10, 4, 4));
+    free(v);
+}
+
+/* ---- tables */
+
+static const sat_kind kinds[] = {SAT_KIND_TILED, SAT_KIND_FLOAT, SAT_KIND_DOUBLE, SAT_KIND_FIXED32, SAT_KIND_FIXED64};
+static const int shapes[][2] = {{1, 1}, {2, 1}, {1, 2}, {1, 300}, {300, 1}, {7, 9}, {8, 8}, {31, 33}, {32, 32}, {33, 31}, {64, 65}, {129, 70}, {513, 20}, {20, 521}, {1030, 40}};
+enum { SHAPES = sizeof shapes / sizeof *shapes };
+
+/* One value of an image, with the rule for non-finite pixels left out. */
+static double pixel(const sat_image *view, int x, int y, int c)
+{
+    float v = 0;
+    if (x < 0 || y < 0 || x >= view->width || y >= view->height) return 0;
+    sat__read_row(&v, view, y, x, x + 1, c);
+    return (double)v;
+}
+
+static double exact_sum(const sat_image *view, int c, int x0, int y0, int x1, int y1)
+{
+    long double sum = 0;
+    int x, y;
+    for (y = y0 < 0 ? 0 : y0; y < y1 && y < view->height; y++)
+        for (x = x0 < 0 ? 0 : x0; x < x1 && x < view->width; x++) sum += (long double)pixel(view, x, y, c);
+    return (double)sum;
+}
+
+static void random_box(uint64_t *state, int w, int h, int largest, int box[4])
+{
+    box[0] = support_below(state, w + 6) - 3;
+    box[1] = support_below(state, h + 6) - 3;
+    box[2] = box[0] + 1 + support_below(state, largest);
+    box[3] = box[1] + 1 + support_below(state, largest);
+}
+
+static sat_table *build(const sat_image *view, const sat_options *options)
+{
+    sat_table *table = NULL;
+    EXPECT_EQ(sat_create(&table, view->width, view->height, view->channels, options), SAT_OK);
+    if (table) EXPECT_EQ(sat_build(table, view), SAT_OK);
+    return table;
+}
+
+/* Every random box within the stated bound, and a bit for the double that returns it. */
+static void check_boxes(const sat_table *t, const sat_image *view, int boxes, uint64_t seed)
+{
+    int i, c;
+    for (i = 0; i < boxes; i++) {
+        int b[4], w, h;
+        double exact, area;
+        c = i % view->channels;
+        random_box(&seed, view->width, view->height, i % 3 ? 12 : 90, b);
+        exact = exact_sum(view, c, b[0], b[1], b[2], b[3]);
+        w = sat__min_int(b[2], view->width) - sat__max_int(b[0], 0);
+        h = sat__min_int(b[3], view->height) - sat__max_int(b[1], 0);
+        area = w > 0 && h > 0 ? (double)w * h : 0;
+        EXPECT_NEAR(sat_sum(t, c, b[0], b[1], b[2], b[3]), exact, area * sat_error_bound(t, c, w > 0 ? w : 1, h > 0 ? h : 1));
+        if (area > 0) EXPECT_NEAR(sat_mean(t, c, b[0], b[1], b[2], b[3]), exact / area, 1.0001 * sat_error_bound(t, c, w, h) + 1e-300);
+        else EXPECT_NEAR(sat_mean(t, c, b[0], b[1], b[2], b[3]), 0, 0);
+    }
+}
+
+TEST(tables_of_every_kind_shape_and_format)
+{
+    static unsigned char memory[1030 * 70 * 4 * 4 + 600000];
+    int k, s, f, c;
+    for (s = 0; s < SHAPES; s++)
+        for (f = 0; f < 4; f++)
+            for (c = 1; c <= 4; c++) {
+                int w = shapes[s][0], h = shapes[s][1], i, n = w * h * c;
+                sat_image view;
+                uint64_t state = (uint64_t)(s * 17 + f * 5 + c);
+                if (c == 2 && f != 0 && f != 3) continue;
+                memset(&view, 0, sizeof view);
+                view.width = w;
+                view.height = h;
+                view.channels = c;
+                view.format = (sat_format)f;
+                view.stride = (ptrdiff_t)((size_t)(w * c) * sat__format_size(view.format));
+                if (f == 0) support_hdr_image((float *)(void *)memory, w, h, c, state);
+                for (i = 0; i < n; i++) {
+                    if (f == 1) memory[i] = (unsigned char)support_random(&state);
+                    if (f == 2) ((uint16_t *)(void *)memory)[i] = (uint16_t)support_random(&state);
+                    if (f == 3) ((uint16_t *)(void *)memory)[i] = sat__half_from_float((float)(100 * support_gaussian(&state)));
+                }
+                view.pixels = memory;
+                if (s % 2) { /* the same rows upside down in memory */
+                    view.pixels = memory + (ptrdiff_t)(h - 1) * view.stride;
+                    view.stride = -view.stride;
+                }
+                for (k = 0; k < 5; k++) {
+                    sat_options o = sat_defaults();
+                    sat_table *t;
+                    o.kind = kinds[k];
+                    o.tile = 8 << (s % 5);
+                    t = build(&view, &o);
+                    if (!t) continue;
+                    check_boxes(t, &view, 12, (uint64_t)s);
+                    sat_destroy(t);
+                }
+            }
+}
+
+TEST(integer_images_are_exact_in_fixed64_and_come_back)
+{
+    enum { W = 211, H = 97 };
+    static uint16_t wide[W * H];
+    static uint8_t narrow[W * H];
+    uint64_t state = 8;
+    int i, bits;
+    for (i = 0; i < W * H; i++) {
+        wide[i] = (uint16_t)support_random(&state);
+        narrow[i] = (uint8_t)support_random(&state);
+    }
+    for (bits = 8; bits <= 16; bits += 8) {
+        sat_options o = sat_defaults();
+        sat_image view;
+        sat_table *t;
+        view.width = W;
+        view.height = H;
+        view.channels = 1;
+        view.format = bits == 8 ? SAT_U8 : SAT_U16;
+        view.stride = W * bits / 8;
+        view.pixels = bits == 8 ? (const void *)narrow : (const void *)wide;
+        o.kind = SAT_KIND_FIXED64;
+        t = build(&view, &o);
+        for (i = 0; i < 2000; i++) {
+            int b[4];
+            random_box(&state, W, H, 100, b);
+            EXPECT_NEAR(sat_sum(t, 0, b[0], b[1], b[2], b[3]), exact_sum(&view, 0, b[0], b[1], b[2], b[3]), 0);
+            EXPECT_NEAR(sat_restore(t, 0, i % W, i % H), pixel(&view, i % W, i % H, 0), 0);
+        }
+        EXPECT_NEAR(sat_restore(t, 0, -1, 0), 0, 0);
+        sat_destroy(t);
+    }
+}
+
+TEST(fixed32_wraps_around_and_boxes_stay_exact)
+{
+    enum { W = 600, H = 500 };
+    float *p = (float *)malloc(W * H * 4);
+    sat_image view = sat_image_f32(p, W, H, 1);
+    sat_options o = sat_defaults();
+    sat_table *t;
+    uint64_t state = 1;
+    int i;
+    for (i = 0; i < W * H; i++) p[i] = (float)(support_below(&state, 1 << 20) - (1 << 19)) / 1024.0f;
+    o.kind = SAT_KIND_FIXED32;
+    o.quantum = 1.0 / 1024;
+    o.max_box_area = 41 * 41;
+    t = build(&view, &o);
+    for (i = 0; i < 3000; i++) {
+        int b[4];
+        random_box(&state, W, H, 41, b);
+        EXPECT_NEAR(sat_sum(t, 0, b[0], b[1], b[2], b[3]), exact_sum(&view, 0, b[0], b[1], b[2], b[3]), 0);
+    }
+    EXPECT_EQ(sat_get_statistics(t).clamped, 0);
+    sat_destroy(t);
+    o.max_value = 100; /* beyond it: clamped and counted */
+    t = build(&view, &o);
+    EXPECT(sat_get_statistics(t).clamped > 1000);
+    EXPECT_NEAR(sat_restore(t, 0, 5, 5), p[5 * W + 5] > 100 ? 100 : p[5 * W + 5] < -100 ? -100 : p[5 * W + 5], 0);
+    sat_destroy(t);
+    o.max_box_area = 4e9;
+    o.quantum = 0;
+    EXPECT_EQ(sat_create(&t, W, H, 1, &o), SAT_OK);
+    EXPECT_EQ(sat_build(t, &view), SAT_ERR_LIMIT);
+    sat_destroy(t);
+    free(p);
+}
+
+TEST(constant_images_are_exact_in_every_kind)
+{
+    static float p[150 * 130];
+    int k, i;
+    for (i = 0; i < 150 * 130; i++) p[i] = 0.75f;
+    for (k = 0; k < 5; k++) {
+        sat_image view = sat_image_f32(p, 150, 130, 1);
+        sat_options o = sat_defaults();
+        sat_table *t;
+        uint64_t state = 2;
+        o.kind = kinds[k];
+        t = build(&view, &o);
+        for (i = 0; i < 500; i++) {
+            int b[4];
+            random_box(&state, 150, 130, 140, b);
+            if (b[0] < 150 && b[1] < 130 && b[2] > 0 && b[3] > 0) EXPECT_NEAR(sat_mean(t, 0, b[0], b[1], b[2], b[3]), 0.75, 0);
+            EXPECT_NEAR(sat_mean_border(t, 0, b[0] + 0.25, b[1] + 0.5, b[2], b[3] + 0.125, SAT_BORDER_WRAP, SAT_BORDER_MIRROR), 0.75, 1e-15);
+        }
+        sat_destroy(t);
+    }
+}
+
+TEST(dark_boxes_of_high_dynamic_range)
+{
+    enum { W = 1500, H = 1100, BOXES = 4000 };
+    float *p = (float *)malloc((size_t)W * H * 4);
+    static double tiled[BOXES], flat[BOXES];
+    sat_image view = sat_image_f32(p, W, H, 1);
+    sat_options o = sat_defaults();
+    sat_table *t, *f;
+    uint64_t state = 3;
+    int i;
+    support_hdr_image(p, W, H, 1, 77);
+    t = build(&view, &o);
+    o.kind = SAT_KIND_FLOAT;
+    f = build(&view, &o);
+    for (i = 0; i < BOXES; i++) {
+        int x = support_below(&state, W - 3), y = support_below(&state, H - 3);
+        double exact = exact_sum(&view, 0, x, y, x + 3, y + 3);
+        tiled[i] = fabs(sat_sum(t, 0, x, y, x + 3, y + 3) - exact) / exact;
+        flat[i] = fabs(sat_sum(f, 0, x, y, x + 3, y + 3) - exact) / exact;
+    }
+    EXPECT(support_median(tiled, BOXES) <= 1e-5);
+    EXPECT(support_median(flat, BOXES) > 100 * support_median(tiled, BOXES));
+    REPORT("tiled 3x3 median relative error", support_median(tiled, BOXES), "");
+    REPORT("float 3x3 median relative error", support_median(flat, BOXES), "");
+    sat_destroy(t);
+    sat_destroy(f);
+    free(p);
+}
+
+TEST(mean_subtraction_helps_low_contrast)
+{
+    enum { W = 700, H = 600 };
+    float *p = (float *)malloc(W * H * 4);
+    sat_image view = sat_image_f32(p, W, H, 1);
+    double worst[2] = {0, 0};
+    int i, lowered;
+    support_fill(p, W * H, 0.9, 1.1, 6);
+    for (lowered = 0; lowered < 2; lowered++) {
+        sat_options o = sat_defaults();
+        sat_table *t;
+        uint64_t state = 2;
+        o.kind = SAT_KIND_FLOAT;
+        o.subtract_mean = lowered;
+        t = build(&view, &o);
+        check_boxes(t, &view, 300, 5);
+        for (i = 0; i < 2000; i++) {
+            int x = support_below(&state, W - 5), y = support_below(&state, H - 5);
+            double error = fabs(sat_sum(t, 0, x, y, x + 5, y + 5) - exact_sum(&view, 0, x, y, x + 5, y + 5));
+            if (error > worst[lowered]) worst[lowered] = error;
+        }
+        sat_destroy(t);
+    }
+    EXPECT(worst[1] * 20 < worst[0]);
+    free(p);
+}
+
+/* ---- real corners and borders, against the definition pixel by pixel */
+
+static double overlap(double a0, double a1, double b0, double b1)
+{
+    double low = a0 > b0 ? a0 : b0, high = a1 < b1 ? a1 : b1;
+    return high > low ? high - low : 0;
+}
+
+static int border_index(int i, int n, sat_border border)
+{
+    if (border == SAT_BORDER_CLAMP) return i < 0 ? 0 : i >= n ? n - 1 : i;
+    if (border == SAT_BORDER_WRAP) return ((i % n) + n) % n;
+    if (border == SAT_BORDER_MIRROR) {
+        i = ((i % (2 * n)) + 2 * n) % (2 * n);
+        return i < n ? i : 2 * n - 1 - i;
+    }
+    return i < 0 || i >= n ? -1 : i;
+}
+
+static double exact_border_mean(const sat_image *view, const double b[4], sat_border bx, sat_border by)
+{
+    long double sum = 0, area = 0;
+    int x, y;
+    for (y = (int)floor(b[1]) - 1; y < b[3]; y++)
+        for (x = (int)floor(b[0]) - 1; x < b[2]; x++) {
+            double weight = overlap(b[0], b[2], x, x + 1) * overlap(b[1], b[3], y, y + 1);
+            int ix = border_index(x, view->width, bx), iy = border_index(y, view->height, by);
+            if ((bx == SAT_BORDER_CLIP && ix < 0) || (by == SAT_BORDER_CLIP && iy < 0)) continue;
+            area += (long double)weight;
+            if (ix >= 0 && iy >= 0) sum += (long double)weight * (long double)pixel(view, ix, iy, 0);
+        }
+    return area > 0 ? (double)(sum / area) : 0;
+}
+
+TEST(borders_and_real_corners)
+{
+    static float p[23 * 17];
+    static const int sizes[][2] = {{23, 17}, {1, 17}, {23, 1}, {1, 1}, {5, 3}};
+    uint64_t state = 12;
+    int s, bx, by, i;
+    support_fill(p, 23 * 17, 0, 1, 4);
+    for (s = 0; s < 5; s++) {
+        sat_image view = sat_image_f32(p, sizes[s][0], sizes[s][1], 1);
+        sat_options o = sat_defaults();
+        sat_table *t;
+        o.kind = SAT_KIND_DOUBLE;
+        t = build(&view, &o);
+        for (bx = 0; bx < 5; bx++)
+            for (by = 0; by < 5; by++)
+                for (i = 0; i < 40; i++) {
+                    double b[4];
+                    b[0] = 60 * support_uniform(&state) - 30;
+                    b[1] = 60 * support_uniform(&state) - 30;
+                    b[2] = b[0] + 50 * support_uniform(&state);
+                    b[3] = b[1] + (i % 2 ? 50 : 3) * support_uniform(&state);
+                    if (i % 5 == 0) {
+                        b[0] = floor(b[0]);
+                        b[3] = ceil(b[3]);
+                    }
+                    EXPECT_NEAR(sat_mean_border(t, 0, b[0], b[1], b[2], b[3], (sat_border)bx, (sat_border)by),
+                                exact_border_mean(&view, b, (sat_border)bx, (sat_border)by), 1e-12);
+                    EXPECT_NEAR(sat_sum_fractional(t, 0, b[0], b[1], b[2], b[3]),
+                                exact_border_mean(&view, b, SAT_BORDER_CLIP, SAT_BORDER_CLIP) *
+                                    overlap(b[0], b[2], 0, view.width) * overlap(b[1], b[3], 0, view.height), 1e-10);
+                }
+        EXPECT_NEAR(sat_mean_border(t, 0, 2, 2, 2, 5, SAT_BORDER_WRAP, SAT_BORDER_WRAP), 0, 0);
+        EXPECT_NEAR(sat_mean_border(t, 0, sqrt(-1.0), 2, 3, 5, SAT_BORDER_WRAP, SAT_BORDER_WRAP), 0, 0);
+        EXPECT_NEAR(sat_mean_border(t, 0, -1e300, 2, 1e300, 5, SAT_BORDER_WRAP, SAT_BORDER_WRAP), 0, 0);
+        EXPECT_REL(sat_mean_border(t, 0, -1e6, -1e6, 1e6, 1e6, SAT_BORDER_WRAP, SAT_BORDER_MIRROR),
+                   sat_mean(t, 0, 0, 0, sizes[s][0], sizes[s][1]), 1e-4);
+        sat_destroy(t);
+    }
+}
+
+/* ---- filters and streams */
+
+static float *filtered(const sat_table *t, int w, int h, int c, int radius)
+{
+    float *out = (float *)malloc((size_t)(w * h * c) * 4);
+    EXPECT_EQ(sat_box_filter(out, (ptrdiff_t)((size_t)(w * c) * 4), t, radius), SAT_OK);
+    return out;
+}
+
+TEST(box_filters_are_the_means_they_promise)
+{
+    static float p[70 * 50 * 3], radii[70 * 50], out[70 * 50 * 3];
+    static const int rs[] = {0, 1, 5, 20, 1000};
+    sat_image view = sat_image_f32(p, 70, 50, 3);
+    int k, i, x, y, c;
+    support_hdr_image(p, 70, 50, 3, 3);
+    for (i = 0; i < 70 * 50; i++) radii[i] = (float)(i % 50) * 0.3f - 1;
+    radii[0] = (float)sqrt(-1.0);
+    radii[1] = 1e30f;
+    for (k = 0; k < 5; k++) {
+        sat_options o = sat_defaults();
+        sat_table *t;
+        o.kind = kinds[k];
+        t = build(&view, &o);
+        for (i = 0; i < 5; i++) {
+            float *means = filtered(t, 70, 50, 3, rs[i]);
+            for (y = 0; y < 50; y++)
+                for (x = 0; x < 70; x++)
+                    for (c = 0; c < 3; c++)
+                        EXPECT_NEAR(means[(y * 70 + x) * 3 + c], (float)sat_mean(t, c, x - rs[i], y - rs[i], x + rs[i] + 1, y + rs[i] + 1), 0);
+            free(means);
+        }
+        EXPECT_EQ(sat_box_filter_variable(out, 70 * 12, t, radii, 70 * 4), SAT_OK);
+        for (i = 0; i < 70 * 50; i++) {
+            double reach = radii[i] > 0 ? (double)radii[i] + 0.5 : 0.5;
+            x = i % 70;
+            y = i / 70;
+            if (i == 1) reach = 120;
+            EXPECT_REL(out[i * 3 + 1], sat_mean_border(t, 1, x + 0.5 - reach, y + 0.5 - reach, x + 0.5 + reach, y + 0.5 + reach, SAT_BORDER_CLIP, SAT_BORDER_CLIP), 1e-6);
+        }
+        EXPECT_EQ(sat_box_filter(out, 70 * 12, t, -1), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(sat_box_filter(out, 70 * 12 - 4, t, 1), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(sat_box_filter(NULL, 70 * 12, t, 1), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(sat_box_filter_variable(out, 70 * 12, t, NULL, 70 * 4), SAT_ERR_ARGUMENT);
+        sat_destroy(t);
+    }
+}
+
+TEST(streams_equal_the_whole_image_bit_for_bit)
+{
+    enum { W = 140, H = 333 };
+    static float p[W * H * 2], row_out[W * 2];
+    static const int rs[] = {0, 1, 7, 15, 16, 31, 40, 400};
+    sat_image view = sat_image_f32(p, W, H, 2);
+    int k, r;
+    support_hdr_image(p, W, H, 2, 8);
+    p[999] = (float)sqrt(-1.0);
+    p[2000] = (float)HUGE_VAL;
+    for (k = 0; k < 5; k++)
+        for (r = 0; r < 8; r++) {
+            sat_options o = sat_defaults();
+            sat_table *t;
+            sat_stream *s;
+            float *whole;
+            int y, given = 0, got;
+            o.kind = kinds[k];
+            o.quantum = kinds[k] == SAT_KIND_FIXED32 ? 4096 : 1e-3;
+            if (!sat__is_fixed(o.kind)) o.quantum = 0;
+            o.max_value = 1e8;
+            o.max_box_area = (2.0 * rs[r] + 1) * (2.0 * rs[r] + 1);
+            if (o.kind == SAT_KIND_FIXED32 && rs[r] > 31) continue;
+            o.tile = 8 << r % 4;
+            t = build(&view, &o);
+            whole = filtered(t, W, H, 2, rs[r]);
+            if (!EXPECT_EQ(sat_stream_create(&s, W, 2, rs[r], &o), SAT_OK)) return;
+            for (y = 0;; y++) {
+                sat_image row = sat_image_f32(p + (size_t)y * W * 2, W, 1, 2);
+                EXPECT_EQ(sat_stream_push(s, row_out, &got, y < H ? &row : NULL), SAT_OK);
+                if (y >= H && !got) break;
+                if (!got) continue;
+                if (!EXPECT(memcmp(row_out, whole + (size_t)given * W * 2, sizeof row_out) == 0)) printf("kind %d radius %d row %d\n", k, rs[r], given);
+                given++;
+            }
+            EXPECT_EQ(given, H);
+            sat_stream_destroy(s);
+            sat_destroy(t);
+            free(whole);
+        }
+}
+
+/* ---- workers, updates, bad pixels */
+
+static uint64_t table_hash(const sat_table *t, int w, int h, int c)
+{
+    uint64_t hash = 1;
+    int x, y, i;
+    for (i = 0; i < c; i++)
+        for (y = 1; y <= h; y += 3)
+            for (x = 1; x <= w; x++) {
+                double sums[2];
+                sums[0] = sat_sum(t, i, 0, 0, x, y);
+                sums[1] = sat_sum(t, i, x - 5, y - 4, x, y);
+                hash = support_hash_add(hash, sums, sizeof sums);
+            }
+    return hash;
+}
+
+TEST(tables_same_bits_for_any_worker_count)
+{
+    enum { W = 1700, H = 203 };
+    static const int workers[] = {1, 2, 3, 7};
+    float *p = (float *)malloc(W * H * 2 * 4);
+    int k, w, c;
+    support_hdr_image(p, W, H, 2, 8);
+    p[777] = -p[777];
+    p[W * 150] = (float)sqrt(-1.0);
+    for (c = 1; c <= 2; c++)
+        for (k = 0; k < 5; k++) {
+            uint64_t hash = 0, filter_hash = 0;
+            double bound = 0;
+            for (w = 0; w < 8; w++) {
+                sat_image view = sat_image_f32(p, W, H, c);
+                sat_options o = sat_defaults();
+                sat_table *t;
+                float *out;
+                o.kind = kinds[k];
+                o.threads = w < 4 ? support_threads(workers[w]) : support_odd_threads(workers[w - 4]);
+                t = build(&view, &o);
+                out = filtered(t, W, H, c, 4);
+                if (w == 0) {
+                    hash = table_hash(t, W, H, c);
+                    filter_hash = support_hash(out, (size_t)(W * H * c) * 4);
+                    bound = sat_error_bound(t, 0, 3, 3);
+                }
+                EXPECT(table_hash(t, W, H, c) == hash);
+                EXPECT(support_hash(out, (size_t)(W * H * c) * 4) == filter_hash);
+                EXPECT_NEAR(sat_error_bound(t, 0, 3, 3), bound, 0);
+                EXPECT_EQ(sat_get_statistics(t).nan, W * 150 < W * H * c ? 1 : 0);
+                free(out);
+                sat_destroy(t);
+            }
+        }
+    free(p);
+}
+
+TEST(updates_equal_fresh_builds)
+{
+    enum { W = 300, H = 210 };
+    static float p[W * H];
+    sat_image view = sat_image_f32(p, W, H, 1);
+    int k, i;
+    for (k = 0; k < 5; k++) {
+        sat_options o = sat_defaults();
+        sat_table *t, *fresh;
+        uint64_t state = 5;
+        o.kind = kinds[k];
+        o.quantum = sat__is_fixed(o.kind) ? 0.25 : 0;
+        o.max_box_area = 90 * 90;
+        o.tile = 16;
+        support_hdr_image(p, W, H, 1, 8);
+        t = build(&view, &o);
+        for (i = 0; i < 25; i++) {
+            int x0 = support_below(&state, W), y0 = support_below(&state, H), x, y;
+            int x1 = sat__min_int(W, x0 + 1 + support_below(&state, 70)), y1 = sat__min_int(H, y0 + 1 + support_below(&state, 70));
+            for (y = y0; y < y1; y++)
+                for (x = x0; x < x1; x++) p[y * W + x] = (float)pow(10, 5 * support_uniform(&state)) * (i % 3 ? 1.0f : -1.0f);
+            if (i == 9) p[y0 * W + x0] = (float)sqrt(-1.0);
+            EXPECT_EQ(sat_update(t, &view, x0, y0, x1, y1), SAT_OK);
+            fresh = build(&view, &o);
+            EXPECT(table_hash(t, W, H, 1) == table_hash(fresh, W, H, 1));
+            EXPECT_NEAR(sat_error_bound(t, 0, 5, 5), sat_error_bound(fresh, 0, 5, 5), 0);
+            sat_destroy(fresh);
+        }
+        EXPECT_EQ(sat_update(t, &view, 0, 0, 0, 5), SAT_OK);
+        EXPECT_EQ(sat_update(t, &view, -1, 0, 5, 5), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(sat_update(t, &view, 0, 0, W + 1, 5), SAT_ERR_ARGUMENT);
+        sat_destroy(t);
+    }
+}
+
+TEST(a_bad_pixel_changes_no_box_without_it)
+{
+    enum { W = 150, H = 120, X = 70, Y = 45 };
+    static float p[W * H];
+    static const float bad[] = {(float)HUGE_VAL, -(float)HUGE_VAL, 3e38f, -3e38f};
+    int k, b, i;
+    for (k = 0; k < 5; k++)
+        for (b = 0; b < 5; b++) {
+            float value = b < 4 ? bad[b] : (float)sqrt(-1.0);
+            sat_image view = sat_image_f32(p, W, H, 1);
+            sat_options o = sat_defaults();
+            sat_table *t, *without;
+            sat_statistics s;
+            uint64_t state = 4;
+            o.kind = kinds[k];
+            if (sat__is_fixed(o.kind)) o.max_value = 1e6;
+            support_fill(p, W * H, 0, 1000, 9);
+            p[Y * W + X] = 0;
+            without = build(&view, &o);
+            p[Y * W + X] = value;
+            t = build(&view, &o);
+            s = sat_get_statistics(t);
+            EXPECT_EQ(s.nan, b == 4 ? 1 : 0);
+            EXPECT_EQ(s.infinite, b < 2 ? 1 : 0);
+            for (i = 0; i < 3000; i++) {
+                int box[4];
+                double got, expected;
+                random_box(&state, W, H, i % 2 ? 9 : 60, box);
+                if (X >= box[0] && X < box[2] && Y >= box[1] && Y < box[3]) continue;
+                got = sat_sum(t, 0, box[0], box[1], box[2], box[3]);
+                expected = sat_sum(without, 0, box[0], box[1], box[2], box[3]);
+                if (b == 4 || sat__is_fixed(o.kind)) EXPECT_NEAR(got, expected, 0);
+                else EXPECT(fabs(got) < 1e39 && got - got <= 0); /* finite, if not precise beside 1e35 */
+            }
+            sat_destroy(t);
+            o.non_finite = SAT_NON_FINITE_REFUSE;
+            EXPECT_EQ(sat_create(&t, W, H, 1, &o), SAT_OK);
+            EXPECT_EQ(sat_build(t, &view), b == 4 || b < 2 ? SAT_ERR_NON_FINITE : SAT_OK);
+            if (b == 4 || b < 2) {
+                EXPECT_NEAR(sat_sum(t, 0, 0, 0, W, H), 0, 0);
+                p[Y * W + X] = 1;
+                EXPECT_EQ(sat_update(t, &view, X, Y, X + 1, Y + 1), SAT_OK);
+                EXPECT_REL(sat_sum(t, 0, 0, 0, W, H), sat_sum(without, 0, 0, 0, W, H) + 1, 1e-5);
+            }
+            sat_destroy(t);
+            sat_destroy(without);
+        }
+}
+
+TEST(extreme_floats_keep_finite_sums)
+{
+    enum { W = 400, H = 300 };
+    static float p[W * H];
+    sat_image view = sat_image_f32(p, W, H, 1);
+    int k, i, pattern;
+    for (pattern = 0; pattern < 4; pattern++)
+        for (k = 0; k < 5; k++) {
+            sat_options o = sat_defaults();
+            sat_table *t;
+            uint64_t state = 6;
+            for (i = 0; i < W * H; i++) {
+                double sign = support_uniform(&state) < 0.5 ? -1 : 1, exponent = 76 * support_uniform(&state) - 38;
+                p[i] = pattern == 0 ? 3.4e38f : pattern == 1 ? (float)(sign * 1.7 * pow(10, exponent)) : pattern == 2 ? 1e-44f : (float)(sign * 3.4e38);
+            }
+            o.kind = kinds[k];
+            t = build(&view, &o);
+            for (i = 0; i < 500; i++) {
+                int b[4];
+                double sum;
+                random_box(&state, W, H, 80, b);
+                sum = sat_sum(t, 0, b[0], b[1], b[2], b[3]);
+                EXPECT(sat__is_finite_double(sum));
+                if (pattern == 2 && !sat__is_fixed(o.kind)) EXPECT_NEAR(sum, exact_sum(&view, 0, b[0], b[1], b[2], b[3]), 1e-44);
+            }
+            sat_destroy(t);
+        }
+}
+
+TEST(real_pictures_with_nan_infinity_and_every_half)
+{
+    static const char *const names[] = {"hdr/BrightRingsNanInf.exr", "hdr/AllHalfValues.exr", "hdr/WideFloatRange.exr", "hdr/Desk.exr"};
+    int i, k;
+    for (i = 0; i < 4; i++) {
+        const char *path = support_data(names[i]);
+        image picture;
+        if (!path) SKIP("needs hdr/*.exr in ../shared/data or $LIGHTSCAN_DATA");
+        if (!image_load(&picture, path)) SKIP("needs libopenexr-dev");
+        for (k = 0; k < 5; k++) {
+            sat_image view = sat_image_f32(picture.pixels, picture.width, picture.height, picture.channels);
+            sat_options o = sat_defaults();
+            sat_table *t;
+            double sum;
+            o.kind = kinds[k];
+            t = build(&view, &o);
+            sum = sat_sum(t, 0, 0, 0, view.width, view.height);
+            EXPECT(sat__is_finite_double(sum));
+            if (i == 0) EXPECT(sat_get_statistics(t).nan + sat_get_statistics(t).infinite > 0);
+            sat_destroy(t);
+        }
+        image_free(&picture);
+    }
+}
+
+/* ---- bounds and plans */
+
+enum { BOUND_W = 640, BOUND_H = 480, BOUND_IMAGES = 4, BOUND_BOXES = 5 };
+
+static void bound_image(float *p, int which)
+{
+    uint64_t state = 99;
+    int i;
+    if (which == 1) support_hdr_image(p, BOUND_W, BOUND_H, 1, 5);
+    else
+        for (i = 0; i < BOUND_W * BOUND_H; i++) p[i] = (float)(which == 3 ? support_gaussian(&state) : support_uniform(&state));
+    if (which == 2) p[BOUND_W * 100 + 200] = 1e8f;
+}
+
+TEST(error_bounds_hold_and_the_expected_error_is_near)
+{
+    static float p[BOUND_W * BOUND_H];
+    static const int boxes[BOUND_BOXES] = {1, 3, 11, 41, 201};
+    int which, k, b, i;
+    for (which = 0; which < BOUND_IMAGES; which++) {
+        bound_image(p, which);
+        for (k = 0; k < 5; k++) {
+            sat_image view = sat_image_f32(p, BOUND_W, BOUND_H, 1);
+            sat_options o = sat_defaults();
+            sat_table *t;
+            o.kind = kinds[k];
+            t = build(&view, &o);
+            for (b = 0; b < BOUND_BOXES; b++) {
+                uint64_t state = 7;
+                int n = boxes[b] > 100 ? 60 : 600;
+                double squares = 0, worst = 0, rms;
+                for (i = 0; i < n; i++) {
+                    int x = support_below(&state, BOUND_W - boxes[b]), y = support_below(&state, BOUND_H - boxes[b]);
+                    double area = (double)boxes[b] * boxes[b];
+                    double e = fabs(sat_sum(t, 0, x, y, x + boxes[b], y + boxes[b]) - exact_sum(&view, 0, x, y, x + boxes[b], y + boxes[b])) / area;
+                    squares += e * e;
+                    if (e > worst) worst = e;
+                }
+                rms = sqrt(squares / n);
+                EXPECT(worst <= sat_error_bound(t, 0, boxes[b], boxes[b]));
+                if (which < 2 && kinds[k] != (which ? SAT_KIND_FIXED32 : SAT_KIND_DOUBLE) && rms > 0) {
+                    double ratio = sat_error_rms(t, 0, boxes[b], boxes[b]) / rms;
+                    if (!EXPECT(ratio > 1.0 / 3 && ratio < 3)) printf("image %d kind %d box %d ratio %g\n", which, k, boxes[b], ratio);
+                }
+            }
+            sat_destroy(t);
+        }
+    }
+}
+
+TEST(plan_takes_the_cheapest_kind_that_is_good_enough)
+{
+    static float p[500 * 400];
+    sat_image view = sat_image_f32(p, 500, 400, 1);
+    sat_kind kind;
+    support_fill(p, 500 * 400, 0, 1, 3);
+    EXPECT_EQ(sat_plan(&kind, &view, 101, 101, 0.1, 0, NULL), SAT_OK);
+    EXPECT_EQ(kind, SAT_KIND_FLOAT);
+    EXPECT_EQ(sat_plan(&kind, &view, 3, 3, 1e-2, 0, NULL), SAT_OK);
+    EXPECT(kind == SAT_KIND_FIXED32 || kind == SAT_KIND_TILED);
+    EXPECT_EQ(sat_plan(&kind, &view, 3, 3, 1e-8, 0, NULL), SAT_OK);
+    EXPECT_EQ(kind, SAT_KIND_DOUBLE);
+    EXPECT_EQ(sat_plan(&kind, &view, 3, 3, 1e-10, 0, NULL), SAT_OK);
+    EXPECT_EQ(kind, SAT_KIND_FIXED64);
+    EXPECT_EQ(sat_plan(&kind, &view, 3, 3, 1e-9, 500 * 400 * 5, NULL), SAT_ERR_LIMIT);
+    EXPECT(kind != SAT_KIND_DOUBLE && kind != SAT_KIND_FIXED64);
+    EXPECT_EQ(sat_plan(&kind, &view, 3, 3, 0, 0, NULL), SAT_ERR_LIMIT);
+    EXPECT_EQ(sat_plan(NULL, &view, 3, 3, 1e-9, 0, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_plan(&kind, &view, 0, 3, 1e-9, 0, NULL), SAT_ERR_ARGUMENT);
+}
+
+TEST(plans_keep_their_word)
+{
+    static float p[BOUND_W * BOUND_H];
+    int which, e, i;
+    for (which = 0; which < BOUND_IMAGES; which++)
+        for (e = 1; e < 8; e++) {
+            sat_image view = sat_image_f32(p, BOUND_W, BOUND_H, 1);
+            double allowed = pow(10, -e), mean = 0;
+            sat_options o = sat_defaults();
+            sat_table *t;
+            uint64_t state = 3;
+            bound_image(p, which);
+            o.max_box_area = 7 * 7;
+            if (sat_plan(&o.kind, &view, 7, 7, allowed, 0, &o) != SAT_OK) continue;
+            t = build(&view, &o);
+            for (i = 0; i < BOUND_W * BOUND_H; i++) mean += fabs((double)p[i]) / (BOUND_W * BOUND_H);
+            for (i = 0; i < 500; i++) {
+                int x = support_below(&state, BOUND_W - 7), y = support_below(&state, BOUND_H - 7);
+                EXPECT_NEAR(sat_mean(t, 0, x, y, x + 7, y + 7), exact_sum(&view, 0, x, y, x + 7, y + 7) / 49, allowed * mean);
+            }
+            sat_destroy(t);
+        }
+}
+
+/* ---- memory, arguments, small functions */
+
+TEST(one_allocation_at_create_and_none_afterwards)
+{
+    static float p[100 * 90], out[100 * 90];
+    sat_image view = sat_image_f32(p, 100, 90, 1);
+    int k;
+    support_fill(p, 100 * 90, -1, 1, 2);
+    for (k = 0; k < 5; k++) {
+        support_memory m;
+        sat_options o = sat_defaults();
+        sat_table *t;
+        sat_stream *s;
+        o.kind = kinds[k];
+        o.allocator = support_allocator(&m);
+        EXPECT_EQ(sat_create(&t, 100, 90, 1, &o), SAT_OK);
+        EXPECT_EQ(sat_build(t, &view), SAT_OK);
+        EXPECT_EQ(sat_update(t, &view, 3, 4, 50, 60), SAT_OK);
+        EXPECT_EQ(sat_box_filter(out, 400, t, 3), SAT_OK);
+        EXPECT_EQ(m.calls, 1);
+        EXPECT_EQ(m.peak, sat_get_statistics(t).bytes);
+        sat_destroy(t);
+        EXPECT(support_memory_clean(&m));
+        m.fail_at = m.calls + 1;
+        EXPECT_EQ(sat_create(&t, 100, 90, 1, &o), SAT_ERR_MEMORY);
+        EXPECT(t == NULL);
+        o.max_value = 1;
+        m.fail_at = m.calls + 1;
+        EXPECT_EQ(sat_stream_create(&s, 100, 1, 3, &o), SAT_ERR_MEMORY);
+        m.fail_at = m.calls + 2;
+        EXPECT_EQ(sat_stream_create(&s, 100, 1, 3, &o), SAT_ERR_MEMORY);
+        EXPECT(s == NULL && support_memory_clean(&m));
+    }
+    sat_destroy(NULL);
+    sat_stream_destroy(NULL);
+}
+
+TEST(bad_arguments_are_refused)
+{
+    static float p[64];
+    sat_image view = sat_image_f32(p, 8, 8, 1), bad;
+    sat_options o = sat_defaults();
+    sat_table *t;
+    sat_stream *s;
+    const unsigned nine = 9;
+    EXPECT_EQ(sat_create(NULL, 8, 8, 1, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_create(&t, 0, 8, 1, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_create(&t, 8, -1, 1, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_create(&t, 8, 8, 0, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_create(&t, 8, 8, 5, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_create(&t, 0x7ffffffe, 0x7ffffffe, 4, NULL), SAT_ERR_SIZE);
+    o.tile = 33;
+    EXPECT_EQ(sat_create(&t, 8, 8, 1, &o), SAT_ERR_ARGUMENT);
+    o.tile = 0;
+    EXPECT_EQ(sat_create(&t, 8, 8, 1, &o), SAT_ERR_ARGUMENT);
+    o = sat_defaults();
+    o.subtract_mean = 1;
+    EXPECT_EQ(sat_create(&t, 8, 8, 1, &o), SAT_ERR_ARGUMENT);
+    o = sat_defaults();
+    o.max_value = sqrt(-1.0);
+    EXPECT_EQ(sat_create(&t, 8, 8, 1, &o), SAT_ERR_ARGUMENT);
+    o = sat_defaults();
+    o.allocator.alloc = support_alloc;
+    EXPECT_EQ(sat_create(&t, 8, 8, 1, &o), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_create(&t, 8, 8, 1, NULL), SAT_OK);
+    EXPECT_EQ(sat_build(t, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_build(NULL, &view), SAT_ERR_ARGUMENT);
+    bad = view;
+    bad.width = 7;
+    EXPECT_EQ(sat_build(t, &bad), SAT_ERR_MISMATCH);
+    bad = view;
+    bad.stride = 28;
+    EXPECT_EQ(sat_build(t, &bad), SAT_ERR_ARGUMENT);
+    bad = view;
+    bad.stride = 33;
+    EXPECT_EQ(sat_build(t, &bad), SAT_ERR_ARGUMENT);
+    bad = view;
+    memcpy(&bad.format, &nine, sizeof bad.format);
+    EXPECT_EQ(sat_build(t, &bad), SAT_ERR_ARGUMENT);
+    EXPECT_NEAR(sat_sum(NULL, 0, 0, 0, 1, 1) + sat_sum(t, 1, 0, 0, 1, 1) + sat_sum(t, -1, 0, 0, 1, 1), 0, 0);
+    EXPECT_NEAR(sat_error_bound(t, 3, 1, 1) + sat_error_rms(NULL, 0, 1, 1), 0, 0);
+    sat_destroy(t);
+    o = sat_defaults();
+    o.kind = SAT_KIND_FIXED64;
+    EXPECT_EQ(sat_stream_create(&s, 8, 1, 2, &o), SAT_ERR_ARGUMENT); /* no largest value */
+    EXPECT_EQ(sat_stream_create(&s, 8, 1, -1, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_stream_create(&s, 8, 1, 2, NULL), SAT_OK);
+    EXPECT_EQ(sat_stream_push(s, p, NULL, &view), SAT_ERR_ARGUMENT);
+    sat_stream_destroy(s);
+}
+
+TEST(result_texts_and_version)
+{
+    const unsigned ninety_nine = 99;
+    sat_result unknown;
+    int i, j;
+    for (i = 0; i < SAT_RESULT_COUNT; i++) {
+        EXPECT(strlen(sat_result_text((sat_result)i)) > 5);
+        for (j = 0; j < i; j++) EXPECT(strcmp(sat_result_text((sat_result)i), sat_result_text((sat_result)j)) != 0);
+    }
+    memcpy(&unknown, &ninety_nine, sizeof unknown);
+    EXPECT(strcmp(sat_result_text(unknown), "unknown result") == 0);
+    EXPECT_EQ(sat_version(), SAT_VERSION);
+}
+
+TEST(half_floats_there_and_back)
+{
+    uint32_t h;
+    uint64_t state = 5;
+    int i;
+    for (h = 0; h < 65536; h++) {
+        float f = sat__half_to_float((uint16_t)h);
+        if (sat__is_nan(f)) EXPECT((h & 0x7fff) > 0x7c00 && (sat__half_from_float(f) & 0x7fff) > 0x7c00);
+        else EXPECT_EQ(sat__half_from_float(f), h);
+    }
+    for (i = 0; i < 100000; i++) { /* nearest: no neighbour is nearer */
+        float v = (float)(pow(2, 45 * support_uniform(&state) - 28) * (i % 2 ? 1 : -1)), back;
+        uint16_t half = sat__half_from_float(v), next = (uint16_t)(half + 1), previous = (uint16_t)(half - 1);
+        back = sat__half_to_float(half);
+        if (!sat__is_finite(back)) {
+            EXPECT(fabs((double)v) >= 65520);
+            continue;
+        }
+        if (sat__is_finite(sat__half_to_float(next))) EXPECT(fabs((double)back - (double)v) <= fabs((double)sat__half_to_float(next) - (double)v));
+        if (half & 0x7fff) EXPECT(fabs((double)back - (double)v) <= fabs((double)sat__half_to_float(previous) - (double)v));
+    }
+}
+
+TEST(srgb_there_and_back)
+{
+    int i;
+    for (i = 0; i <= 255; i++) EXPECT_NEAR(sat__srgb_encode(sat__srgb_decode((float)i / 255)) * 255, i, 2e-4);
+    EXPECT_NEAR(sat__srgb_encode((float)sqrt(-1.0)), 0, 0);
+    EXPECT_NEAR(sat__srgb_encode(7), 1, 0);
+    EXPECT_NEAR(sat__luminance(1, 1, 1), 1, 1e-6);
+}
+
+#ifdef SAT__VECTOR
+TEST(vector_rows_equal_plain_rows_bit_for_bit)
+{
+    enum { N = 1003 };
+    static float in[N], out[2][N + 16], column[2][N + 16];
+    static double out64[2][N + 16], column64[2][N + 16];
+    int n, i;
+    support_hdr_image(in, N, 1, 1, 5);
+    for (i = 0; i < N; i += 3) in[i] = -in[i];
+    for (n = 0; n < N; n += n < 70 ? 1 : 97) {
+        int32_t signs[2] = {0, 0};
+        float last[2];
+        double last64[2];
+        memset(column, 0, sizeof column);
+        memset(column64, 0, sizeof column64);
+        for (i = 0; i < 3; i++) {
+            last[0] = sat__sum_row_f32(out[0], column[0], in, n, 0.5f, 0, &signs[0]);
+            last[1] = sat__sum_row_plain_f32(out[1], column[1], in, n, 0.5f, &signs[1]);
+            last64[0] = sat__sum_row_f64(out64[0], column64[0], in, n, 0.5, 0, &signs[0]);
+            last64[1] = sat__sum_row_plain_f64(out64[1], column64[1], in, n, 0.5, &signs[1]);
+        }
+        EXPECT(memcmp(out[0], out[1], (size_t)n * 4) == 0 && memcmp(column[0], column[1], (size_t)n * 4) == 0);
+        EXPECT(memcmp(out64[0], out64[1], (size_t)n * 8) == 0 && memcmp(column64[0], column64[1], (size_t)n * 8) == 0);
+        EXPECT(memcmp(&last[0], &last[1], 4) == 0 && memcmp(&last64[0], &last64[1], 8) == 0);
+        EXPECT_EQ(signs[0] < 0, signs[1] < 0);
+    }
+}
+#endif
