@@ -881,7 +881,7 @@ TEST(plan_takes_the_cheapest_kind_that_is_good_enough)
     EXPECT_EQ(kind, SAT_KIND_FLOAT);
     EXPECT_EQ(sat_plan(&kind, &view, 3, 3, 1e-2, 0, NULL), SAT_OK);
     EXPECT(kind == SAT_KIND_FIXED32 || kind == SAT_KIND_TILED);
-    EXPECT_EQ(sat_plan(&kind, &view, 3, 3, 1e-8, 0, NULL), SAT_OK);
+    EXPECT_EQ(sat_plan(&kind, &view, 101, 101, 1e-7, 0, NULL), SAT_OK);
     EXPECT_EQ(kind, SAT_KIND_DOUBLE);
     EXPECT_EQ(sat_plan(&kind, &view, 3, 3, 1e-10, 0, NULL), SAT_OK);
     EXPECT_EQ(kind, SAT_KIND_FIXED64);
