@@ -86,13 +86,14 @@ build/%_view: examples/%_view.c
 build/%: examples/%.c
 	$(COMPILE_C) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
 
-# make demo [IN=picture.exr] [ARGS='--gl ...']
-DEMO := $(patsubst examples/%.c,build/%,$(firstword $(wildcard examples/demo.c examples/tonemap.c)))
+# make demo [IN=picture.exr] [ARGS='--gl ...']; without IN the first picture there is, else one that the program makes up
+DEMO    := $(patsubst examples/%.c,%,$(firstword $(wildcard examples/demo.c examples/tonemap.c)))
+FOUND   := $(if $(EXR),$(firstword $(wildcard ../shared/data/hdr/StillLife.exr ../shared/data/hdr/*.exr data/env/*.exr)))
 demo: deps
 	@$(MAKE) --no-print-directory run-demo
-run-demo: $(DEMO)
+run-demo: build/$(DEMO)
 	@mkdir -p out
-	$(DEMO) $(ARGS) $(IN) $(if $(filter build/demo,$(DEMO)),--out )out/demo.png
+	build/$(DEMO) --stats --out out/demo.png $(ARGS) $(or $(IN),$(if $(filter tonemap,$(DEMO)),$(FOUND)))
 
 # ---- tests -----------------------------------------------------------------------------------------------------
 
