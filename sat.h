@@ -265,7 +265,7 @@ extern const int sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file;
 extern "C" {
 #endif
 
-/* How the table texture stores sums. */
+/* How the table texture stores sums. ES 3.0 and WebGL 2 need EXT_color_buffer_float for the first two. */
 typedef enum sat_gl_format {
     SAT_GL_TWO_FLOAT, /* RG32F: the sum of two floats, about 48 bits; for HDR */
     SAT_GL_FLOAT,     /* R32F: as SAT_KIND_FLOAT, only for large boxes or small images */
@@ -315,7 +315,7 @@ SAT_DEF double sat_gl_quantum(const sat_gl *gl);
 SAT_DEF sat_result sat_gl_mean(sat_gl *gl, float *mean, unsigned texture, int width, int height);
 SAT_DEF unsigned sat_gl_mean_texture(const sat_gl *gl);
 
-/* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader; boxes are half-open and clipped, as in C:
+/* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader, once or more; boxes are half-open and clipped, as in C:
 
        float sat_sum(sampler2D table, ivec2 low, ivec2 high)               4 fetches
        float sat_mean(sampler2D table, ivec2 low, ivec2 high)              by the clipped area; empty: 0
@@ -850,7 +850,6 @@ enum {
     X(int, GetUniformLocation, (unsigned program, const char *name))                                                   \
     X(unsigned char, IsEnabled, (unsigned capability))                                                                 \
     X(void, LinkProgram, (unsigned program))                                                                           \
-    X(void *, MapBufferRange, (unsigned target, ptrdiff_t offset, ptrdiff_t size, unsigned access))                    \
     X(void, PixelStorei, (unsigned name, int value))                                                                   \
     X(void, ReadBuffer, (unsigned source))                                                                             \
     X(void, ReadPixels, (int x, int y, int width, int height, unsigned format, unsigned type, void *pixels))           \
@@ -879,15 +878,16 @@ enum {
     X(void, Uniform4fv, (int location, int count, const float *values))                                                \
     X(void, UniformMatrix3fv, (int location, int count, unsigned char transpose, const float *values))                 \
     X(void, UniformMatrix4fv, (int location, int count, unsigned char transpose, const float *values))                 \
-    X(unsigned char, UnmapBuffer, (unsigned target))                                                                   \
     X(void, UseProgram, (unsigned program))                                                                            \
     X(void, VertexAttribDivisor, (unsigned index, unsigned divisor))                                                   \
     X(void, VertexAttribPointer, (unsigned index, int size, unsigned type, unsigned char normalized, int stride,       \
                                   const void *offset))                                                                 \
     X(void, Viewport, (int x, int y, int width, int height))
 
-/* ... and these may be NULL: has_timer and has_compute say whether the last two groups may be called. */
+/* ... and these may be NULL: the first three in WebGL, the others where has_timer and has_compute are 0. */
 #define SAT__GL_OPTIONAL_FUNCTIONS(X)                                                                                  \
+    X(void *, MapBufferRange, (unsigned target, ptrdiff_t offset, ptrdiff_t size, unsigned access))                    \
+    X(unsigned char, UnmapBuffer, (unsigned target))                                                                   \
     X(void, PolygonMode, (unsigned face, unsigned mode))                                                               \
     X(void, GenQueries, (int count, unsigned *queries))                                                                \
     X(void, DeleteQueries, (int count, const unsigned *queries))                                                       \
@@ -2831,7 +2831,7 @@ static sat__rows sat__rows_at(const sat_table *t, int channel, int y0, int y1)
 
 /* The four-corner sum (eq 4.2) of a tiled table. Differences are taken along x first, so that what both corners of a row
    share cancels exactly; strips that all four corners share are not read at all. */
-static double sat__tiled_sum(const sat_table *t, const sat__rows *r, int x0, int x1)
+static inline double sat__tiled_sum(const sat_table *t, const sat__rows *r, int x0, int x1)
 {
     const float *low = (const float *)r->low, *high = (const float *)r->high;
     double sum = ((double)high[x1] - (double)high[x0]) - ((double)low[x1] - (double)low[x0]);
@@ -2841,11 +2841,12 @@ static double sat__tiled_sum(const sat_table *t, const sat__rows *r, int x0, int
     return sum;
 }
 
-/* Integer differences wrap around, and the true sum is the representative near zero. */
-static double sat__rows_sum(const sat_table *t, const sat__rows *r, int channel, int x0, int x1, int height)
+/* Integer differences wrap around, and the true sum is the representative near zero. `kind` is the table's: loops pass it
+   as a constant. */
+static inline double sat__rows_sum(const sat_table *t, sat_kind kind, const sat__rows *r, int channel, int x0, int x1, int height)
 {
     double sum = 0;
-    switch (t->options.kind) {
+    switch (kind) {
     case SAT_KIND_TILED: return sat__tiled_sum(t, r, x0, x1);
     case SAT_KIND_FLOAT: {
         const float *low = (const float *)r->low, *high = (const float *)r->high;
@@ -2884,7 +2885,7 @@ SAT_DEF double sat_sum(const sat_table *table, int channel, int x0, int y0, int 
     sat__rows rows;
     if (!table || channel < 0 || channel >= table->channels || !sat__clip_box(table, &x0, &y0, &x1, &y1)) return 0;
     rows = sat__rows_at(table, channel, y0, y1);
-    return sat__rows_sum(table, &rows, channel, x0, x1, y1 - y0);
+    return sat__rows_sum(table, table->options.kind, &rows, channel, x0, x1, y1 - y0);
 }
 
 SAT_DEF double sat_mean(const sat_table *table, int channel, int x0, int y0, int x1, int y1)
@@ -3019,12 +3020,23 @@ typedef struct sat__filter {
 } sat__filter;
 
 /* One output row: box means of `height` rows between two corner rows. */
+static inline void sat__filter_kind(float *out, const sat_table *t, sat_kind kind, const sat__rows *rows, int channel, int radius, int height)
+{
+    int x, step = t->channels, width = t->width;
+    for (x = 0; x < width; x++) {
+        int x0 = x > radius ? x - radius : 0, x1 = width - x > radius ? x + radius + 1 : width;
+        out[(size_t)x * (size_t)step] = (float)(sat__rows_sum(t, kind, rows, channel, x0, x1, height) / ((double)(x1 - x0) * (double)height));
+    }
+}
+
 static void sat__filter_row(float *out, const sat_table *t, const sat__rows *rows, int channel, int radius, int height)
 {
-    int x, step = t->channels;
-    for (x = 0; x < t->width; x++) {
-        int x0 = x > radius ? x - radius : 0, x1 = t->width - x > radius ? x + radius + 1 : t->width;
-        out[(size_t)x * (size_t)step] = (float)(sat__rows_sum(t, rows, channel, x0, x1, height) / ((double)(x1 - x0) * (double)height));
+    switch (t->options.kind) {
+    case SAT_KIND_TILED: sat__filter_kind(out, t, SAT_KIND_TILED, rows, channel, radius, height); break;
+    case SAT_KIND_FLOAT: sat__filter_kind(out, t, SAT_KIND_FLOAT, rows, channel, radius, height); break;
+    case SAT_KIND_DOUBLE: sat__filter_kind(out, t, SAT_KIND_DOUBLE, rows, channel, radius, height); break;
+    case SAT_KIND_FIXED32: sat__filter_kind(out, t, SAT_KIND_FIXED32, rows, channel, radius, height); break;
+    case SAT_KIND_FIXED64: sat__filter_kind(out, t, SAT_KIND_FIXED64, rows, channel, radius, height); break;
     }
 }
 
@@ -3374,6 +3386,8 @@ extern "C" {
    4.4: zero left and above, clamped right and below; they take differences of neighbours first. A fractional box is nine
    boxes: the cells that its border cuts, weighted, and what lies between them. */
 static const char sat__glsl_lookups[] =
+    "#ifndef SAT_GLSL\n"
+    "#define SAT_GLSL\n"
     "#ifdef GL_ES\n"
     "precision highp float;\n"
     "precision highp int;\n"
@@ -3455,7 +3469,8 @@ static const char sat__glsl_lookups[] =
     "        }\n"
     "    }\n"
     "    return quantum * sum;\n"
-    "}\n";
+    "}\n"
+    "#endif\n";
 
 SAT_DEF const char *sat_gl_glsl(void) { return sat__glsl_lookups; }
 
@@ -3760,6 +3775,7 @@ static sat_result sat__gl_make_target(sat__gl *gl, sat__gl_target *target, unsig
 {
     sat_result result = sat__gl_texture(gl, &target->texture, internal, width, height, NULL);
     if (result == SAT_OK) result = sat__gl_framebuffer(gl, &target->framebuffer, &target->texture, 1, 0);
+    if (result != SAT_OK) sat__gl_free_target(gl, target);
     return result;
 }
 
@@ -3813,17 +3829,21 @@ static sat_result sat__gl_settle(sat_gl *g, int width, int height)
     return SAT_OK;
 }
 
-static sat_result sat__gl_fit(sat_gl *g, int width, int height)
+/* Makes what is missing for a build of this size: nothing when the last one had it. */
+static sat_result sat__gl_fit(sat_gl *g, int width, int height, int own_table)
 {
     unsigned internal = sat__gl_internal(g->options.format);
     sat_result result = SAT_OK;
-    if (g->width == width && g->height == height) return SAT_OK;
+    if (g->width == width && g->height == height) {
+        if (own_table && !g->table.texture) result = sat__gl_make_target(&g->gl, &g->table, internal, width, height);
+        return result;
+    }
     sat__gl_free_textures(g);
     result = sat__gl_settle(g, width, height);
     if (result != SAT_OK) return result;
     g->width = width;
     g->height = height;
-    result = sat__gl_make_target(&g->gl, &g->table, internal, width, height);
+    if (own_table) result = sat__gl_make_target(&g->gl, &g->table, internal, width, height);
     if (result == SAT_OK) result = sat__gl_make_target(&g->gl, &g->partial, internal, width, height);
     if (result == SAT_OK && g->options.algorithm == SAT_SCAN_BALANCED_TREE) {
         result = sat__gl_make_tree(g, 0);
@@ -3943,7 +3963,7 @@ static sat_result sat__gl_run(sat_gl *g, int axes, unsigned table, unsigned text
     sat_result result;
     if (!g || !g->ready || !texture || texture == table || width < 1 || height < 1) return SAT_ERR_ARGUMENT;
     sat__gl_begin(&g->gl, &state, 2);
-    result = sat__gl_fit(g, width, height);
+    result = sat__gl_fit(g, width, height, !table);
     target = g->table;
     if (result == SAT_OK && table) {
         target.texture = table;

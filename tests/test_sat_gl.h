@@ -447,6 +447,7 @@ TEST(borrowed_table_and_untouched_input)
             texture = test_texture(SAT__GL_R32F, 61, 47, t.pixels);
             table = test_texture(SAT__GL_RG32F, 61, 47, NULL);
             EXPECT_EQ(sat_gl_build(g, table, texture, w, h), SAT_OK);
+            EXPECT_EQ(sat_gl_table(g), 0); /* none of its own is made */
             EXPECT_EQ(sat_gl_build(g, texture, texture, w, h), SAT_ERR_ARGUMENT);
             test_read(back, texture, SAT__GL_R32F, 61, 47);
             EXPECT_EQ(memcmp(back, t.pixels, 61 * 47 * sizeof *back), 0);
@@ -465,7 +466,12 @@ TEST(borrowed_table_and_untouched_input)
             test_delete(table);
             test_case_free(&t);
         }
+        texture = test_texture(SAT__GL_R32F, 23, 9, NULL);
+        EXPECT_EQ(sat_gl_build(g, 0, texture, 23, 9), SAT_OK); /* until it is asked for */
+        EXPECT(sat_gl_table(g) != 0);
+        test_delete(texture);
         sat_gl_destroy(g);
+        EXPECT_EQ(test_objects, 0);
     }
     free(back);
     test_close();
