@@ -162,9 +162,9 @@ size:
 
 # ---- benchmarks and reports ------------------------------------------------------------------------------------
 
-BENCH_SOURCES := $(if $(LIB),$(wildcard tests/bench/bench_$(LIB).c tests/bench/bench_$(LIB).cpp),\
-                 $(wildcard tests/bench/bench_*.c tests/bench/bench_*.cpp))
-BENCHES       := $(patsubst tests/bench/bench_%.c,%,$(patsubst tests/bench/bench_%.cpp,%,$(BENCH_SOURCES)))
+BENCH_SOURCES := $(wildcard tests/bench/bench_*.c tests/bench/bench_*.cpp)
+BENCH_NAMES   := $(sort $(patsubst tests/bench/bench_%.c,%,$(patsubst tests/bench/bench_%.cpp,%,$(BENCH_SOURCES))))
+BENCHES       := $(foreach l,$(PICK),$(filter $l $l_%,$(BENCH_NAMES)))
 PEERS         := $(OPENCV) $(EMBREE)
 
 build/bench/bench_%: tests/bench/bench_%.c
@@ -190,10 +190,10 @@ out/bench/gpu_%.tsv: build/bench/gpu_% FORCE
 
 report:
 	@sh tests/deps.sh gnuplot-nox
-	@$(MAKE) --no-print-directory bench QUICK='$(QUICK)' >/dev/null
+	+@$(MAKE) --no-print-directory -k bench QUICK='$(QUICK)' >/dev/null || true
 	@mkdir -p out/bench report
 	@$(MAKE) --no-print-directory -s size >out/bench/size.tsv
-	@bash tests/report.sh $(patsubst %,out/bench/%.tsv,$(filter $(BENCHES),$(PICK)) $(filter-out $(PICK),$(BENCHES))) $(wildcard out/bench/gpu_*.tsv) out/bench/size.tsv >report/index.html.part
+	@bash tests/report.sh $(BENCHES:%=out/bench/%.tsv) $(wildcard out/bench/gpu_*.tsv) out/bench/size.tsv >report/index.html.part
 	@mv report/index.html.part report/index.html
 	@echo report/index.html
 
