@@ -3166,10 +3166,10 @@ SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width,
     if (table->options.kind == SAT_KIND_TILED) {
         tiles = (double)table->tiles_x * ((height - 1) / tile + 1);
         stored = sqrt(total->tile_squares / tiles);
-        return 0.5 * u * stored * sqrt((1 + (w - 1) / tile) * (1 + (h - 1) / tile)) / (w * h);
+        return 0.32 * u * stored * sqrt((1 + (w - 1) / tile) * (1 + (h - 1) / tile)) / (w * h);
     }
     stored = total->sum_abs / (table->options.subtract_mean ? sqrt(width * height) : 1);
-    return 0.33 * (table->options.kind == SAT_KIND_FLOAT ? u : v) * stored * sqrt(1 + 0.15 * (w + h)) / (w * h);
+    return 0.25 * (table->options.kind == SAT_KIND_FLOAT ? u : v) * stored * sqrt(1 + 0.1 * (w + h)) / (w * h);
 }
 
 /* ---- choosing a kind */

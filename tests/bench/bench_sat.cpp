@@ -1,0 +1,412 @@
+/* Benchmarks of sat.h: build time against memcpy and cv::integral, precision against exact sums, lookups, updates, bounds,
+   k-ary scans. References are long double sums over the pixels of each box. */
+#define SAT_IMPLEMENTATION
+#include "sat.h"
+#include "bench.h"
+#ifdef HAVE_OPENCV
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#endif
+
+static const char *const kind_names[] = {"tiled", "float", "double", "fixed32", "fixed64"};
+
+/* ---- pictures: constant, uniform, 14 decades in smooth patches, uniform with one pixel of 1e8 */
+
+enum { CONSTANT, UNIFORM, HDR14, SPIKE, PICTURES };
+static const char *const picture_names[] = {"constant", "uniform", "14 decades", "spike 1e8"};
+
+static void make_picture(float *p, int n, int which)
+{
+    uint64_t state = 88172645463325252u;
+    int cells = n / 128 + 2, x, y;
+    float *grid = (float *)malloc((size_t)cells * (size_t)cells * sizeof(float));
+    for (x = 0; x < cells * cells; x++) grid[x] = (float)(1 + 2.4 * support_gaussian(&state));
+    for (y = 0; y < n; y++)
+        for (x = 0; x < n; x++) {
+            float *out = p + (size_t)y * (size_t)n + (size_t)x;
+            const float *g = grid + (size_t)(y / 128) * (size_t)cells + (size_t)(x / 128);
+            double fx = x % 128 / 128.0, fy = y % 128 / 128.0;
+            if (which == HDR14) {
+                double level = (1 - fy) * ((1 - fx) * (double)g[0] + fx * (double)g[1]) + fy * ((1 - fx) * (double)g[cells] + fx * (double)g[cells + 1]);
+                double light = pow(10, level * 1.3 + 0.15 * support_gaussian(&state));
+                *out = (float)(light < 1e-6 ? 1e-6 : light > 1e8 ? 1e8 : light);
+            } else *out = which == CONSTANT ? 1.0f : (float)support_uniform(&state);
+        }
+    if (which == SPIKE) p[(size_t)(n / 3) * ((size_t)n + 1)] = 1e8f;
+    free(grid);
+}
+
+#ifndef BENCH_BUILD_ONLY
+static double exact_sum(const float *p, int n, int x0, int y0, int x1, int y1)
+{
+    long double sum = 0;
+    for (int y = y0; y < y1; y++)
+        for (int x = x0; x < x1; x++) sum += (long double)p[(size_t)y * (size_t)n + (size_t)x];
+    return (double)sum;
+}
+#endif
+
+/* ---- building */
+
+struct copy_work {
+    char *to;
+    const char *from;
+    size_t bytes;
+};
+
+static void copy(void *user)
+{
+    copy_work *w = (copy_work *)user;
+    memcpy(w->to, w->from, w->bytes);
+}
+
+struct build_work {
+    sat_table *table;
+    sat_image image;
+    int x0, y0, x1, y1;
+    void *out;
+};
+
+static void build(void *user) { sat_build(((build_work *)user)->table, &((build_work *)user)->image); }
+
+#ifdef HAVE_OPENCV
+static void integrate(void *user, int depth)
+{
+    build_work *w = (build_work *)user;
+    cv::Mat in(w->image.height, w->image.width, CV_32F, const_cast<void *>(w->image.pixels));
+    cv::Mat out(w->image.height + 1, w->image.width + 1, depth, w->out);
+    cv::integral(in, out, depth);
+}
+static void integrate_f32(void *user) { integrate(user, CV_32F); }
+static void integrate_f64(void *user) { integrate(user, CV_64F); }
+#endif
+
+static void bench_build(void)
+{
+    static const int sizes[] = {512, 2048, 4096, 8192};
+    bench_table("Build: time against memcpy of the same traffic and against OpenCV", "kind\tside\ttime_memcpy_ratio\topencv_speedup\tbytes_a_pixel\tdefault");
+    bench_plot("Build time; x=side; y=time_memcpy_ratio; by=kind; log=x; style=lines");
+    bench_note("opencv_speedup: time of cv::integral (float or double output) over ours; 0: OpenCV is not installed");
+    for (int s = 0; s < (bench_quick() ? 2 : 4); s++) {
+        int n = sizes[s];
+        size_t pixels = (size_t)n * (size_t)n;
+        float *p = (float *)malloc(pixels * 4);
+        char *to = (char *)malloc(pixels * 8), *from = (char *)malloc(pixels * 8), *out = (char *)malloc(((size_t)n + 1) * ((size_t)n + 1) * 8);
+        make_picture(p, n, UNIFORM);
+        memset(to, 1, pixels * 8);
+        memset(from, 1, pixels * 8);
+        for (int k = 0; k < 5; k++) {
+            sat_options o = sat_defaults();
+            build_work w;
+            copy_work c;
+            o.kind = (sat_kind)k;
+            if (k >= SAT_KIND_FIXED32) o.max_value = 1;
+            o.max_box_area = 201 * 201;
+            w.image = sat_image_f32(p, n, n, 1);
+            w.out = out;
+            if (sat_create(&w.table, n, n, 1, &o) != SAT_OK) continue;
+            c.to = to;
+            c.from = from;
+            /* a copy of b bytes moves 2 b: read 4 bytes a pixel, write 4 (4.5, 8) */
+            c.bytes = (size_t)((double)pixels * (4 + (k == SAT_KIND_DOUBLE || k == SAT_KIND_FIXED64 ? 8 : k == SAT_KIND_TILED ? 4.5 : 4)) / 2);
+            double ratio = bench_ratio(build, &w, copy, &c, bench_rounds(n > 5000 ? 7 : 21)).ratio, peer = 0;
+#ifdef HAVE_OPENCV
+            cv::setNumThreads(1);
+            peer = 1 / bench_ratio(build, &w, k == SAT_KIND_DOUBLE || k == SAT_KIND_FIXED64 ? integrate_f64 : integrate_f32, &w, bench_rounds(n > 5000 ? 7 : 21)).ratio;
+#endif
+            bench_row("%s\t%d\t%.2f\t%.2f\t%.3f\t%d", kind_names[k], n, ratio, peer, (double)sat_get_statistics(w.table).bytes / (double)pixels, k == 0);
+            sat_destroy(w.table);
+        }
+        free(p);
+        free(to);
+        free(from);
+        free(out);
+    }
+}
+
+#ifndef BENCH_BUILD_ONLY
+
+/* ---- precision */
+
+struct representation {
+    const char *name;
+    sat_kind kind;
+    int tile, subtract_mean;
+};
+
+static const representation representations[] = {
+    {"float", SAT_KIND_FLOAT, 32, 0},   {"float less mean", SAT_KIND_FLOAT, 32, 1}, {"tiled 8", SAT_KIND_TILED, 8, 0},
+    {"tiled 16", SAT_KIND_TILED, 16, 0}, {"tiled 32", SAT_KIND_TILED, 32, 0},        {"tiled 64", SAT_KIND_TILED, 64, 0},
+    {"tiled 128", SAT_KIND_TILED, 128, 0}, {"double", SAT_KIND_DOUBLE, 32, 0},       {"fixed32", SAT_KIND_FIXED32, 32, 0},
+    {"fixed64", SAT_KIND_FIXED64, 32, 0},
+};
+
+enum { BOXES = 5, MOST = 20000 };
+static const int box_sides[BOXES] = {1, 3, 11, 41, 201};
+
+static void precision_rows(const float *p, int n, const char *picture, const representation *r)
+{
+    static double relative[MOST];
+    double mean = 0;
+    sat_image image = sat_image_f32(p, n, n, 1);
+    sat_options o = sat_defaults();
+    sat_table *t;
+    for (size_t i = 0; i < (size_t)n * (size_t)n; i++) mean += (double)p[i];
+    mean /= (double)n * n;
+    o.kind = r->kind;
+    o.tile = r->tile;
+    o.subtract_mean = r->subtract_mean;
+    o.max_box_area = 201 * 201;
+    if (sat_create(&t, n, n, 1, &o) != SAT_OK) return;
+    build_work w;
+    copy_work c;
+    w.table = t;
+    w.image = image;
+    c.bytes = (size_t)n * (size_t)n * 4;
+    c.from = (const char *)p;
+    c.to = (char *)malloc(c.bytes);
+    double time = bench_ratio(build, &w, copy, &c, 3).ratio;
+    free(c.to);
+    for (int b = 0; b < BOXES; b++) {
+        uint64_t state = 123456789;
+        int side = box_sides[b], count = side > 100 ? 300 : side > 20 ? 4000 : MOST, negative = 0;
+        double squares = 0, worst = 0, area = (double)side * side;
+        for (int i = 0; i < count; i++) {
+            int x = support_below(&state, n - side), y = support_below(&state, n - side);
+            double exact = exact_sum(p, n, x, y, x + side, y + side), got = sat_sum(t, 0, x, y, x + side, y + side);
+            double error = fabs(got - exact) / area;
+            squares += error * error;
+            if (error > worst) worst = error;
+            relative[i] = error * area / exact;
+            negative += got < 0;
+        }
+        double rms = sqrt(squares / count);
+        qsort(relative, (size_t)count, sizeof *relative, support_compare_doubles);
+        bench_row("%s\t%s\t%d\t%d\t%.2g\t%.2g\t%.2g\t%.2g\t%.2g\t%.3f\t%.2f\t%d", picture, r->name, n, side, rms / mean, worst / mean,
+                  relative[count / 2] + 1e-17, relative[count * 99 / 100] + 1e-17, relative[count - 1], (double)negative / count, time,
+                  r->kind == SAT_KIND_TILED && r->tile == 32);
+    }
+    sat_destroy(t);
+}
+
+static void bench_precision(void)
+{
+    bench_table("Precision: box means against exact sums",
+                "picture\trepresentation\tside\tbox\trms_of_mean\tmax_of_mean\tmedian_relative\tp99_relative\tmax_relative\tnegative_share\ttime_memcpy_ratio\tdefault");
+    bench_plot("3 x 3 boxes of 14 decades and others: error against build time; x=time_memcpy_ratio; y=median_relative; by=representation; log=y");
+    bench_note("rms and max are of the image's mean; relative errors are of each box's own mean; fixed kinds are given boxes up to 201 x 201");
+    for (int s = 0; s < 3; s++) {
+        int n = s == 0 ? 2048 : s == 1 ? 4096 : 8192;
+        float *p;
+        if (bench_quick() && s) break;
+        p = (float *)malloc((size_t)n * (size_t)n * 4);
+        for (int which = 0; which < PICTURES; which++) {
+            make_picture(p, n, which);
+            for (size_t r = 0; r < sizeof representations / sizeof *representations; r++) precision_rows(p, n, picture_names[which], &representations[r]);
+        }
+        free(p);
+    }
+}
+
+/* ---- lookups */
+
+enum { LOOKUPS = 1 << 18 };
+
+struct lookup_work {
+    const sat_table *table;
+    const int *x, *y;
+    int radius;
+    double sink;
+};
+
+static void look_up(void *user)
+{
+    lookup_work *w = (lookup_work *)user;
+    double sum = 0;
+    for (int i = 0; i < LOOKUPS; i++) {
+        int x = w->x[i], y = w->y[i], r = w->radius;
+        sum += sat_sum(w->table, 0, x - r, y - r, x + r + 1, y + r + 1);
+    }
+    w->sink += sum;
+}
+
+static void bench_lookups(void)
+{
+    static const int radii[] = {1, 5, 10, 20, 50, 100};
+    int n = bench_quick() ? 2048 : 4096;
+    float *p = (float *)malloc((size_t)n * (size_t)n * 4);
+    int *x = (int *)malloc(LOOKUPS * sizeof(int)), *y = (int *)malloc(LOOKUPS * sizeof(int));
+    sat_table *tables[5];
+    make_picture(p, n, UNIFORM);
+    sat_image image = sat_image_f32(p, n, n, 1);
+    for (int k = 0; k < 5; k++) {
+        sat_options o = sat_defaults();
+        o.kind = (sat_kind)k;
+        if (sat_create(&tables[k], n, n, 1, &o) == SAT_OK) sat_build(tables[k], &image);
+    }
+    bench_table("Lookup: random boxes, time against the float table", "kind\tradius\ttime_ratio\tdefault");
+    bench_plot("Lookup time; x=radius; y=time_ratio; by=kind; log=x; style=lines");
+    for (int r = 0; r < 6; r++) {
+        uint64_t state = 9;
+        for (int i = 0; i < LOOKUPS; i++) {
+            x[i] = radii[r] + support_below(&state, n - 2 * radii[r]);
+            y[i] = radii[r] + support_below(&state, n - 2 * radii[r]);
+        }
+        for (int k = 0; k < 5; k++) {
+            lookup_work work = {tables[k], x, y, radii[r], 0}, peer = {tables[SAT_KIND_FLOAT], x, y, radii[r], 0};
+            bench_row("%s\t%d\t%.2f\t%d", kind_names[k], radii[r], bench_ratio(look_up, &work, look_up, &peer, bench_rounds(11)).ratio, k == 0);
+        }
+    }
+    for (int k = 0; k < 5; k++) sat_destroy(tables[k]);
+    free(p);
+    free(x);
+    free(y);
+}
+
+/* ---- filters and updates */
+
+struct filter_work {
+    const sat_table *table;
+    float *out;
+    int radius, n;
+};
+
+static void filter(void *user)
+{
+    filter_work *w = (filter_work *)user;
+    sat_box_filter(w->out, (ptrdiff_t)w->n * 4, w->table, w->radius);
+}
+
+static void update(void *user)
+{
+    build_work *w = (build_work *)user;
+    sat_update(w->table, &w->image, w->x0, w->y0, w->x1, w->y1);
+}
+
+static void bench_whole_images(void)
+{
+    int n = bench_quick() ? 1024 : 4096;
+    float *p = (float *)malloc((size_t)n * (size_t)n * 4), *out = (float *)malloc((size_t)n * (size_t)n * 4);
+    make_picture(p, n, UNIFORM);
+    sat_image image = sat_image_f32(p, n, n, 1);
+    bench_table("Whole images: time against a build of the same table", "kind\twork\tside\ttime_build_ratio\tspeedup\tdefault");
+    bench_note("update: 64 x 64 pixels changed in the middle (and in the last corner); box: sat_box_filter with this radius");
+    for (int k = 0; k < 5; k++) {
+        sat_options o = sat_defaults();
+        build_work w;
+        o.kind = (sat_kind)k;
+        if (sat_create(&w.table, n, n, 1, &o) != SAT_OK) continue;
+        w.image = image;
+        for (int place = 0; place < (k == SAT_KIND_TILED ? 3 : 0); place++) {
+            w.x0 = w.y0 = place == 0 ? n / 2 + 5 : place == 1 ? n - 64 : 5;
+            w.x1 = w.y1 = w.x0 + 64;
+            double ratio = bench_ratio(update, &w, build, &w, bench_rounds(15)).ratio;
+            bench_row("%s\tupdate %s\t%d\t%.4f\t%.1f\t%d", kind_names[k], place == 0 ? "middle" : place == 1 ? "last corner" : "first corner", n, ratio, 1 / ratio, 1);
+        }
+        for (int radius = 1; radius <= 100; radius *= 10) {
+            filter_work f = {w.table, out, radius, n};
+            bench_row("%s\tbox %d\t%d\t%.2f\t%.2f\t%d", kind_names[k], radius, n, bench_ratio(filter, &f, build, &w, bench_rounds(5)).ratio, 1.0, k == 0);
+        }
+        sat_destroy(w.table);
+    }
+    free(p);
+    free(out);
+}
+
+/* ---- error bounds */
+
+static void bench_bounds(void)
+{
+    int n = 1024;
+    float *p = (float *)malloc((size_t)n * (size_t)n * 4);
+    sat_image image = sat_image_f32(p, n, n, 1);
+    bench_table("Expected error: bound and expected root mean square against the measured", "picture\tkind\tbox\tbound_over_max\texpected_over_rms");
+    bench_note("0: the measured error is 0");
+    for (int which = 0; which < PICTURES; which++) {
+        make_picture(p, n, which);
+        for (int k = 0; k < 5; k++) {
+            sat_options o = sat_defaults();
+            sat_table *t;
+            o.kind = (sat_kind)k;
+            o.max_box_area = 201 * 201;
+            if (sat_create(&t, n, n, 1, &o) != SAT_OK) continue;
+            sat_build(t, &image);
+            for (int b = 0; b < BOXES; b++) {
+                uint64_t state = 4;
+                int side = box_sides[b], count = side > 100 ? 200 : 2000;
+                double squares = 0, worst = 0, area = (double)side * side;
+                for (int i = 0; i < count; i++) {
+                    int x = support_below(&state, n - side), y = support_below(&state, n - side);
+                    double e = fabs(sat_sum(t, 0, x, y, x + side, y + side) - exact_sum(p, n, x, y, x + side, y + side)) / area;
+                    squares += e * e;
+                    if (e > worst) worst = e;
+                }
+                bench_row("%s\t%s\t%d\t%.3g\t%.3g", picture_names[which], kind_names[k], side, worst > 0 ? sat_error_bound(t, 0, side, side) / worst : 0,
+                          squares > 0 ? sat_error_rms(t, 0, side, side) / sqrt(squares / count) : 0);
+            }
+            sat_destroy(t);
+        }
+    }
+    free(p);
+}
+
+/* ---- scans */
+
+struct scan_work {
+    float *in, *out;
+    size_t n;
+    sat_scan_options options;
+};
+
+static void scan(void *user)
+{
+    scan_work *w = (scan_work *)user;
+    sat_scan_f32(w->out, w->in, w->n, &w->options);
+}
+
+static void bench_scans(void)
+{
+    static const int ks[] = {2, 3, 4, 6, 8, 12, 16};
+    enum { N = 1 << 20 };
+    float *in = (float *)malloc(N * 4), *out = (float *)malloc(N * 4);
+    support_fill(in, N, 0, 1, 3);
+    bench_table("k-ary scans of 2^20 floats: work and time against the sequential scan", "algorithm\tk\tpasses\tadds_a_value\taccesses_a_value\tnodes_a_value\ttime_ratio\terror_ulp\tdefault");
+    bench_plot("Accesses a value; x=k; y=accesses_a_value; by=algorithm; style=lines");
+    bench_note("these are the algorithms of the GPU; on a CPU the sequential scan is the fast one");
+    for (int a = 1; a < 3; a++)
+        for (int i = 0; i < 7; i++) {
+            sat_scan_counters c;
+            scan_work work = {in, out, N, sat_scan_defaults()}, peer = work;
+            double worst = 0;
+            long double exact = 0;
+            work.options.algorithm = (sat_scan_algorithm)a;
+            work.options.k = ks[i];
+            double ratio = bench_ratio(scan, &work, scan, &peer, bench_rounds(5)).ratio;
+            work.options.counters = &c;
+            scan(&work);
+            for (int j = 0; j < N; j++) {
+                exact += (long double)in[j];
+                double e = fabs((double)(((long double)out[j] - exact) / exact)) / 5.96e-8;
+                if (e > worst) worst = e;
+            }
+            bench_row("%s\t%d\t%d\t%.2f\t%.2f\t%.3f\t%.1f\t%.2f\t%d", a == 1 ? "recursive doubling" : "balanced tree", ks[i], (int)c.passes, (double)c.adds / N,
+                      (double)(c.reads + c.writes) / N, (double)c.nodes / N, ratio, worst, a == 2 && ks[i] == 4);
+        }
+    free(in);
+    free(out);
+}
+#endif
+
+int main(void)
+{
+    bench_start("sat.h");
+    bench_build();
+#ifndef BENCH_BUILD_ONLY
+    bench_lookups();
+    bench_whole_images();
+    bench_bounds();
+    bench_scans();
+    bench_precision();
+#endif
+    return 0;
+}
