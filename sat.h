@@ -2300,10 +2300,10 @@ SAT__DEFINE_SUM_ROW_4(u32, uint32_t, uint32_t)
 SAT__DEFINE_SUM_ROW_2(f64, double, float)
 SAT__DEFINE_SUM_ROW_2(u64, uint64_t, uint64_t)
 #else
-#define sat__sum_row_f32(out, column, in, n, carry, stream, signs) sat__sum_row_plain_f32(out, column, in, n, carry, signs)
-#define sat__sum_row_f64(out, column, in, n, carry, stream, signs) sat__sum_row_plain_f64(out, column, in, n, carry, signs)
-#define sat__sum_row_u32(out, column, in, n, carry, stream, signs) sat__sum_row_plain_u32(out, column, in, n, carry, signs)
-#define sat__sum_row_u64(out, column, in, n, carry, stream, signs) sat__sum_row_plain_u64(out, column, in, n, carry, signs)
+#define sat__sum_row_f32(out, column, in, n, carry, stream, signs) ((void)(stream), sat__sum_row_plain_f32(out, column, in, n, carry, signs))
+#define sat__sum_row_f64(out, column, in, n, carry, stream, signs) ((void)(stream), sat__sum_row_plain_f64(out, column, in, n, carry, signs))
+#define sat__sum_row_u32(out, column, in, n, carry, stream, signs) ((void)(stream), sat__sum_row_plain_u32(out, column, in, n, carry, signs))
+#define sat__sum_row_u64(out, column, in, n, carry, stream, signs) ((void)(stream), sat__sum_row_plain_u64(out, column, in, n, carry, signs))
 #endif
 
 /* ---- tables: reading pixels */
