@@ -27,13 +27,17 @@ value() { tr ';' '\n' <<<"$2" | sed -n "s/^ *$1=//p" | head -1 | sed 's/ *$//'; 
 
 # plot ROWS LINE: an SVG on stdout; nothing when a column is missing or no row has numbers
 plot() {
-    local rows=$1 title x y by log style count defaults
-    title=${2%%;*} x=$(value x "$2") y=$(value y "$2") by=$(value by "$2") log=$(value log "$2") style=$(value style "$2")
-    count=$(awk -F '\t' -v x="$x" -v y="$y" -v by="$by" -v out="$work/points" -v defaults="$work/defaults" '
+    local rows=$1 title x y by log style where count defaults
+    title=${2%%;*} x=$(value x "$2") y=$(value y "$2") by=$(value by "$2") log=$(value log "$2") style=$(value style "$2") where=$(value where "$2")
+    count=$(awk -F '\t' -v x="$x" -v y="$y" -v by="$by" -v where="$where" -v out="$work/points" -v defaults="$work/defaults" '
         function number(v) { return v ~ /^ *[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)? *$/ }
         BEGIN { printf "" > out; printf "" > defaults }
         NR == 1 { for (i = 1; i <= NF; ++i) column[$i] = i; next }
         !(x in column) || !(y in column) { exit }
+        {
+            n_where = split(where, terms, ",")
+            for (i = 1; i <= n_where; ++i) { split(terms[i], pair, ":"); if ($column[pair[1]] != pair[2]) next }
+        }
         number($column[x]) && number($column[y]) {
             key = by != "" && by in column ? $column[by] : "all"
             if (!(key in rank)) { rank[key] = n++; names[n - 1] = key }
@@ -46,13 +50,13 @@ plot() {
         }' "$rows")
     [ "$count" -gt 0 ] || return
     defaults=
-    [ -s "$work/defaults" ] && defaults=", '$work/defaults' using 1:2 with points pointtype 6 pointsize 2 linewidth 2 linecolor rgb '#c03030' title 'default'"
+    [ -s "$work/defaults" ] && defaults=", '$work/defaults' using 1:2 with points pointtype 6 pointsize 1.3 linewidth 2 linecolor rgb '#c03030' title 'default'"
     {
         echo "set terminal svg size 620,400 dynamic font 'sans-serif,12' background rgb 'white' name '$plot_id'"
         echo "set title '${title//\'/}' noenhanced; set xlabel '$x' noenhanced; set ylabel '$y' noenhanced"
         echo "set key outside right noenhanced; set grid linecolor rgb '#dddddd'; set format '%g'"
         [ -z "$log" ] || echo "set logscale $log"
-        echo "plot for [i=0:$((count - 1))] '$work/points' index i using 1:2 with ${style:-points} linewidth 1.5 pointtype 7 pointsize 0.7 title columnheader(1)$defaults"
+        echo "plot for [i=0:$((count - 1))] '$work/points' index i using 1:2 with ${style:-points} linewidth 1.5 pointtype (i < 8 ? 7 : 5) pointsize 0.7 title columnheader(1)$defaults"
     } | gnuplot 2>/dev/null | sed -e '/<?xml/d' -e '/<!DOCTYPE/,/>/d'
 }
 

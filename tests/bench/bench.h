@@ -1,8 +1,8 @@
 /* bench.h - benchmark tables: error against run time, as tab-separated values.
    SPDX-License-Identifier: MIT-0 OR Unlicense
 
-   A benchmark prints one or more tables on stdout; `make bench` keeps them in out/bench/<lib>.tsv, `make report` turns each into a
-   table and its plots. The form:
+   A benchmark prints one or more tables on stdout; `make bench` keeps them in out/bench/<lib>.tsv, `make report`
+   turns each into a table and its plots. The form:
 
        # table: Box sums against the exact ones           a title starts a table
        # plot: Error against time; x=time_ratio; y=error; by=kind; log=xy     any number of plots of this table
@@ -11,7 +11,8 @@
        tiled   64      1.02          3e-7     1            one row a configuration; default = 1 marks the default
        (an empty line, or the next title, ends the table)
 
-   plot keys: x, y (columns), by (one curve or colour per value of this column), log (x, y, xy), style (points, lines; default points).
+   plot keys: x, y (columns); by (one colour per value of this column); where (only these rows, as in
+   where=picture:14 decades,radius:1); log (x, y or xy); style (points, lines or linespoints; points unless told).
    Times are ratios to a reference in the same run wherever the machine matters: bench_ratio runs A B A B ...
 
        bench_start("sat.h");
