@@ -1,0 +1,2998 @@
+/* softassign.h - 0.1.0 - assignment without repetition, and photomosaics - SPDX-License-Identifier: MIT-0 OR Unlicense
+*/
+
+#if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SOFTASSIGN_IMPLEMENTATION)
+#define SOFTASSIGN_IMPLEMENTATION
+#endif
+
+#ifndef SOFTASSIGN_H
+#define SOFTASSIGN_H
+
+#define SOFTASSIGN_VERSION_MAJOR 0
+#define SOFTASSIGN_VERSION_MINOR 1
+#define SOFTASSIGN_VERSION_PATCH 0
+#define SOFTASSIGN_VERSION (SOFTASSIGN_VERSION_MAJOR * 10000 + SOFTASSIGN_VERSION_MINOR * 100 + SOFTASSIGN_VERSION_PATCH)
+
+#if defined(SOFTASSIGN_IMPLEMENT) || defined(SOFTASSIGN_IMPL)
+#error "softassign.h: the macro is called SOFTASSIGN_IMPLEMENTATION"
+#endif
+
+#if defined(SOFTASSIGN_GL) && !defined(SAT_GL)
+#define SAT_GL
+#endif
+#include "sat.h"
+#if SAT_VERSION < 100
+#error "softassign.h needs sat.h 0.1.0 or newer"
+#endif
+
+/* SOFTASSIGN_STATIC makes every function private to the file; SOFTASSIGN_DEF replaces the linkage altogether. */
+#ifndef SOFTASSIGN_DEF
+#ifdef SOFTASSIGN_STATIC
+#define SOFTASSIGN_DEF static inline
+#else
+#define SOFTASSIGN_DEF extern
+#endif
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Types
+   ------------------------------------------------------------------------------------------------ */
+
+typedef enum softassign_method {
+    SOFTASSIGN_AUTO,        /* the optimum: dense up to 100 000 cells, SOFTASSIGN_EXACT above */
+    SOFTASSIGN_EXACT,       /* the optimum: softassign prices on lists, shortest augmenting paths, finish */
+    SOFTASSIGN_FAST,        /* auction on lists; certified to options.gap */
+    SOFTASSIGN_ENTROPIC,    /* softassign with inequality columns over the whole matrix, rounded by paths */
+    SOFTASSIGN_PUBLISHED,   /* Slomp 2012, section 3.6, as printed */
+    SOFTASSIGN_GREEDY,      /* Slomp 2012, section 3.4.2 */
+    SOFTASSIGN_GREEDY_2OPT, /* the same, then moves and swaps while they help */
+    SOFTASSIGN_ANNEALING,   /* Slomp 2012, section 3.4.3 */
+    SOFTASSIGN_ANTS         /* Slomp 2012, appendix 3.A */
+} softassign_method;
+
+/* The cost of a pair; the same pair must always get the same number. */
+typedef float softassign_cost_fn(int row, int column, void *user);
+
+/* Rows are patches, columns are tiles. Costs come from the first of these that is given: a dense matrix, a
+   function, or features, whose Euclidean distance (Slomp 2012, eq 3.1) is computed when it is needed.
+   Infinite costs forbid a pair; NaN, -infinity and |cost| > 1e36 are refused, as are features beyond +-1e16. */
+typedef struct softassign_problem {
+    int rows, columns;                     /* >= 1 */
+    const float *cost;                     /* cost[row * stride + column], stride in floats */
+    ptrdiff_t stride;
+    softassign_cost_fn *cost_fn;
+    void *cost_user;
+    const float *row_features;             /* rows x feature_count, packed */
+    const float *column_features;          /* columns x feature_count, packed */
+    int feature_count;
+    const int *capacity;                   /* per column, >= 0; NULL: options.capacity_default */
+    const int *minimum_use;                /* per column, 0..capacity: so many rows must get it; NULL: 0. Not for a solver */
+    const int *previous;                   /* per row, the column of the last frame or -1; NULL: none. See options.switching */
+} softassign_problem;
+
+/* What a call found out. gap = (cost - lower_bound) / cost holds at any moment: no assignment costs less than lower_bound. */
+typedef struct softassign_report {
+    double cost;               /* of column_of_row, without the switching bonus */
+    double lower_bound;
+    double gap;                /* 0 when the cost is 0; infinite when no bound is known yet */
+    softassign_method method;  /* what was run */
+    int complete;              /* 1: the method came to its end; 0: the budget or `progress` stopped it */
+    int row_error;             /* the row that an error is about, or -1 */
+    int column_error;          /* the same for a column */
+    size_t iterations;         /* sweeps, bids, moves or ants, see the method */
+    size_t distances_computed; /* costs evaluated, of rows x columns */
+    size_t bytes;              /* largest memory in use beyond the caller's */
+    size_t work;               /* units that softassign_step counts */
+    size_t lists_built;        /* lists of nearest columns, first ones and renewed ones */
+    size_t rows_expanded;      /* times a path search looked at a whole row because its list had ended */
+    size_t paths;              /* augmenting paths */
+    size_t columns_finished;   /* columns whose price had to be raised back */
+    int conflicts;             /* pairs of rows with one column closer than min_distance, 0 when all could be undone */
+    int switched;              /* rows that differ from problem.previous */
+    double soft_cost;          /* PUBLISHED: the lowest sum of Q */
+    double column_sum_max;     /* PUBLISHED, ENTROPIC: largest column sum of the soft matrix */
+    int duplicate_rows;        /* PUBLISHED: rows whose largest element was another row's column already */
+} softassign_report;
+
+/* Called now and then with a valid assignment; not 0 stops the solver, which keeps what it has. */
+typedef int softassign_progress_fn(const softassign_report *report, const int *column_of_row, void *user);
+
+typedef struct softassign_options {
+    softassign_method method;  /* SOFTASSIGN_AUTO */
+    double gap;                /* 0.001; >= 0: FAST ends when its certified gap is not larger */
+    int capacity_default;      /* 1; 0..: uses of a column where problem.capacity is NULL */
+    int neighbours;            /* 48; 4..256: length of a row's list */
+    int certify;               /* 1: GREEDY to ANTS and PUBLISHED buy their bound from the auction; 0: from row minima */
+    uint64_t seed;             /* 1: ANNEALING, ANTS, PUBLISHED */
+
+    /* schedules: softassign_method_defaults() has those of each method */
+    double temperature;        /* ENTROPIC, ANNEALING: first one, times the mean row minimum; PUBLISHED: times the largest cost */
+    double cooling;            /* 0..1: factor from one temperature to the next */
+    int iterations[3];         /* ENTROPIC: temperatures, sweeps at each; PUBLISHED: temperatures, stabilisations, Sinkhorn
+                                  iterations; ANNEALING: temperatures, moves a row; ANTS: iterations; 2OPT: passes */
+    double alpha;              /* PUBLISHED: bias of eq 3.9, times the largest cost */
+    double outlier;            /* PUBLISHED: element of the outlier row, >= 0 */
+    int outlier_evolves;       /* PUBLISHED: 0 constant in the Sinkhorn loop, as printed; 1 normalised as a row of M */
+    int double_precision;      /* PUBLISHED: 0 float, exponents clamped to +-70; 1 double, +-650 */
+    int gather;                /* 4; 2..64: values a reduction step sums */
+    int ants;                  /* 30 */
+    double evaporation;        /* ANTS: 0.1, 0..1: pheromone lost in an iteration */
+    double noise;              /* ANTS: 1, 0..1: share of replaced tiles at the start; falls to 0 */
+
+    double switching;          /* 0; >= 0: staying with problem.previous is worth this times the mean cost */
+    int grid_width;            /* 0; rows are cells of a grid so wide, for min_distance */
+    double min_distance;       /* 0; smallest distance of two cells with the same column, in cells */
+
+    float *soft;               /* NULL; ENTROPIC, PUBLISHED: receives the soft matrix, rows x columns */
+    ptrdiff_t soft_stride;     /* in floats */
+    sat_allocator allocator;   /* malloc */
+    sat_threads threads;       /* serial; same bits for any worker count */
+    softassign_progress_fn *progress;
+    void *progress_user;
+} softassign_options;
+
+/* ------------------------------------------------------------------------------------------------
+   Easy calls
+   ------------------------------------------------------------------------------------------------ */
+
+SOFTASSIGN_DEF int softassign_version(void);
+SOFTASSIGN_DEF softassign_options softassign_defaults(void);
+/* The same with another method and its schedule. */
+SOFTASSIGN_DEF softassign_options softassign_method_defaults(softassign_method method);
+
+/* column_of_row: rows ints. options and report may be NULL. On SAT_ERR_LIMIT no assignment exists: report->row_error
+   names a row that found no column, and column_of_row is untouched as after any error. */
+SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_problem *problem,
+                                           const softassign_options *options, softassign_report *report);
+
+/* Means of parts_x x parts_y rectangles of every cell of a grid_width x grid_height grid: the features of eq 3.1.
+   out: grid_width * grid_height rows of parts_x * parts_y * channels floats. Cells may be smaller than pixels. */
+SOFTASSIGN_DEF sat_result softassign_features(float *out, const sat_image *image, int grid_width, int grid_height,
+                                              int parts_x, int parts_y, const softassign_options *options);
+
+/* Draws the mosaic: 8-bit pixels, grid_width * tile width x grid_height * tile height. tiles: SAT_U8, tiles of
+   tile_width x tile_height in a sheet without gaps, numbered row by row. blend 0..1 tints every tile towards the mean
+   of target's cell (NULL or 0: not at all). */
+SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride, const sat_image *tiles, int tile_width,
+                                            int tile_height, const int *column_of_row, int grid_width, int grid_height,
+                                            const sat_image *target, float blend);
+
+/* ------------------------------------------------------------------------------------------------
+   Full calls: anytime, and frame after frame
+   ------------------------------------------------------------------------------------------------ */
+
+/* A solver for problems of one size; one allocation here, none in the steps. Methods: AUTO and EXACT. */
+typedef struct softassign softassign;
+SOFTASSIGN_DEF sat_result softassign_create(softassign **out, int rows, int columns, const softassign_options *options);
+/* Works on for about work_budget units (a unit is a row looked at, 1 to 100 microseconds) and writes a valid assignment
+   with its certificate; report->complete says that it is the optimum. The costs must stay as they are until then. */
+SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row, const softassign_problem *problem,
+                                          size_t work_budget, softassign_report *report);
+/* The costs have changed: the next step starts anew from the prices found so far. */
+SOFTASSIGN_DEF void softassign_next_frame(softassign *solver);
+SOFTASSIGN_DEF void softassign_destroy(softassign *solver); /* NULL is fine */
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SOFTASSIGN_H */
+/* ------------------------------------------------------------------------------------------------
+   Stop here if you only want to use the library.
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(SOFTASSIGN_IMPLEMENTATION) && !defined(SOFTASSIGN_IMPLEMENTED)
+#define SOFTASSIGN_IMPLEMENTED
+
+#ifndef SAT_SIBLING
+#define SAT_SIBLING
+#endif
+#include "sat.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Portability, limits, small sums
+   ------------------------------------------------------------------------------------------------ */
+
+#define SOFTASSIGN__INFINITY (sat__float_from_bits(0x7f800000u))
+#define SOFTASSIGN__LARGEST_COST 1e36f
+#define SOFTASSIGN__LARGEST_FEATURE 1e16f
+#define SOFTASSIGN__DENSE_CELLS 100000 /* below, lists do not pay */
+#define SOFTASSIGN__DIMS 16            /* coordinates of the cheap bound; the last is the norm of what the others leave */
+#define SOFTASSIGN__BOUND_FEATURES 1024 /* features beyond these are left out of the cheap bound */
+#define SOFTASSIGN__BLOCK 16           /* columns that share a block minimum */
+
+/* A sum whose rounding error does not grow with the number of terms (Neumaier 1974). */
+typedef struct softassign__sum {
+    double sum, correction, magnitude;
+} softassign__sum;
+
+static inline void softassign__add(softassign__sum *s, double x)
+{
+    double t = s->sum + x, a = fabs(s->sum), b = fabs(x);
+    s->correction += a >= b ? (s->sum - t) + x : (x - t) + s->sum;
+    s->sum = t;
+    s->magnitude += b;
+}
+
+static inline double softassign__total(const softassign__sum *s) { return s->sum + s->correction; }
+/* Not above the exact sum of the exact terms, each of which was rounded once. */
+static inline double softassign__total_below(const softassign__sum *s)
+{
+    return s->sum + s->correction - s->magnitude * 4.5e-16;
+}
+
+static inline double softassign__gap(double cost, double bound)
+{
+    double off = cost - bound, size = fabs(cost);
+    if (!(off > 0)) return 0;
+    if (!sat__is_finite_double(bound)) return (double)SOFTASSIGN__INFINITY;
+    return size > 0 ? off / size : (double)SOFTASSIGN__INFINITY;
+}
+
+/* splitmix64 */
+static inline uint64_t softassign__random(uint64_t *state)
+{
+    uint64_t z = (*state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+static inline double softassign__uniform(uint64_t *state) { return (double)(softassign__random(state) >> 11) * 1.1102230246251565e-16; }
+
+/* ------------------------------------------------------------------------------------------------
+   The solver's memory
+   ------------------------------------------------------------------------------------------------ */
+
+typedef struct softassign__candidate {
+    double value; /* cost - price */
+    float cost;
+    int slot;
+} softassign__candidate;
+
+/* What one worker needs to list a row. */
+typedef struct softassign__scratch {
+    float *keys;      /* per slot, never above cost - price */
+    float *block_min; /* of 16 keys */
+    float *select;    /* copy of the above for the selection */
+    softassign__candidate *candidates;
+    size_t distances;
+} softassign__scratch;
+
+enum { SOFTASSIGN__START, SOFTASSIGN__LISTS, SOFTASSIGN__PRICES, SOFTASSIGN__RELIST, SOFTASSIGN__PATHS, SOFTASSIGN__FINISH, SOFTASSIGN__DONE };
+
+/* Slots are the columns, followed by one mandatory slot for each column with a minimum use: same costs, but its
+   price starts at `top`, so high that every assignment that leaves it free is dearer. */
+struct softassign {
+    softassign_options options;
+    sat_allocator allocator;
+    size_t bytes;
+    void *block;
+    int rows, columns, max_slots, padded, list, has_lists;
+    int dense;             /* costs stand in `matrix` */
+    int dense_paths;       /* and paths are searched on it, without lists */
+    int unit_capacities;   /* every slot holds one row */
+
+    softassign_problem problem;
+    int slots, dims;
+    float shrink, slack;   /* bound = distance of the projections * shrink - slack */
+    float *matrix;         /* dense: rows x columns costs, the bonus included */
+    float *coarse;         /* per 16 slots: dims x 16 projected coordinates */
+    float *row_coarse;     /* rows x dims */
+    double *basis;         /* dims x features */
+    int *slot_column, *capacity;
+    double *top;
+
+    double *price;
+    float *price_f;
+    int *used, *first_row; /* per slot: how many rows it holds, and the first of them */
+    int *slot_of_row, *next_row;
+    float *cost_of_row;    /* cost of the row's slot, with the switching bonus */
+    float bonus;
+
+    int *list_slot;        /* rows x list, by value when listed */
+    float *list_cost, *list_value;
+    int *list_length;
+    double *list_limit;    /* every slot outside the list has cost - price at or above this, as long as prices fall */
+    unsigned char *raised; /* per slot: its price rose since the lists were made */
+
+    double *distance, *row_distance; /* path search: per slot, per row */
+    int *parent, *stamp, *row_stamp, *touched, *closed, *heap, *heap_at;
+    float *parent_cost;
+    int epoch, heap_size;
+    float *column_sum, *soft_row;
+
+    softassign__scratch *scratch;
+    int *kept, *leader, *shown, *shown_column; /* slots of rows: best so far, best ant, for the caller; columns of those */
+    int phase, next, left, prices_known;
+    double temperature, bound;
+    int schedule[2];
+    softassign_report report;
+};
+
+static inline int softassign__column(const softassign *s, int slot) { return slot < s->columns ? slot : s->slot_column[slot]; }
+
+static inline void softassign__set_price(softassign *s, int slot, double price)
+{
+    s->price[slot] = price;
+    s->price_f[slot] = (float)price;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Costs
+   ------------------------------------------------------------------------------------------------ */
+
+/* Euclidean distance in four partial sums. Every distance of the library comes from here, so that a pair has ONE
+   cost: two roundings of it would let a path search go round in circles. */
+static float softassign__distance(const float *a, const float *b, int n)
+{
+    float lanes[4] = {0, 0, 0, 0};
+    int k = 0;
+#ifdef SAT__VECTOR
+    sat__f32x4 sum = sat__f32x4_set1(0);
+    for (; k + 4 <= n; k += 4) {
+        sat__f32x4 d = sat__f32x4_sub(sat__f32x4_load(a + k), sat__f32x4_load(b + k));
+        sum = sat__f32x4_add(sum, sat__f32x4_mul(d, d));
+    }
+    sat__f32x4_store(lanes, sum);
+#else
+    for (; k + 4 <= n; k += 4) {
+        int l;
+        for (l = 0; l < 4; l++) lanes[l] += (a[k + l] - b[k + l]) * (a[k + l] - b[k + l]);
+    }
+#endif
+    for (; k < n; k++) lanes[k & 3] += (a[k] - b[k]) * (a[k] - b[k]);
+    return sqrtf((lanes[0] + lanes[1]) + (lanes[2] + lanes[3]));
+}
+
+/* The cost of a pair as the problem states it. */
+static inline float softassign__pair(const softassign_problem *p, int row, int column)
+{
+    if (p->cost) return p->cost[(ptrdiff_t)row * p->stride + column];
+    if (p->cost_fn) return p->cost_fn(row, column, p->cost_user);
+    return softassign__distance(p->row_features + (size_t)row * (size_t)p->feature_count,
+                                p->column_features + (size_t)column * (size_t)p->feature_count, p->feature_count);
+}
+
+/* The cost that is minimised: less the bonus for staying. */
+static inline float softassign__cost(const softassign *s, int row, int slot)
+{
+    int column = softassign__column(s, slot);
+    float cost;
+    if (s->dense) return s->matrix[(size_t)row * (size_t)s->columns + (size_t)column];
+    cost = softassign__pair(&s->problem, row, column);
+    return s->problem.previous && s->problem.previous[row] == column ? cost - s->bonus : cost;
+}
+
+/* keys[j] <= cost - price for every slot, from the projections: |P(a - b)| <= |a - b| for orthonormal P. */
+static void softassign__project_keys(const softassign *s, int row, softassign__scratch *w)
+{
+    const float *p = s->row_coarse + (size_t)row * (size_t)s->dims, *c = s->coarse;
+    int b, k, l, dims = s->dims;
+    for (b = 0; b < s->padded; b += SOFTASSIGN__BLOCK) {
+        float *keys = w->keys + b;
+#ifdef SAT__VECTOR
+        sat__f32x4 a0 = sat__f32x4_set1(0), a1 = a0, a2 = a0, a3 = a0, least;
+        sat__f32x4 acc[4];
+        for (k = 0; k < dims; k++, c += SOFTASSIGN__BLOCK) {
+            sat__f32x4 x = sat__f32x4_set1(p[k]), d0 = sat__f32x4_sub(x, sat__f32x4_load(c));
+            sat__f32x4 d1 = sat__f32x4_sub(x, sat__f32x4_load(c + 4)), d2 = sat__f32x4_sub(x, sat__f32x4_load(c + 8));
+            sat__f32x4 d3 = sat__f32x4_sub(x, sat__f32x4_load(c + 12));
+            a0 = sat__f32x4_add(a0, sat__f32x4_mul(d0, d0));
+            a1 = sat__f32x4_add(a1, sat__f32x4_mul(d1, d1));
+            a2 = sat__f32x4_add(a2, sat__f32x4_mul(d2, d2));
+            a3 = sat__f32x4_add(a3, sat__f32x4_mul(d3, d3));
+        }
+        acc[0] = a0, acc[1] = a1, acc[2] = a2, acc[3] = a3;
+        least = sat__f32x4_set1(SOFTASSIGN__INFINITY);
+        for (l = 0; l < 4; l++) {
+            sat__f32x4 bound = sat__f32x4_mul(sat__f32x4_sqrt(acc[l]), sat__f32x4_set1(s->shrink));
+            sat__f32x4 price = sat__f32x4_load(s->price_f + b + 4 * l);
+            sat__f32x4 loss = sat__f32x4_mul(sat__f32x4_add(bound, sat__f32x4_abs(price)), sat__f32x4_set1(3e-7f));
+            bound = sat__f32x4_sub(sat__f32x4_sub(sat__f32x4_sub(bound, price), loss), sat__f32x4_set1(s->slack));
+            sat__f32x4_store(keys + 4 * l, bound);
+            least = sat__f32x4_min(bound, least);
+        }
+        {
+            float m[4];
+            sat__f32x4_store(m, least);
+            m[0] = m[1] < m[0] ? m[1] : m[0];
+            m[2] = m[3] < m[2] ? m[3] : m[2];
+            w->block_min[b / SOFTASSIGN__BLOCK] = m[2] < m[0] ? m[2] : m[0];
+        }
+#else
+        float least = SOFTASSIGN__INFINITY, acc[SOFTASSIGN__BLOCK] = {0};
+        for (k = 0; k < dims; k++, c += SOFTASSIGN__BLOCK)
+            for (l = 0; l < SOFTASSIGN__BLOCK; l++) acc[l] += (p[k] - c[l]) * (p[k] - c[l]);
+        for (l = 0; l < SOFTASSIGN__BLOCK; l++) {
+            float bound = sqrtf(acc[l]) * s->shrink, price = s->price_f[b + l];
+            keys[l] = bound - price - (bound + fabsf(price)) * 3e-7f - s->slack;
+            least = keys[l] < least ? keys[l] : least;
+        }
+        w->block_min[b / SOFTASSIGN__BLOCK] = least;
+#endif
+    }
+}
+
+/* The same from costs that are known. */
+static void softassign__dense_keys(const softassign *s, int row, softassign__scratch *w)
+{
+    int j, l;
+    for (j = 0; j < s->slots; j++) {
+        float cost = softassign__cost(s, row, j), price = s->price_f[j];
+        w->keys[j] = cost < SOFTASSIGN__INFINITY ? (cost - price) - (fabsf(cost) + fabsf(price)) * 3e-7f : SOFTASSIGN__INFINITY;
+    }
+    w->distances += (size_t)s->slots;
+    for (; j < s->padded; j++) w->keys[j] = SOFTASSIGN__INFINITY;
+    for (j = 0; j < s->padded; j += SOFTASSIGN__BLOCK) {
+        float least = SOFTASSIGN__INFINITY;
+        for (l = 0; l < SOFTASSIGN__BLOCK; l++) least = w->keys[j + l] < least ? w->keys[j + l] : least;
+        w->block_min[j / SOFTASSIGN__BLOCK] = least;
+    }
+}
+
+static void softassign__keys(const softassign *s, int row, softassign__scratch *w)
+{
+    int j, stay;
+    if (s->problem.cost || s->problem.cost_fn || s->dense) {
+        softassign__dense_keys(s, row, w);
+        return;
+    }
+    softassign__project_keys(s, row, w);
+    for (j = s->slots; j < s->padded; j++) w->keys[j] = SOFTASSIGN__INFINITY;
+    if (!s->problem.previous || (stay = s->problem.previous[row]) < 0) return;
+    for (j = stay; j < s->slots; j = j < s->columns ? s->columns : j + 1)
+        if (softassign__column(s, j) == stay) {
+            w->keys[j] -= s->bonus * 1.000001f;
+            if (w->keys[j] < w->block_min[j / SOFTASSIGN__BLOCK]) w->block_min[j / SOFTASSIGN__BLOCK] = w->keys[j];
+        }
+}
+
+/* ------------------------------------------------------------------------------------------------
+   The cheap bound: projection onto the main directions of the column features
+   ------------------------------------------------------------------------------------------------ */
+
+/* Gram and Schmidt, twice, so that the directions are orthonormal to rounding. Directions that vanish become 0. */
+static void softassign__orthonormalise(double *basis, int count, int n)
+{
+    int a, b, k, pass;
+    for (a = 0; a < count; a++) {
+        double *v = basis + (size_t)a * (size_t)n, before = 0, after = 0;
+        for (k = 0; k < n; k++) before += v[k] * v[k];
+        for (pass = 0; pass < 2; pass++)
+            for (b = 0; b < a; b++) {
+                const double *u = basis + (size_t)b * (size_t)n;
+                double dot = 0;
+                for (k = 0; k < n; k++) dot += u[k] * v[k];
+                for (k = 0; k < n; k++) v[k] -= dot * u[k];
+            }
+        for (k = 0; k < n; k++) after += v[k] * v[k];
+        after = after > before * 1e-20 && after > 1e-300 ? 1 / sqrt(after) : 0;
+        for (k = 0; k < n; k++) v[k] *= after;
+    }
+}
+
+/* A few steps of subspace iteration on a sample of the columns. Any orthonormal basis gives a valid bound; this one
+   makes it tight. The mean stands behind the basis. */
+static void softassign__find_basis(softassign *s, int n, int directions)
+{
+    const softassign_problem *p = &s->problem;
+    double *mean = s->basis + (size_t)directions * (size_t)n, *next = mean + n;
+    int samples = sat__min_int(p->columns, 512), i, k, a, step;
+    uint64_t seed = 1;
+    for (k = 0; k < n; k++) mean[k] = 0;
+    for (i = 0; i < samples; i++) {
+        const float *f = p->column_features + (size_t)((int64_t)i * p->columns / samples) * (size_t)p->feature_count;
+        for (k = 0; k < n; k++) mean[k] += (double)f[k] / samples;
+    }
+    for (k = 0; k < directions * n; k++) s->basis[k] = softassign__uniform(&seed) - 0.5;
+    softassign__orthonormalise(s->basis, directions, n);
+    for (step = 0; step < 4; step++) {
+        for (k = 0; k < directions * n; k++) next[k] = 0;
+        for (i = 0; i < samples; i++) {
+            const float *f = p->column_features + (size_t)((int64_t)i * p->columns / samples) * (size_t)p->feature_count;
+            for (a = 0; a < directions; a++) {
+                const double *u = s->basis + (size_t)a * (size_t)n;
+                double *v = next + (size_t)a * (size_t)n, dot = 0;
+                for (k = 0; k < n; k++) dot += u[k] * ((double)f[k] - mean[k]);
+                for (k = 0; k < n; k++) v[k] += dot * ((double)f[k] - mean[k]);
+            }
+        }
+        for (k = 0; k < directions * n; k++) s->basis[k] = next[k];
+        softassign__orthonormalise(s->basis, directions, n);
+    }
+}
+
+/* Coordinates of one feature vector, `stride` floats apart; returns its norm around the mean. */
+static double softassign__project(const softassign *s, const float *f, int n, int directions, float *out, int stride)
+{
+    const double *mean = s->basis + (size_t)directions * (size_t)n;
+    double whole = 0, part = 0, rest;
+    int a, k;
+    for (k = 0; k < n; k++) whole += ((double)f[k] - mean[k]) * ((double)f[k] - mean[k]);
+    for (a = 0; a < directions; a++) {
+        const double *u = s->basis + (size_t)a * (size_t)n;
+        double dot = 0;
+        for (k = 0; k < n; k++) dot += u[k] * ((double)f[k] - mean[k]);
+        part += dot * dot;
+        out[a * stride] = (float)dot;
+    }
+    rest = whole > part ? sqrt(whole - part) : 0;
+    if (s->dims > directions) out[directions * stride] = (float)rest;
+    return sqrt(whole);
+}
+
+typedef struct softassign__projection {
+    softassign *s;
+    int features, directions;
+    double largest[2]; /* norms are maxima: no order to mind */
+    double *norm;      /* per worker, two */
+} softassign__projection;
+
+static void softassign__project_range(int begin, int end, int worker, void *context)
+{
+    softassign__projection *p = (softassign__projection *)context;
+    softassign *s = p->s;
+    int i, d = s->dims, wide = s->problem.feature_count;
+    for (i = begin; i < end; i++) {
+        double norm;
+        int is_row = i >= s->slots, j = i - s->slots;
+        if (is_row)
+            norm = softassign__project(s, s->problem.row_features + (size_t)j * (size_t)wide, p->features, p->directions,
+                                       s->row_coarse + (size_t)j * (size_t)d, 1);
+        else
+            norm = softassign__project(s, s->problem.column_features + (size_t)softassign__column(s, i) * (size_t)wide,
+                                       p->features, p->directions,
+                                       s->coarse + (size_t)(i / SOFTASSIGN__BLOCK) * (size_t)(d * SOFTASSIGN__BLOCK) + i % SOFTASSIGN__BLOCK,
+                                       SOFTASSIGN__BLOCK);
+        if (norm > p->norm[2 * worker + is_row]) p->norm[2 * worker + is_row] = norm;
+    }
+}
+
+static void softassign__start_bound(softassign *s)
+{
+    softassign__projection p;
+    int n = sat__min_int(s->problem.feature_count, SOFTASSIGN__BOUND_FEATURES), w, a;
+    int workers = sat__worker_count(&s->options.threads);
+    p.s = s;
+    p.features = n;
+    p.directions = n <= SOFTASSIGN__DIMS ? n : SOFTASSIGN__DIMS - 1;
+    s->dims = sat__min_int(n, SOFTASSIGN__DIMS);
+    p.norm = s->distance; /* not in use yet */
+    if (n > SOFTASSIGN__DIMS) softassign__find_basis(s, n, p.directions);
+    else
+        for (a = 0; a < (n + 1) * n; a++) s->basis[a] = a < n * n && a % (n + 1) == 0 ? 1 : 0;
+    for (w = 0; w < 2 * workers; w++) p.norm[w] = 0;
+    sat__parallel_for(&s->options.threads, s->slots + s->rows, softassign__project_range, &p);
+    for (w = 1; w < workers; w++)
+        for (a = 0; a < 2; a++)
+            if (p.norm[2 * w + a] > p.norm[a]) p.norm[a] = p.norm[2 * w + a];
+    s->shrink = 1 - 1.2e-7f * (float)(s->problem.feature_count + 32);
+    if (s->shrink < 0) s->shrink = 0;
+    s->slack = (float)((p.norm[0] + p.norm[1]) * 4.8e-7 + 1e-18 * sqrt((double)s->problem.feature_count + 4));
+    for (a = s->slots; a < s->padded; a++) /* the last block reads as zeros behind the slots */
+        for (w = 0; w < s->dims; w++)
+            s->coarse[(a / SOFTASSIGN__BLOCK) * s->dims * SOFTASSIGN__BLOCK + w * SOFTASSIGN__BLOCK + a % SOFTASSIGN__BLOCK] = 0;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Lists: the slots of smallest cost - price of a row, and a limit that no other slot falls below
+
+   Prices only fall while paths are searched, so a list made at some prices stays valid with its limit. It need not
+   grow: made anew at the prices of the moment it holds the columns that matter now.
+   ------------------------------------------------------------------------------------------------ */
+
+static inline int softassign__before(const softassign__candidate *a, const softassign__candidate *b)
+{
+    return a->value < b->value || (!(b->value < a->value) && a->slot < b->slot);
+}
+
+/* The k-th smallest (from 0) of n floats; reorders them. */
+static float softassign__select(float *v, int n, int k)
+{
+    int low = 0, high = n - 1;
+    while (low < high) {
+        float pivot = v[low + (high - low) / 2];
+        int i = low, j = high;
+        while (i <= j) {
+            while (v[i] < pivot) i++;
+            while (v[j] > pivot) j--;
+            if (i <= j) {
+                float t = v[i];
+                v[i++] = v[j];
+                v[j--] = t;
+            }
+        }
+        if (k <= j) high = j;
+        else if (k >= i) low = i;
+        else break;
+    }
+    return v[k];
+}
+
+/* Moves the k smallest of n candidates, in the total order above, to the front. */
+static void softassign__partition(softassign__candidate *v, int n, int k)
+{
+    int low = 0, high = n - 1;
+    while (low < high) {
+        softassign__candidate pivot = v[low + (high - low) / 2];
+        int i = low, j = high;
+        while (i <= j) {
+            while (softassign__before(&v[i], &pivot)) i++;
+            while (softassign__before(&pivot, &v[j])) j--;
+            if (i <= j) {
+                softassign__candidate t = v[i];
+                v[i++] = v[j];
+                v[j--] = t;
+            }
+        }
+        if (k <= j) high = j;
+        else if (k >= i) low = i;
+        else break;
+    }
+}
+
+static void softassign__sort(softassign__candidate *v, int n)
+{
+    int gap, i, j;
+    for (gap = 57; gap > 0; gap = gap == 57 ? 23 : gap == 23 ? 10 : gap == 10 ? 4 : gap == 4 ? 1 : 0) /* Ciura 2001 */
+        for (i = gap; i < n; i++) {
+            softassign__candidate x = v[i];
+            for (j = i; j >= gap && softassign__before(&x, &v[j - gap]); j -= gap) v[j] = v[j - gap];
+            v[j] = x;
+        }
+}
+
+/* Evaluates the slots with low < key <= high and appends them. */
+static int softassign__gather(const softassign *s, int row, softassign__scratch *w, int count, float low, float high)
+{
+    int b, j, n = s->padded / SOFTASSIGN__BLOCK;
+    for (b = 0; b < n; b++) {
+        if (!(w->block_min[b] <= high)) continue;
+        for (j = b * SOFTASSIGN__BLOCK; j < (b + 1) * SOFTASSIGN__BLOCK; j++) {
+            softassign__candidate *c = &w->candidates[count];
+            if (!(w->keys[j] <= high) || w->keys[j] <= low || j >= s->slots || s->capacity[j] == 0) continue;
+            c->cost = softassign__cost(s, row, j);
+            if (!s->problem.cost && !s->problem.cost_fn) w->distances++;
+            if (!(c->cost < SOFTASSIGN__INFINITY)) continue;
+            c->value = (double)c->cost - s->price[j];
+            c->slot = j;
+            count++;
+        }
+    }
+    return count;
+}
+
+/* A float at or above x. */
+static inline float softassign__float_above(double x) { return (float)(x + fabs(x) * 1.2e-7 + 1e-44); }
+static inline float softassign__float_below(double x) { return (float)(x - fabs(x) * 1.2e-7 - 1e-44); }
+
+static void softassign__list_row(softassign *s, int row, softassign__scratch *w)
+{
+    int blocks = s->padded / SOFTASSIGN__BLOCK, k = s->list, count, q;
+    size_t at = (size_t)row * (size_t)s->list;
+    float cut = SOFTASSIGN__INFINITY;
+    double limit = (double)SOFTASSIGN__INFINITY;
+    softassign__keys(s, row, w);
+    if (blocks > k) { /* at least k keys are not above the k-th smallest block minimum */
+        memcpy(w->select, w->block_min, (size_t)blocks * sizeof(float));
+        cut = softassign__select(w->select, blocks, k - 1);
+        if (!(cut < 3e38f)) cut = SOFTASSIGN__INFINITY;
+    }
+    count = softassign__gather(s, row, w, 0, -SOFTASSIGN__INFINITY, cut);
+    if (count > k) softassign__partition(w->candidates, count, k - 1);
+    if (cut < SOFTASSIGN__INFINITY) { /* a slot that is better than the k-th so far has a key below it */
+        float reach = cut;
+        int old = count;
+        if (count >= k) {
+            reach = softassign__float_above(w->candidates[k - 1].value);
+            if (reach > cut) count = softassign__gather(s, row, w, count, cut, reach);
+        }
+        limit = (double)(reach > cut ? reach : cut);
+        if (count > old) softassign__partition(w->candidates, count, k - 1);
+    }
+    if (count > k) {
+        for (q = k; q < count; q++)
+            if (w->candidates[q].value < limit) limit = w->candidates[q].value;
+        count = k;
+    }
+    softassign__sort(w->candidates, count);
+    for (q = 0; q < count; q++) {
+        s->list_slot[at + (size_t)q] = w->candidates[q].slot;
+        s->list_cost[at + (size_t)q] = w->candidates[q].cost;
+        s->list_value[at + (size_t)q] = softassign__float_below(w->candidates[q].value);
+    }
+    s->list_length[row] = count;
+    s->list_limit[row] = limit;
+}
+
+static void softassign__list_range(int begin, int end, int worker, void *context)
+{
+    softassign *s = (softassign *)context;
+    int i;
+    for (i = begin; i < end; i++) softassign__list_row(s, s->next + i, &s->scratch[worker]);
+}
+
+/* A list made again while serial work goes on. */
+static void softassign__relist(softassign *s, int row)
+{
+    softassign__list_row(s, row, &s->scratch[0]);
+    s->report.lists_built++;
+}
+
+/* The smallest cost - price of a row's list. */
+static double softassign__list_least(const softassign *s, int row)
+{
+    size_t at = (size_t)row * (size_t)s->list, end = at + (size_t)s->list_length[row];
+    double least = (double)SOFTASSIGN__INFINITY;
+    for (; at < end; at++) {
+        double value = (double)s->list_cost[at] - s->price[s->list_slot[at]];
+        if (value < least) least = value;
+    }
+    return least;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Softassign prices on lists
+
+   min <C,X> + eps sum x ln x, row sums 1, column sums <= capacity. The projection onto a column's inequality is
+   v <- min(top, v - eps ln(sum / capacity)): no outlier row. What lies beyond a list is left out: these prices are a
+   start for the paths, which are exact from any start.
+   ------------------------------------------------------------------------------------------------ */
+
+/* exp for x <= 0 with a relative error of 3e-7; below -87 about 1e-38 (Cody and Waite reduction, minimax of degree 5) */
+static inline float softassign__exp(float x)
+{
+    float z, k, r, p;
+    if (x < -87.0f) x = -87.0f;
+    if (x > 88.0f) x = 88.0f;
+    z = x * 1.44269504f + 12582912.0f;
+    k = z - 12582912.0f;
+    r = (x - k * 0.693359375f) - k * -2.12194440e-4f;
+    p = 1.9875691500e-4f;
+    p = p * r + 1.3981999507e-3f;
+    p = p * r + 8.3334519073e-3f;
+    p = p * r + 4.1665795894e-2f;
+    p = p * r + 1.6666665459e-1f;
+    p = p * r + 5.0000001201e-1f;
+    p = p * r * r + r + 1.0f;
+    return p * sat__float_from_bits((uint32_t)((int32_t)k + 127) << 23);
+}
+
+#ifdef SAT__VECTOR
+static inline sat__f32x4 softassign__exp4(sat__f32x4 x)
+{
+    sat__f32x4 z, k, r, p, magic = sat__f32x4_set1(12582912.0f);
+    x = sat__f32x4_min(sat__f32x4_max(x, sat__f32x4_set1(-87.0f)), sat__f32x4_set1(88.0f));
+    z = sat__f32x4_add(sat__f32x4_mul(x, sat__f32x4_set1(1.44269504f)), magic);
+    k = sat__f32x4_sub(z, magic);
+    r = sat__f32x4_sub(x, sat__f32x4_mul(k, sat__f32x4_set1(0.693359375f)));
+    r = sat__f32x4_sub(r, sat__f32x4_mul(k, sat__f32x4_set1(-2.12194440e-4f)));
+    p = sat__f32x4_set1(1.9875691500e-4f);
+    p = sat__f32x4_add(sat__f32x4_mul(p, r), sat__f32x4_set1(1.3981999507e-3f));
+    p = sat__f32x4_add(sat__f32x4_mul(p, r), sat__f32x4_set1(8.3334519073e-3f));
+    p = sat__f32x4_add(sat__f32x4_mul(p, r), sat__f32x4_set1(4.1665795894e-2f));
+    p = sat__f32x4_add(sat__f32x4_mul(p, r), sat__f32x4_set1(1.6666665459e-1f));
+    p = sat__f32x4_add(sat__f32x4_mul(p, r), sat__f32x4_set1(5.0000001201e-1f));
+    p = sat__f32x4_add(sat__f32x4_add(sat__f32x4_mul(sat__f32x4_mul(p, r), r), r), sat__f32x4_set1(1.0f));
+    k = sat__f32x4_mul(sat__f32x4_add(k, sat__f32x4_set1(127.0f)), sat__f32x4_set1(8388608.0f));
+    return sat__f32x4_mul(p, sat__f32x4_from_bits(sat__f32x4_truncate(k)));
+}
+#endif
+
+/* e[q] = exp((least - e[q]) / eps); returns the sum. */
+static float softassign__weights(float *e, int n, float least, float inverse)
+{
+    float lanes[4] = {0, 0, 0, 0};
+    int q = 0;
+#ifdef SAT__VECTOR
+    sat__f32x4 sum = sat__f32x4_set1(0), top = sat__f32x4_set1(least), factor = sat__f32x4_set1(inverse);
+    for (; q + 4 <= n; q += 4) {
+        sat__f32x4 x = softassign__exp4(sat__f32x4_mul(sat__f32x4_sub(top, sat__f32x4_load(e + q)), factor));
+        sat__f32x4_store(e + q, x);
+        sum = sat__f32x4_add(sum, x);
+    }
+    sat__f32x4_store(lanes, sum);
+#endif
+    for (; q < n; q++) {
+        e[q] = softassign__exp((least - e[q]) * inverse);
+        lanes[q & 3] += e[q];
+    }
+    return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+}
+
+/* One sweep over all rows; returns how far the fullest column overflows. */
+static float softassign__price_sweep(softassign *s, float eps)
+{
+    float worst = 0, *e = s->soft_row;
+    int i, j, q;
+    for (j = 0; j < s->slots; j++) s->column_sum[j] = 0;
+    for (i = 0; i < s->rows; i++) {
+        size_t at = (size_t)i * (size_t)s->list;
+        float least = SOFTASSIGN__INFINITY, sum;
+        int again;
+        for (again = 0; again < 2; again++) {
+            least = SOFTASSIGN__INFINITY;
+            for (q = 0; q < s->list_length[i]; q++) {
+                e[q] = s->list_cost[at + (size_t)q] - s->price_f[s->list_slot[at + (size_t)q]];
+                least = e[q] < least ? e[q] : least;
+            }
+            if (again || (double)least <= s->list_limit[i]) break;
+            softassign__relist(s, i);
+        }
+        sum = 1 / softassign__weights(e, s->list_length[i], least, 1 / eps);
+        for (q = 0; q < s->list_length[i]; q++) s->column_sum[s->list_slot[at + (size_t)q]] += e[q] * sum;
+    }
+    for (j = 0; j < s->slots; j++) {
+        double limit = s->top[j], price, fill;
+        if (s->capacity[j] == 0) continue;
+        fill = (double)s->column_sum[j] / s->capacity[j];
+        if (fill > 1 && fill - 1 > (double)worst) worst = (float)(fill - 1);
+        if (fill <= 1 && s->price[j] >= limit) continue;
+        price = fill < 1e-36 ? s->price[j] + 82 * (double)eps : s->price[j] - (double)eps * log(fill);
+        softassign__set_price(s, j, price < limit ? price : limit);
+    }
+    s->report.iterations++;
+    return worst;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Assignment: rows of a slot are a chain
+   ------------------------------------------------------------------------------------------------ */
+
+static inline int softassign__is_free(const softassign *s, int slot) { return s->used[slot] < s->capacity[slot]; }
+
+static void softassign__unassign(softassign *s, int row)
+{
+    int slot = s->slot_of_row[row], *link;
+    if (slot < 0) return;
+    for (link = &s->first_row[slot]; *link != row;) link = &s->next_row[*link];
+    *link = s->next_row[row];
+    s->used[slot]--;
+    s->slot_of_row[row] = -1;
+}
+
+static void softassign__assign(softassign *s, int row, int slot, float cost)
+{
+    softassign__unassign(s, row);
+    s->slot_of_row[row] = slot;
+    s->cost_of_row[row] = cost;
+    s->next_row[row] = s->first_row[slot];
+    s->first_row[slot] = row;
+    s->used[slot]++;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Shortest augmenting paths on lists
+
+   Dijkstra over slots with reduced costs (c_ij - c_ix) - (v_j - v_x), where x is the row's own slot: differences of
+   costs, so that one huge cost does not drown the small ones. A node slots + i stands for everything outside row i's
+   list: when it surfaces, the list is made anew, and when that was not enough, the whole row is looked at. Closed
+   nodes are never relaxed again.
+   ------------------------------------------------------------------------------------------------ */
+
+static inline double softassign__node_key(const softassign *s, int node)
+{
+    return node < s->slots ? s->distance[node] : s->row_distance[node - s->slots];
+}
+
+/* Order of the heap: distance, then free slots, full slots, lists; then the index. */
+static inline int softassign__node_before(const softassign *s, int a, int b)
+{
+    double x = softassign__node_key(s, a), y = softassign__node_key(s, b);
+    int class_a, class_b;
+    if (x < y) return 1;
+    if (y < x) return 0;
+    class_a = a >= s->slots ? 2 : !softassign__is_free(s, a);
+    class_b = b >= s->slots ? 2 : !softassign__is_free(s, b);
+    return class_a < class_b || (class_a == class_b && a < b);
+}
+
+static void softassign__heap_up(softassign *s, int at)
+{
+    int node = s->heap[at];
+    while (at > 0 && softassign__node_before(s, node, s->heap[(at - 1) / 2])) {
+        s->heap[at] = s->heap[(at - 1) / 2];
+        s->heap_at[s->heap[at]] = at;
+        at = (at - 1) / 2;
+    }
+    s->heap[at] = node;
+    s->heap_at[node] = at;
+}
+
+static void softassign__heap_push(softassign *s, int node)
+{
+    s->heap[s->heap_size] = node;
+    softassign__heap_up(s, s->heap_size++);
+}
+
+static int softassign__heap_pop(softassign *s)
+{
+    int first = s->heap[0], node = s->heap[--s->heap_size], at = 0, child;
+    while ((child = 2 * at + 1) < s->heap_size) {
+        if (child + 1 < s->heap_size && softassign__node_before(s, s->heap[child + 1], s->heap[child])) child++;
+        if (!softassign__node_before(s, s->heap[child], node)) break;
+        s->heap[at] = s->heap[child];
+        s->heap_at[s->heap[at]] = at;
+        at = child;
+    }
+    s->heap[at] = node;
+    s->heap_at[node] = at;
+    return first;
+}
+
+typedef struct softassign__search {
+    double nearest; /* distance of the nearest free slot met so far */
+    int root;
+    double root_cost, root_price; /* reference of the root, which has no slot of its own */
+} softassign__search;
+
+enum { SOFTASSIGN__OPEN = 1, SOFTASSIGN__CLOSED = 2 };
+
+static void softassign__relax(softassign *s, softassign__search *q, int row, int slot, float cost, double base,
+                              double own_cost, double own_price)
+{
+    double w = base + (((double)cost - own_cost) - (s->price[slot] - own_price));
+    int known = s->stamp[slot] - 4 * s->epoch;
+    if (known == SOFTASSIGN__CLOSED || w >= q->nearest) {
+        if (known == SOFTASSIGN__CLOSED || w > q->nearest || !softassign__is_free(s, slot)) return;
+    }
+    if (w < base) w = base; /* rounding */
+    if (known == SOFTASSIGN__OPEN && w >= s->distance[slot]) return;
+    s->distance[slot] = w;
+    s->parent[slot] = row;
+    s->parent_cost[slot] = cost;
+    if (known == SOFTASSIGN__OPEN) softassign__heap_up(s, s->heap_at[slot]);
+    else {
+        s->stamp[slot] = 4 * s->epoch + SOFTASSIGN__OPEN;
+        softassign__heap_push(s, slot);
+    }
+    if (w < q->nearest && softassign__is_free(s, slot)) q->nearest = w;
+}
+
+/* Relaxes the row's list at distance `base`, and leaves a node for the rest. */
+static void softassign__relax_list(softassign *s, softassign__search *q, int row, double base)
+{
+    size_t at = (size_t)row * (size_t)s->list, end = at + (size_t)s->list_length[row];
+    double own_cost = q->root_cost, own_price = q->root_price, shift, beyond;
+    if (row != q->root) {
+        own_cost = (double)s->cost_of_row[row];
+        own_price = s->price[s->slot_of_row[row]];
+    }
+    shift = base - (own_cost - own_price);
+    for (; at < end; at++) {
+        if ((double)s->list_value[at] + shift - (fabs((double)s->list_value[at]) + fabs(shift)) * 4e-16 > q->nearest) return;
+        softassign__relax(s, q, row, s->list_slot[at], s->list_cost[at], base, own_cost, own_price);
+    }
+    if (s->list_limit[row] >= (double)SOFTASSIGN__INFINITY) return;
+    beyond = s->list_limit[row] + shift;
+    beyond -= (fabs(s->list_limit[row]) + fabs(shift)) * 4e-16;
+    if (beyond >= q->nearest) return;
+    s->row_distance[row] = beyond < base ? base : beyond;
+    softassign__heap_push(s, s->slots + row);
+}
+
+/* Relaxes every slot of the row. */
+static void softassign__relax_row(softassign *s, softassign__search *q, int row, double base)
+{
+    softassign__scratch *w = &s->scratch[0];
+    double own_cost = q->root_cost, own_price = q->root_price, shift;
+    int j;
+    if (row != q->root) {
+        own_cost = (double)s->cost_of_row[row];
+        own_price = s->price[s->slot_of_row[row]];
+    }
+    shift = base - (own_cost - own_price);
+    softassign__keys(s, row, w);
+    s->report.rows_expanded++;
+    for (j = 0; j < s->slots; j++) {
+        int known = s->stamp[j] - 4 * s->epoch;
+        double least = (double)w->keys[j] + shift;
+        float cost;
+        least -= (fabs((double)w->keys[j]) + fabs(shift)) * 4e-16;
+        if (s->capacity[j] == 0 || least > q->nearest || known == SOFTASSIGN__CLOSED) continue;
+        if (known == SOFTASSIGN__OPEN && least >= s->distance[j]) continue;
+        cost = softassign__cost(s, row, j);
+        if (!s->problem.cost && !s->problem.cost_fn) w->distances++;
+        if (cost < SOFTASSIGN__INFINITY) softassign__relax(s, q, row, j, cost, base, own_cost, own_price);
+    }
+}
+
+/* The node of a list surfaced at distance key. */
+static void softassign__open_list(softassign *s, softassign__search *q, int row)
+{
+    double base = row == q->root ? 0 : s->distance[s->slot_of_row[row]];
+    if (s->row_stamp[row] == s->epoch) {
+        softassign__relax_row(s, q, row, base);
+        return;
+    }
+    s->row_stamp[row] = s->epoch;
+    softassign__relist(s, row);
+    softassign__relax_list(s, q, row, base);
+}
+
+/* Assigns the root along the shortest path and lowers the prices on the way; 0 when no path exists. */
+static int softassign__augment(softassign *s, int root)
+{
+    softassign__search q;
+    int closed = 0, end = -1, i, j;
+    size_t at = (size_t)root * (size_t)s->list, q_at;
+    double least = (double)SOFTASSIGN__INFINITY;
+    q.root = root;
+    q.nearest = (double)SOFTASSIGN__INFINITY;
+    s->epoch++;
+    s->heap_size = 0;
+    s->report.paths++;
+    if (softassign__list_least(s, root) > s->list_limit[root]) softassign__relist(s, root);
+    for (q_at = at; q_at < at + (size_t)s->list_length[root]; q_at++) {
+        double price = s->price[s->list_slot[q_at]], value = (double)s->list_cost[q_at] - price;
+        if (value < least) {
+            least = value;
+            q.root_cost = (double)s->list_cost[q_at];
+            q.root_price = price;
+        }
+    }
+    if (!(least < (double)SOFTASSIGN__INFINITY)) return 0;
+    softassign__relax_list(s, &q, root, 0);
+    s->report.work++;
+    while (s->heap_size > 0) {
+        int node = softassign__heap_pop(s);
+        s->report.work++;
+        if (node >= s->slots) {
+            softassign__open_list(s, &q, node - s->slots);
+            continue;
+        }
+        if (softassign__is_free(s, node)) {
+            end = node;
+            break;
+        }
+        s->stamp[node] = 4 * s->epoch + SOFTASSIGN__CLOSED;
+        s->closed[closed++] = node;
+        for (i = s->first_row[node]; i >= 0; i = s->next_row[i]) softassign__relax_list(s, &q, i, s->distance[node]);
+    }
+    if (end < 0) return 0;
+    for (i = 0; i < closed; i++) {
+        j = s->closed[i];
+        softassign__set_price(s, j, s->price[j] + (s->distance[j] - s->distance[end]));
+    }
+    for (j = end;;) {
+        int row = s->parent[j], old = s->slot_of_row[row];
+        softassign__assign(s, row, j, s->parent_cost[j]);
+        if (row == root) return 1;
+        j = old;
+    }
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Finish: a slot with room must have its top price. Where the start prices left one below, it is raised along a
+   shortest path of slots; the distance between slots a and b is the smallest reduced cost, in a, of a row of b.
+   Costs of a whole column are computed, no list is needed.
+   ------------------------------------------------------------------------------------------------ */
+
+/* Relaxes from slot `from` at distance `base` to the slots of all rows. */
+static void softassign__relax_column(softassign *s, int from, double base, double *nearest)
+{
+    int i;
+    for (i = 0; i < s->rows; i++) {
+        int j = s->slot_of_row[i], known;
+        float cost;
+        double w;
+        if (j < 0 || j == from) continue;
+        known = s->stamp[j] - 4 * s->epoch;
+        if (known == SOFTASSIGN__CLOSED) continue;
+        cost = softassign__cost(s, i, from);
+        if (!(cost < SOFTASSIGN__INFINITY)) continue;
+        w = (((double)cost - (double)s->cost_of_row[i]) - (s->price[from] - s->price[j]));
+        w = base + (w > 0 ? w : 0);
+        if (w >= *nearest || (known == SOFTASSIGN__OPEN && w >= s->distance[j])) continue;
+        s->distance[j] = w;
+        s->parent[j] = i; /* the row of j that moves to `from` */
+        s->parent_cost[j] = cost;
+        s->touched[j] = from;
+        if (known == SOFTASSIGN__OPEN) softassign__heap_up(s, s->heap_at[j]);
+        else {
+            s->stamp[j] = 4 * s->epoch + SOFTASSIGN__OPEN;
+            softassign__heap_push(s, j);
+        }
+    }
+    s->scratch[0].distances += (size_t)s->rows;
+    s->report.work += (size_t)s->rows / 16 + 1;
+}
+
+static void softassign__finish(softassign *s, int slot)
+{
+    double nearest = s->top[slot] - s->price[slot]; /* raising the slot alone */
+    int end = slot, closed = 0, i, j;
+    s->epoch++;
+    s->heap_size = 0;
+    s->report.columns_finished++;
+    s->stamp[slot] = 4 * s->epoch + SOFTASSIGN__CLOSED;
+    s->distance[slot] = 0;
+    s->closed[closed++] = slot;
+    softassign__relax_column(s, slot, 0, &nearest);
+    while (s->heap_size > 0) {
+        j = softassign__heap_pop(s);
+        if (s->distance[j] >= nearest) break;
+        s->stamp[j] = 4 * s->epoch + SOFTASSIGN__CLOSED;
+        s->closed[closed++] = j;
+        if (s->distance[j] + (s->top[j] - s->price[j]) < nearest) { /* j may lose a row and rise to its top */
+            nearest = s->distance[j] + (s->top[j] - s->price[j]);
+            end = j;
+        }
+        softassign__relax_column(s, j, s->distance[j], &nearest);
+    }
+    for (i = 0; i < closed; i++) {
+        double up;
+        j = s->closed[i];
+        up = s->price[j] + (nearest - s->distance[j]);
+        if (!(s->distance[j] < nearest)) continue;
+        softassign__set_price(s, j, up < s->top[j] ? up : s->top[j]);
+        s->raised[j] = 1;
+    }
+    for (j = end; j != slot;) {
+        int to = s->touched[j];
+        softassign__assign(s, s->parent[j], to, s->parent_cost[j]);
+        j = to;
+    }
+    softassign__set_price(s, end, s->top[end]);
+}
+
+/* ------------------------------------------------------------------------------------------------
+   The certificate: sum_i min_j (c_ij - v_j) + sum_j capacity_j v_j is below every assignment when v <= 0 (mandatory
+   slots, which are full in every assignment: any v).
+   ------------------------------------------------------------------------------------------------ */
+
+static double softassign__dense_row_bound(const softassign *s, int row)
+{
+    const float *cost = s->matrix + (size_t)row * (size_t)s->columns;
+    int j, stay = s->problem.previous ? s->problem.previous[row] : -1;
+    double least = (double)SOFTASSIGN__INFINITY;
+    for (j = 0; j < s->columns; j++) {
+        double value = (double)cost[j] - s->price[j];
+        if (j == stay) value = (double)softassign__pair(&s->problem, row, j) - s->price[j]; /* without the bonus */
+        if (value < least) least = value;
+    }
+    return least;
+}
+
+/* A list that ended below the row's own value is made anew first when the solver is done: the bound is then tight. */
+static double softassign__row_bound(softassign *s, int row)
+{
+    size_t at = (size_t)row * (size_t)s->list, end;
+    int stay = s->problem.previous ? s->problem.previous[row] : -1, own = s->slot_of_row[row];
+    double least;
+    if (s->dense_paths) return softassign__dense_row_bound(s, row);
+    if (s->phase == SOFTASSIGN__DONE && own >= 0 && s->list_limit[row] < (double)s->cost_of_row[row] - s->price[own])
+        softassign__relist(s, row);
+    least = s->list_limit[row];
+    for (end = at + (size_t)s->list_length[row]; at < end; at++) {
+        int slot = s->list_slot[at];
+        double cost = (double)s->list_cost[at], value;
+        if (softassign__column(s, slot) == stay) cost = (double)softassign__pair(&s->problem, row, stay);
+        value = cost - s->price[slot];
+        if (value < least) least = value;
+    }
+    return least;
+}
+
+static void softassign__certify(softassign *s)
+{
+    softassign__sum bound = {0, 0, 0};
+    double *least = s->row_distance;
+    int i, j;
+    for (i = 0; i < s->rows; i++) least[i] = softassign__row_bound(s, i);
+    for (j = 0; j < s->slots; j++) {
+        if (s->price[j] != 0 && s->capacity[j] > 0) softassign__add(&bound, s->price[j] * s->capacity[j]);
+        if (!s->raised[j] || s->capacity[j] == 0 || s->dense_paths) continue;
+        s->scratch[0].distances += (size_t)s->rows;
+        for (i = 0; i < s->rows; i++) {
+            double value = (double)softassign__pair(&s->problem, i, softassign__column(s, j)) - s->price[j];
+            if (value < least[i]) least[i] = value;
+        }
+    }
+    for (i = 0; i < s->rows; i++) softassign__add(&bound, least[i]);
+    s->bound = softassign__total_below(&bound);
+    if (!sat__is_finite_double(s->bound)) s->bound = -(double)SOFTASSIGN__INFINITY;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Auction on lists (Bertsekas 1988): every row bids for its best slot and pays down to its second best, less eps.
+   A slot that fell below its top price stays taken, so the bound loses at most eps a row. Capacities of 1 only.
+   ------------------------------------------------------------------------------------------------ */
+
+/* Best slot of a row and the value of its second best, which the limit of the list may stand for. */
+static int softassign__best_two(softassign *s, int row, double *best, double *second)
+{
+    size_t at = (size_t)row * (size_t)s->list, end;
+    int again, entry = -1;
+    for (again = 0; again < 2; again++) {
+        double m1 = (double)SOFTASSIGN__INFINITY, m2 = m1;
+        for (entry = -1, end = at + (size_t)s->list_length[row]; at < end; at++) {
+            double value;
+            if ((double)s->list_value[at] >= m2) break; /* sorted, and values only rise */
+            value = (double)s->list_cost[at] - s->price[s->list_slot[at]];
+            if (value < m1) {
+                m2 = m1;
+                m1 = value;
+                entry = (int)(at - (size_t)row * (size_t)s->list);
+            } else if (value < m2) m2 = value;
+        }
+        *best = m1;
+        *second = m2 < s->list_limit[row] ? m2 : s->list_limit[row];
+        if (m1 <= s->list_limit[row]) break;
+        softassign__relist(s, row);
+        at = (size_t)row * (size_t)s->list;
+    }
+    return entry;
+}
+
+/* Bids until every row has a slot; 0 when the budget ran out first or a row has no choice at all. */
+static int softassign__auction(softassign *s, double eps, size_t budget)
+{
+    int *stack = s->heap, size = 0, i;
+    for (i = s->rows - 1; i >= 0; i--)
+        if (s->slot_of_row[i] < 0) stack[size++] = i;
+    while (size > 0) {
+        double best, second;
+        int row = stack[--size], entry, slot, out;
+        size_t at;
+        if (budget-- == 0) return 0;
+        entry = softassign__best_two(s, row, &best, &second);
+        if (entry < 0) return 0;
+        if (!(second < (double)SOFTASSIGN__INFINITY)) second = best;
+        at = (size_t)row * (size_t)s->list + (size_t)entry;
+        slot = s->list_slot[at];
+        out = s->first_row[slot];
+        if (out >= 0) {
+            softassign__unassign(s, out);
+            stack[size++] = out;
+        }
+        softassign__assign(s, row, slot, s->list_cost[at]);
+        softassign__set_price(s, slot, s->price[slot] - (second - best) - eps);
+        s->report.iterations++;
+        s->report.work++;
+    }
+    return 1;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   The dense solver for small problems: shortest augmenting paths after two rounds of augmenting row reduction
+   (Jonker and Volgenant 1987, with prices that never rise above 0). Capacities of 1 only.
+   ------------------------------------------------------------------------------------------------ */
+
+static void softassign__dense_swap(softassign *s, int row, int slot)
+{
+    int out = s->first_row[slot];
+    if (s->slot_of_row[row] >= 0) s->first_row[s->slot_of_row[row]] = -1;
+    s->first_row[slot] = row;
+    s->slot_of_row[row] = slot;
+    if (out >= 0) s->slot_of_row[out] = -1;
+}
+
+/* Rows without a slot take their best one and pay down to the second best; returns how many are left in s->closed. */
+static int softassign__reduce_rows(softassign *s, int *rows, int count)
+{
+    int next = 0, left = 0, j, budget = 8 * count + 64;
+    while (next < count) {
+        int row = rows[next++], best = -1, other = -1, out;
+        const float *cost = s->matrix + (size_t)row * (size_t)s->columns;
+        double m1 = (double)SOFTASSIGN__INFINITY, m2 = m1;
+        for (j = 0; j < s->slots; j++) {
+            double value = (double)cost[j] - s->price[j];
+            if (value >= m2) continue;
+            if (value < m1) {
+                m2 = m1;
+                other = best;
+                m1 = value;
+                best = j;
+            } else {
+                m2 = value;
+                other = j;
+            }
+        }
+        if (best < 0) {
+            rows[left++] = row;
+            continue;
+        }
+        out = s->first_row[best];
+        if (other >= 0 && s->price[best] - (m2 - m1) < s->price[best]) s->price[best] -= m2 - m1;
+        else if (out >= 0 && other >= 0) {
+            best = other;
+            out = s->first_row[best];
+        }
+        if (out >= 0 && other < 0) { /* its only choice is taken: leave it to the paths */
+            rows[left++] = row;
+            continue;
+        }
+        softassign__dense_swap(s, row, best);
+        if (out < 0) continue;
+        if (m2 > m1 && budget-- > 0) rows[--next] = out;
+        else rows[left++] = out;
+    }
+    return left;
+}
+
+/* The slots that are open stand in `open`; every row visit relaxes them and finds the nearest. */
+static int softassign__augment_dense(softassign *s, int root)
+{
+    const float *cost = s->matrix + (size_t)root * (size_t)s->columns;
+    double *d = s->distance, own_cost = 0, own_price = 0, base = 0, least = (double)SOFTASSIGN__INFINITY;
+    int *open = s->heap, *pred = s->parent, count = s->slots, closed = 0, row = root, j, k, end, at;
+    s->report.paths++;
+    for (j = 0; j < s->slots; j++) {
+        double value = (double)cost[j] - s->price[j];
+        open[j] = j;
+        d[j] = (double)SOFTASSIGN__INFINITY;
+        if (value < least) {
+            least = value;
+            own_cost = (double)cost[j];
+            own_price = s->price[j];
+        }
+    }
+    for (;;) {
+        double nearest = (double)SOFTASSIGN__INFINITY;
+        at = -1;
+        s->report.work++;
+        for (k = 0; k < count; k++) {
+            double w;
+            j = open[k];
+            w = base + (((double)cost[j] - own_cost) - (s->price[j] - own_price));
+            if (w < d[j]) {
+                d[j] = w;
+                pred[j] = row;
+            }
+            if (d[j] < nearest || (d[j] <= nearest && at >= 0 && s->first_row[open[at]] >= 0 && s->first_row[j] < 0)) {
+                nearest = d[j];
+                at = k;
+            }
+        }
+        if (at < 0) return 0;
+        if (nearest < base) nearest = base; /* rounding */
+        end = open[at];
+        base = d[end] = nearest;
+        if (s->first_row[end] < 0) break;
+        open[at] = open[--count];
+        s->closed[closed++] = end;
+        row = s->first_row[end];
+        cost = s->matrix + (size_t)row * (size_t)s->columns;
+        own_cost = (double)cost[end];
+        own_price = s->price[end];
+    }
+    for (k = 0; k < closed; k++) s->price[s->closed[k]] += d[s->closed[k]] - base;
+    for (j = end;;) {
+        int old;
+        row = pred[j];
+        old = s->slot_of_row[row];
+        s->slot_of_row[row] = j;
+        s->first_row[j] = row;
+        if (row == root) return 1;
+        j = old;
+    }
+}
+
+/* What the rest of the library reads of an assignment. */
+static void softassign__dense_publish(softassign *s)
+{
+    int i, j;
+    for (j = 0; j < s->slots; j++) {
+        s->used[j] = s->first_row[j] >= 0;
+        s->price_f[j] = (float)s->price[j];
+    }
+    for (i = 0; i < s->rows; i++) {
+        s->next_row[i] = -1;
+        if (s->slot_of_row[i] >= 0) s->cost_of_row[i] = softassign__cost(s, i, s->slot_of_row[i]);
+    }
+}
+
+/* ------------------------------------------------------------------------------------------------
+   The solver: phases that can be left at any time
+   ------------------------------------------------------------------------------------------------ */
+
+static void softassign__reset_assignment(softassign *s)
+{
+    int i, j;
+    for (j = 0; j < s->max_slots; j++) {
+        s->used[j] = 0;
+        s->first_row[j] = -1;
+        s->raised[j] = 0;
+    }
+    for (i = 0; i < s->rows; i++) s->slot_of_row[i] = -1;
+}
+
+static void softassign__reset_prices(softassign *s)
+{
+    int j;
+    for (j = 0; j < s->max_slots; j++) softassign__set_price(s, j, j < s->slots ? s->top[j] : 0);
+    for (; j < s->padded; j++) s->price_f[j] = 0;
+}
+
+/* The mean of the row minima at the prices of the moment: the scale of the temperatures. */
+static double softassign__mean_least(const softassign *s)
+{
+    double sum = 0;
+    int i, count = 0;
+    for (i = 0; i < s->rows; i++)
+        if (s->list_length[i] > 0) {
+            sum += fabs((double)s->list_cost[(size_t)i * (size_t)s->list]);
+            count++;
+        }
+    return count ? sum / count : 0;
+}
+
+/* One step of a phase; sets the next phase when it is over. SAT_ERR_LIMIT: report.row_error found no column. */
+static sat_result softassign__list_phase(softassign *s, size_t budget)
+{
+    int count = s->rows - s->next;
+    if ((size_t)count > budget) count = (int)budget;
+    sat__parallel_for(&s->options.threads, count, softassign__list_range, s);
+    s->next += count;
+    s->report.work += (size_t)count;
+    s->report.lists_built += (size_t)count;
+    if (s->next < s->rows) return SAT_OK;
+    s->next = 0;
+    if (s->phase == SOFTASSIGN__RELIST || s->prices_known) s->phase = SOFTASSIGN__PATHS;
+    else {
+        s->phase = SOFTASSIGN__PRICES;
+        s->temperature = 0.3 * softassign__mean_least(s);
+        s->schedule[0] = s->schedule[1] = 0;
+        if (!(s->temperature > 1e-30)) s->phase = SOFTASSIGN__PATHS;
+    }
+    return SAT_OK;
+}
+
+static sat_result softassign__price_phase(softassign *s)
+{
+    float overflow = softassign__price_sweep(s, (float)s->temperature);
+    s->report.work += (size_t)s->rows;
+    if (overflow >= 0.02f && ++s->schedule[1] < 10) return SAT_OK;
+    s->schedule[1] = 0;
+    s->temperature *= 0.5;
+    if (++s->schedule[0] < 6) return SAT_OK;
+    s->phase = SOFTASSIGN__RELIST;
+    s->next = 0;
+    return SAT_OK;
+}
+
+/* Row reduction in the first call, then one path a call. */
+static sat_result softassign__dense_phase(softassign *s)
+{
+    int i;
+    if (s->next == 0) {
+        for (i = 0; i < s->rows; i++) s->kept[i] = i;
+        s->left = softassign__reduce_rows(s, s->kept, s->rows);
+        s->left = softassign__reduce_rows(s, s->kept, s->left);
+        s->report.work += (size_t)s->rows;
+    }
+    if (s->next < s->left) {
+        if (!softassign__augment_dense(s, s->kept[s->next])) {
+            s->report.row_error = s->kept[s->next];
+            return SAT_ERR_LIMIT;
+        }
+        s->next++;
+    }
+    if (s->next < s->left) return SAT_OK;
+    softassign__dense_publish(s);
+    s->phase = SOFTASSIGN__FINISH;
+    s->next = 0;
+    return SAT_OK;
+}
+
+static sat_result softassign__path_phase(softassign *s)
+{
+    if (s->dense_paths) return softassign__dense_phase(s);
+    if (!softassign__augment(s, s->next)) {
+        s->report.row_error = s->next;
+        return SAT_ERR_LIMIT;
+    }
+    if (++s->next < s->rows) return SAT_OK;
+    s->phase = SOFTASSIGN__FINISH;
+    s->next = 0;
+    return SAT_OK;
+}
+
+static sat_result softassign__finish_phase(softassign *s)
+{
+    while (s->next < s->slots) {
+        int j = s->next;
+        if (softassign__is_free(s, j) && s->price[j] < s->top[j]) {
+            softassign__finish(s, j);
+            return SAT_OK;
+        }
+        s->next++;
+    }
+    s->phase = SOFTASSIGN__DONE;
+    s->prices_known = 1;
+    return SAT_OK;
+}
+
+static sat_result softassign__advance(softassign *s, size_t budget)
+{
+    size_t stop = s->report.work + budget;
+    sat_result result = SAT_OK;
+    while (s->phase != SOFTASSIGN__DONE && s->report.work < stop && result == SAT_OK) {
+        if (s->phase == SOFTASSIGN__LISTS || s->phase == SOFTASSIGN__RELIST) result = softassign__list_phase(s, stop - s->report.work);
+        else if (s->phase == SOFTASSIGN__PRICES) result = softassign__price_phase(s);
+        else if (s->phase == SOFTASSIGN__PATHS) result = softassign__path_phase(s);
+        else result = softassign__finish_phase(s);
+    }
+    return result;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Memory
+   ------------------------------------------------------------------------------------------------ */
+
+static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
+{
+    size_t rows = (size_t)s->rows, cells = 0, slots = (size_t)s->max_slots, padded = (size_t)s->padded, list = rows * (size_t)s->list;
+    int workers = sat__worker_count(&s->options.threads), w;
+    if (s->dense && !sat__multiply_size(&cells, rows, (size_t)s->columns)) a->overflow = 1;
+    s->matrix = (float *)sat__carve(a, cells, sizeof(float));
+    s->price = (double *)sat__carve(a, slots, sizeof(double));
+    s->top = (double *)sat__carve(a, slots, sizeof(double));
+    s->distance = (double *)sat__carve(a, slots > 2 * (size_t)workers ? slots : 2 * (size_t)workers, sizeof(double));
+    s->row_distance = (double *)sat__carve(a, rows, sizeof(double));
+    s->list_limit = (double *)sat__carve(a, rows, sizeof(double));
+    s->basis = (double *)sat__carve(a, (size_t)(2 * SOFTASSIGN__DIMS + 1) * (size_t)features, sizeof(double));
+    s->price_f = (float *)sat__carve(a, padded, sizeof(float));
+    s->coarse = (float *)sat__carve(a, padded * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
+    s->row_coarse = (float *)sat__carve(a, rows * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
+    s->cost_of_row = (float *)sat__carve(a, rows, sizeof(float));
+    s->list_cost = (float *)sat__carve(a, list, sizeof(float));
+    s->list_value = (float *)sat__carve(a, list, sizeof(float));
+    s->parent_cost = (float *)sat__carve(a, slots, sizeof(float));
+    s->column_sum = (float *)sat__carve(a, slots, sizeof(float));
+    s->soft_row = (float *)sat__carve(a, padded, sizeof(float));
+    s->slot_column = (int *)sat__carve(a, slots, sizeof(int));
+    s->capacity = (int *)sat__carve(a, slots, sizeof(int));
+    s->used = (int *)sat__carve(a, slots, sizeof(int));
+    s->first_row = (int *)sat__carve(a, slots, sizeof(int));
+    s->slot_of_row = (int *)sat__carve(a, rows, sizeof(int));
+    s->next_row = (int *)sat__carve(a, rows, sizeof(int));
+    s->list_slot = (int *)sat__carve(a, list, sizeof(int));
+    s->list_length = (int *)sat__carve(a, rows, sizeof(int));
+    s->parent = (int *)sat__carve(a, slots, sizeof(int));
+    s->stamp = (int *)sat__carve(a, slots, sizeof(int));
+    s->row_stamp = (int *)sat__carve(a, rows, sizeof(int));
+    s->touched = (int *)sat__carve(a, slots, sizeof(int));
+    s->kept = (int *)sat__carve(a, rows, sizeof(int));
+    s->leader = (int *)sat__carve(a, rows, sizeof(int));
+    s->shown = (int *)sat__carve(a, rows, sizeof(int));
+    s->shown_column = (int *)sat__carve(a, rows, sizeof(int));
+    s->closed = (int *)sat__carve(a, slots + rows, sizeof(int));
+    s->heap = (int *)sat__carve(a, slots + rows, sizeof(int));
+    s->heap_at = (int *)sat__carve(a, slots + rows, sizeof(int));
+    s->raised = (unsigned char *)sat__carve(a, slots, 1);
+    s->scratch = (softassign__scratch *)sat__carve(a, (size_t)workers, sizeof *s->scratch);
+    for (w = 0; w < workers; w++) {
+        float *keys = (float *)sat__carve(a, padded, sizeof(float));
+        float *block_min = (float *)sat__carve(a, padded / SOFTASSIGN__BLOCK, sizeof(float));
+        float *select = (float *)sat__carve(a, padded / SOFTASSIGN__BLOCK, sizeof(float));
+        softassign__candidate *candidates = (softassign__candidate *)sat__carve(a, padded + 1, sizeof *candidates);
+        if (!a->base) continue;
+        s->scratch[w].keys = keys;
+        s->scratch[w].block_min = block_min;
+        s->scratch[w].select = select;
+        s->scratch[w].candidates = candidates;
+        s->scratch[w].distances = 0;
+    }
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Greedy search (Slomp 2012, section 3.4.2), and moves and swaps while they help
+   ------------------------------------------------------------------------------------------------ */
+
+/* The nearest slot with room, through lists that see full slots as infinitely dear. */
+static int softassign__nearest_free(softassign *s, int row, float *cost)
+{
+    size_t at = (size_t)row * (size_t)s->list;
+    int again, q;
+    for (again = 0; again < 2; again++) {
+        for (q = 0; q < s->list_length[row]; q++)
+            if (softassign__is_free(s, s->list_slot[at + (size_t)q])) {
+                *cost = s->list_cost[at + (size_t)q];
+                return s->list_slot[at + (size_t)q];
+            }
+        if (!again) softassign__relist(s, row);
+    }
+    return -1;
+}
+
+#define SOFTASSIGN__FULL_PRICE (-1e37)
+
+static void softassign__greedy_take(softassign *s, int row, int slot, float cost)
+{
+    softassign__assign(s, row, slot, cost);
+    if (!softassign__is_free(s, slot)) softassign__set_price(s, slot, SOFTASSIGN__FULL_PRICE);
+}
+
+/* Every row takes its best match; rows of a slot that was chosen too often then move, in order, to their best free one.
+   Returns the number of rows that found none. */
+static int softassign__greedy(softassign *s)
+{
+    int *wanted = s->touched, *best = s->heap, i, j, lost = 0;
+    for (j = 0; j < s->slots; j++) wanted[j] = 0;
+    for (i = 0; i < s->rows; i++) {
+        best[i] = s->list_length[i] ? s->list_slot[(size_t)i * (size_t)s->list] : -1;
+        if (best[i] >= 0) wanted[best[i]]++;
+    }
+    for (i = s->rows - 1; i >= 0; i--) /* the last ones in order keep it */
+        if (best[i] >= 0 && s->used[best[i]] < s->capacity[best[i]] )
+            softassign__greedy_take(s, i, best[i], s->list_cost[(size_t)i * (size_t)s->list]);
+    for (i = 0; i < s->rows; i++) {
+        float cost = 0;
+        if (s->slot_of_row[i] >= 0) continue;
+        j = softassign__nearest_free(s, i, &cost);
+        if (j >= 0) softassign__greedy_take(s, i, j, cost);
+        else lost++;
+        s->report.iterations++;
+    }
+    return lost;
+}
+
+/* What changes when `row` goes to `slot`: into a place, or in exchange with the row that gains most by it. */
+static double softassign__move_gain(softassign *s, int row, int slot, float cost, int *partner, float *partner_cost)
+{
+    double own = (double)cost - (double)s->cost_of_row[row], best = (double)SOFTASSIGN__INFINITY;
+    int k, from = s->slot_of_row[row];
+    *partner = -1;
+    if (softassign__is_free(s, slot)) return own;
+    for (k = s->first_row[slot]; k >= 0; k = s->next_row[k]) {
+        float back = softassign__cost(s, k, from);
+        double change = own + ((double)back - (double)s->cost_of_row[k]);
+        s->scratch[0].distances++;
+        if (!(change < best)) continue;
+        best = change;
+        *partner = k;
+        *partner_cost = back;
+    }
+    return best;
+}
+
+static void softassign__move(softassign *s, int row, int slot, float cost, int partner, float partner_cost)
+{
+    int from = s->slot_of_row[row];
+    if (partner >= 0) softassign__unassign(s, partner);
+    softassign__assign(s, row, slot, cost);
+    if (partner >= 0) softassign__assign(s, partner, from, partner_cost);
+}
+
+/* The grid distance of two rows is below the minimum. */
+static int softassign__too_close(const softassign *s, int a, int b)
+{
+    int w = s->options.grid_width;
+    double dx = a % w - b % w, dy = a / w - b / w;
+    return dx * dx + dy * dy < s->options.min_distance * s->options.min_distance;
+}
+
+/* Rows with the same column too close to `row`, were it in `slot`. */
+static int softassign__conflicts(const softassign *s, int row, int slot, int without)
+{
+    int column = softassign__column(s, slot), count = 0, j, k;
+    if (s->options.grid_width < 1 || !(s->options.min_distance > 0)) return 0;
+    for (j = column; j < s->slots; j = j < s->columns ? s->columns : j + 1) {
+        if (softassign__column(s, j) != column) continue;
+        for (k = s->first_row[j]; k >= 0; k = s->next_row[k])
+            count += k != row && k != without && softassign__too_close(s, row, k);
+    }
+    return count;
+}
+
+/* The best move or swap of a row among all columns that are nearer than its own. */
+static int softassign__improve_row(softassign *s, int row)
+{
+    softassign__scratch *w = &s->scratch[0];
+    double best = -1e-9 * fabs((double)s->cost_of_row[row]);
+    int j, to = -1, partner = -1;
+    float to_cost = 0, partner_cost = 0;
+    softassign__keys(s, row, w);
+    for (j = 0; j < s->slots; j++) {
+        float cost, back = 0;
+        int other;
+        double gain;
+        if (!(w->keys[j] < s->cost_of_row[row]) || s->capacity[j] == 0 || j == s->slot_of_row[row]) continue;
+        cost = softassign__cost(s, row, j);
+        w->distances++;
+        if (!(cost < s->cost_of_row[row])) continue;
+        gain = softassign__move_gain(s, row, j, cost, &other, &back);
+        if (!(gain < best) || softassign__conflicts(s, row, j, other)) continue;
+        if (other >= 0 && softassign__conflicts(s, other, s->slot_of_row[row], row)) continue;
+        best = gain;
+        to = j;
+        to_cost = cost;
+        partner = other;
+        partner_cost = back;
+    }
+    if (to >= 0) softassign__move(s, row, to, to_cost, partner, partner_cost);
+    s->report.iterations++;
+    return to >= 0;
+}
+
+static void softassign__two_opt(softassign *s, int passes)
+{
+    int pass, i, changed = 1, j;
+    for (j = 0; j < s->slots; j++) softassign__set_price(s, j, 0);
+    for (pass = 0; pass < passes && changed; pass++)
+        for (changed = i = 0; i < s->rows; i++) changed += softassign__improve_row(s, i);
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Simulated annealing (Slomp 2012, eq 3.7 and 3.8). alpha cancels, as every state has one element a row. A slot is
+   drawn at random: free, the row moves; taken, the two rows swap, which section 3.4.3 does for square problems only.
+   ------------------------------------------------------------------------------------------------ */
+
+/* Keeps the best assignment in s->closed (slots of rows) and returns its cost. */
+static void softassign__keep_best(softassign *s, int *best)
+{
+    int i;
+    for (i = 0; i < s->rows; i++) best[i] = s->slot_of_row[i];
+}
+
+static void softassign__take_back(softassign *s, const int *best)
+{
+    int i;
+    for (i = 0; i < s->rows; i++) softassign__unassign(s, i);
+    for (i = 0; i < s->rows; i++) softassign__assign(s, i, best[i], softassign__cost(s, i, best[i]));
+}
+
+static double softassign__cost_now(const softassign *s)
+{
+    softassign__sum sum = {0, 0, 0};
+    int i;
+    for (i = 0; i < s->rows; i++) softassign__add(&sum, (double)s->cost_of_row[i]);
+    return softassign__total(&sum);
+}
+
+static int softassign__progress(softassign *s, const int *slots);
+
+static void softassign__anneal(softassign *s, int *best)
+{
+    const softassign_options *o = &s->options;
+    uint64_t seed = o->seed;
+    double temperature = o->temperature * softassign__mean_least(s), lowest = softassign__cost_now(s), cost = lowest;
+    int step, count = s->rows * sat__min_int(o->iterations[1], 2147483647 / s->rows), n;
+    softassign__keep_best(s, best);
+    for (step = 0; step < o->iterations[0]; step++, temperature *= o->cooling) {
+        for (n = 0; n < count; n++) {
+            int row = (int)(softassign__uniform(&seed) * s->rows), slot = (int)(softassign__uniform(&seed) * s->slots), other;
+            float here, back = 0;
+            double change;
+            s->report.iterations++;
+            if (slot == s->slot_of_row[row] || s->capacity[slot] == 0) continue;
+            here = softassign__cost(s, row, slot);
+            s->scratch[0].distances++;
+            if (!(here < SOFTASSIGN__INFINITY)) continue;
+            change = softassign__move_gain(s, row, slot, here, &other, &back);
+            if (!(change < (double)SOFTASSIGN__INFINITY)) continue;
+            if (change > 0 && !(softassign__uniform(&seed) < exp(-change / temperature))) continue;
+            softassign__move(s, row, slot, here, other, back);
+            cost += change;
+        }
+        cost = softassign__cost_now(s); /* the running sum drifts */
+        if (cost < lowest) {
+            lowest = cost;
+            softassign__keep_best(s, best);
+        }
+        if (softassign__progress(s, s->slot_of_row)) break;
+    }
+    softassign__take_back(s, best);
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Ants (Slomp 2012, appendix 3.A): every ant builds an assignment row by row, drawn by pheromone times similarity; all
+   trails evaporate, good ones are renewed; what is shown has a share of random tiles that falls to none.
+   Pheromone lies on the lists (in list_value); a row whose list is used up takes the best of some random free slots.
+   ------------------------------------------------------------------------------------------------ */
+
+static int softassign__ant_choice(softassign *s, int row, uint64_t *seed, float *cost)
+{
+    size_t at = (size_t)row * (size_t)s->list;
+    float *weight = s->soft_row, sum = 0, nearest = s->list_length[row] ? s->list_cost[at] : 0, near_scale;
+    double draw;
+    int q, last = -1, tries, slot = -1;
+    near_scale = nearest > 0 ? nearest : 1e-30f;
+    for (q = 0; q < s->list_length[row]; q++) {
+        float ratio = near_scale / (s->list_cost[at + (size_t)q] - nearest + near_scale);
+        weight[q] = 0;
+        if (!softassign__is_free(s, s->list_slot[at + (size_t)q])) continue;
+        ratio *= ratio;
+        ratio *= ratio; /* similarity to the fourth */
+        weight[q] = s->list_value[at + (size_t)q] * ratio * ratio;
+        sum += weight[q];
+        last = q;
+    }
+    draw = softassign__uniform(seed) * (double)sum;
+    for (q = 0; q <= last; q++) {
+        draw -= (double)weight[q];
+        if (weight[q] > 0 && (draw < 0 || q == last)) {
+            *cost = s->list_cost[at + (size_t)q];
+            return s->list_slot[at + (size_t)q];
+        }
+    }
+    for (tries = 0; tries < 64 || slot < 0; tries++) {
+        int j = (int)(softassign__uniform(seed) * s->slots), n;
+        float c;
+        for (n = 0; n < s->slots && !softassign__is_free(s, j); n++) j = j + 1 < s->slots ? j + 1 : 0;
+        c = softassign__cost(s, row, j);
+        s->scratch[0].distances++;
+        if (slot >= 0 && !(c < *cost)) continue;
+        slot = j;
+        *cost = c;
+    }
+    return slot;
+}
+
+/* One ant; rows in random order. Returns its cost. */
+static double softassign__ant(softassign *s, uint64_t *seed, int *order)
+{
+    int i;
+    for (i = 0; i < s->rows; i++) softassign__unassign(s, i);
+    for (i = s->rows - 1; i >= 0; i--) {
+        int k = (int)(softassign__uniform(seed) * (i + 1)), row = order[k], slot;
+        float cost = 0;
+        order[k] = order[i];
+        order[i] = row;
+        slot = softassign__ant_choice(s, row, seed, &cost);
+        softassign__assign(s, row, slot, cost);
+    }
+    s->report.iterations++;
+    return softassign__cost_now(s);
+}
+
+static void softassign__deposit(softassign *s, const int *slots, float amount)
+{
+    int i, q;
+    for (i = 0; i < s->rows; i++)
+        for (q = 0; q < s->list_length[i]; q++) {
+            size_t at = (size_t)i * (size_t)s->list + (size_t)q;
+            if (s->list_slot[at] == slots[i]) s->list_value[at] += amount;
+        }
+}
+
+/* The iterate for the eye: `count` rows of it get random free slots. */
+static void softassign__add_noise(softassign *s, int *shown, int count, uint64_t *seed)
+{
+    int n, j, i;
+    for (j = 0; j < s->slots; j++) s->touched[j] = 0;
+    for (i = 0; i < s->rows; i++) s->touched[shown[i]]++;
+    for (n = 0; n < count; n++) {
+        i = (int)(softassign__uniform(seed) * s->rows);
+        j = (int)(softassign__uniform(seed) * s->slots);
+        if (s->touched[j] >= s->capacity[j] || !(softassign__cost(s, i, j) < SOFTASSIGN__INFINITY)) continue;
+        s->touched[shown[i]]--;
+        s->touched[j]++;
+        shown[i] = j;
+    }
+}
+
+static void softassign__run_ants(softassign *s, int *best, int *leader, int *shown)
+{
+    const softassign_options *o = &s->options;
+    uint64_t seed = o->seed;
+    double lowest = (double)SOFTASSIGN__INFINITY;
+    int step, ant, i, *order = s->closed;
+    size_t at, cells = (size_t)s->rows * (size_t)s->list;
+    for (at = 0; at < cells; at++) s->list_value[at] = 1;
+    for (i = 0; i < s->rows; i++) order[i] = i;
+    for (step = 0; step < o->iterations[0]; step++) {
+        double nearest = (double)SOFTASSIGN__INFINITY;
+        for (ant = 0; ant < o->ants; ant++) {
+            double cost = softassign__ant(s, &seed, order);
+            if (!(cost < nearest)) continue;
+            nearest = cost;
+            softassign__keep_best(s, leader);
+        }
+        if (nearest < lowest) {
+            lowest = nearest;
+            for (i = 0; i < s->rows; i++) best[i] = leader[i];
+        }
+        for (at = 0; at < cells; at++) {
+            s->list_value[at] *= (float)(1 - o->evaporation);
+            if (s->list_value[at] < 1e-3f) s->list_value[at] = 1e-3f;
+        }
+        softassign__deposit(s, leader, (float)o->evaporation * 4);
+        softassign__deposit(s, best, (float)o->evaporation * 8);
+        for (i = 0; i < s->rows; i++) shown[i] = leader[i];
+        softassign__add_noise(s, shown, (int)(o->noise * (1 - (double)step / o->iterations[0]) * s->rows), &seed);
+        if (softassign__progress(s, shown)) break;
+    }
+    softassign__take_back(s, best);
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Softassign with inequality columns over the whole matrix
+
+   One sweep gives, row by row, the minimum of c - v (which is the row's share of the bound and keeps exp from
+   overflowing), the weights, their sum and the column sums. Rows go in 8 fixed chunks: same bits for any worker count.
+   ------------------------------------------------------------------------------------------------ */
+
+#define SOFTASSIGN__CHUNKS 8
+
+typedef struct softassign__sweep {
+    softassign *s;
+    float eps;
+    float *columns, *rows;    /* per chunk: column sums, one row of weights */
+    double bound[SOFTASSIGN__CHUNKS];
+    float *soft;              /* not NULL: the soft matrix is wanted */
+    ptrdiff_t soft_stride;
+} softassign__sweep;
+
+/* e[j] = c - v and their minimum. */
+static float softassign__reduced_row(const float *cost, const float *price, float *e, int n)
+{
+    float least = SOFTASSIGN__INFINITY;
+    int j = 0;
+#ifdef SAT__VECTOR
+    float m[4];
+    sat__f32x4 lanes = sat__f32x4_set1(SOFTASSIGN__INFINITY);
+    for (; j + 4 <= n; j += 4) {
+        sat__f32x4 x = sat__f32x4_sub(sat__f32x4_load(cost + j), sat__f32x4_load(price + j));
+        sat__f32x4_store(e + j, x);
+        lanes = sat__f32x4_min(x, lanes);
+    }
+    sat__f32x4_store(m, lanes);
+    least = m[0] < m[1] ? m[0] : m[1];
+    least = m[2] < least ? m[2] : least;
+    least = m[3] < least ? m[3] : least;
+#endif
+    for (; j < n; j++) {
+        e[j] = cost[j] - price[j];
+        least = e[j] < least ? e[j] : least;
+    }
+    return least;
+}
+
+/* sum[j] += e[j] * factor */
+static void softassign__accumulate(float *sum, const float *e, float factor, int n)
+{
+    int j = 0;
+#ifdef SAT__VECTOR
+    sat__f32x4 f = sat__f32x4_set1(factor);
+    for (; j + 4 <= n; j += 4)
+        sat__f32x4_store(sum + j, sat__f32x4_add(sat__f32x4_load(sum + j), sat__f32x4_mul(sat__f32x4_load(e + j), f)));
+#endif
+    for (; j < n; j++) sum[j] += e[j] * factor;
+}
+
+static void softassign__sweep_range(int begin, int end, int worker, void *context)
+{
+    softassign__sweep *w = (softassign__sweep *)context;
+    const softassign *s = w->s;
+    int chunk, i, j, n = s->columns;
+    (void)worker;
+    for (chunk = begin; chunk < end; chunk++) {
+        float *sum = w->columns + (size_t)chunk * (size_t)n, *e = w->rows + (size_t)chunk * (size_t)n;
+        int first = (int)((int64_t)s->rows * chunk / SOFTASSIGN__CHUNKS), last = (int)((int64_t)s->rows * (chunk + 1) / SOFTASSIGN__CHUNKS);
+        for (j = 0; j < n; j++) sum[j] = 0;
+        w->bound[chunk] = 0;
+        for (i = first; i < last; i++) {
+            float least = softassign__reduced_row(s->matrix + (size_t)i * (size_t)n, s->price_f, e, n), total;
+            if (!(least < SOFTASSIGN__INFINITY)) continue;
+            w->bound[chunk] += (double)least;
+            total = 1 / softassign__weights(e, n, least, 1 / w->eps);
+            softassign__accumulate(sum, e, total, n);
+            if (w->soft)
+                for (j = 0; j < n; j++) w->soft[(ptrdiff_t)i * w->soft_stride + j] = e[j] * total;
+        }
+    }
+}
+
+/* One sweep; column sums end in the first chunk. Returns the bound at the prices of the sweep, to float rounding. */
+static double softassign__sweep_once(softassign__sweep *w)
+{
+    softassign *s = w->s;
+    double bound = 0;
+    int c, j;
+    sat__parallel_for(&s->options.threads, SOFTASSIGN__CHUNKS, softassign__sweep_range, w);
+    for (c = 0; c < SOFTASSIGN__CHUNKS; c++) {
+        bound += w->bound[c];
+        if (c) softassign__accumulate(w->columns, w->columns + (size_t)c * (size_t)s->columns, 1, s->columns);
+    }
+    for (j = 0; j < s->columns; j++) bound += (double)s->price_f[j] * s->capacity[j];
+    s->report.iterations++;
+    return bound;
+}
+
+static float softassign__move_prices(softassign__sweep *w)
+{
+    softassign *s = w->s;
+    float worst = 0;
+    int j;
+    for (j = 0; j < s->columns; j++) {
+        float fill, price;
+        if (s->capacity[j] == 0) continue;
+        fill = w->columns[j] / (float)s->capacity[j];
+        if (fill - 1 > worst) worst = fill - 1;
+        if (fill <= 1 && !(s->price_f[j] < 0)) continue;
+        price = fill < 1e-36f ? s->price_f[j] + 82 * w->eps : s->price_f[j] - w->eps * logf(fill);
+        softassign__set_price(s, j, (double)(price < 0 ? price : 0));
+    }
+    return worst;
+}
+
+/* The prices of the best bound stay. */
+static void softassign__entropic(softassign *s, softassign__sweep *w, double *best_price)
+{
+    const softassign_options *o = &s->options;
+    double best = -(double)SOFTASSIGN__INFINITY, eps = o->temperature * softassign__mean_least(s);
+    int step, sweep, j, stop = 0;
+    if (!(eps > 0)) eps = 1e-30;
+    for (j = 0; j < s->columns; j++) best_price[j] = 0;
+    for (j = 0; j < s->columns; j++)
+        if (s->capacity[j] == 0) s->price_f[j] = -1e37f; /* out of every row's sight */
+    for (step = 0; step < o->iterations[0] && !stop; step++, eps *= o->cooling) {
+        w->eps = eps > 1e-37 ? (float)eps : 1e-37f;
+        for (sweep = 0; sweep < o->iterations[1]; sweep++) {
+            double bound = softassign__sweep_once(w);
+            if (bound > best) {
+                best = bound;
+                for (j = 0; j < s->columns; j++) best_price[j] = s->capacity[j] ? (double)s->price_f[j] : 0;
+            }
+            if (softassign__move_prices(w) < 0.02f) break;
+        }
+        stop = softassign__progress(s, NULL);
+    }
+    if (o->soft) {
+        w->soft = o->soft;
+        w->soft_stride = o->soft_stride;
+        (void)softassign__sweep_once(w);
+    } else (void)softassign__sweep_once(w);
+    for (j = 0; j < s->columns; j++)
+        if ((double)w->columns[j] > s->report.column_sum_max) s->report.column_sum_max = (double)w->columns[j];
+    for (j = 0; j < s->columns; j++) softassign__set_price(s, j, best_price[j]);
+}
+
+/* ------------------------------------------------------------------------------------------------
+   The published softassign, statement by statement (Slomp 2012, section 3.6; D = cost / largest |cost|):
+
+       Q = M .* (D - alpha);  M = exp(clamp(-Q / t)) / sqrt(t)
+       repeat: M = M ./ (sum_cols(M) + outlier);  M = M ./ sum_rows(M)
+       once a temperature: cost = sum_all(Q); if (cost < lowest) S = M
+
+   Sums are trees of k gathers as in section 3.7. Forbidden elements are 0. Extraction, which the source leaves open: the
+   largest element of each row of S, rows in order; a row whose column is taken gets the nearest free column.
+   ------------------------------------------------------------------------------------------------ */
+
+typedef struct softassign__published {
+    softassign *s;
+    void *m, *best;           /* rows x columns, float or double */
+    void *column, *outlier;   /* per column */
+    double *row_cost;
+    double largest, t;
+    int evolves;
+} softassign__published;
+
+/* The sum of n values `step` apart: a tree in which every node gathers k. */
+static double softassign__gather_f64(const double *v, size_t n, size_t step, int k)
+{
+    size_t part = 1, i;
+    double sum = 0;
+    if (n <= (size_t)k) {
+        for (i = 0; i < n; i++) sum += v[i * step];
+        return sum;
+    }
+    while (part * (size_t)k < n) part *= (size_t)k;
+    for (i = 0; i < n; i += part) sum += softassign__gather_f64(v + i * step, n - i < part ? n - i : part, step, k);
+    return sum;
+}
+
+static double softassign__gather_f32(const float *v, size_t n, size_t step, int k)
+{
+    return sat_reduce_f32(v, n, (ptrdiff_t)(step * sizeof(float)), k);
+}
+
+static inline double softassign__exp_clamped_f32(double x)
+{
+    float y = (float)x;
+    return (double)expf(y < -70.0f ? -70.0f : y > 70.0f ? 70.0f : y);
+}
+static inline double softassign__exp_clamped_f64(double x) { return exp(x < -650 ? -650 : x > 650 ? 650 : x); }
+
+#define SOFTASSIGN__DEFINE_PUBLISHED(T, suffix)                                                                        \
+    /* Q and M of a range of rows; row_cost[i] = sum of Q's row */                                                     \
+    static void softassign__update_##suffix(int begin, int end, int worker, void *context)                             \
+    {                                                                                                                  \
+        softassign__published *p = (softassign__published *)context;                                                   \
+        const softassign *s = p->s;                                                                                    \
+        int i, j, n = s->columns;                                                                                      \
+        T alpha = (T)s->options.alpha, scale = (T)(1 / p->largest), inverse = (T)(1 / p->t), factor = (T)(1 / sqrt(p->t)); \
+        (void)worker;                                                                                                  \
+        for (i = begin; i < end; i++) {                                                                                \
+            const float *cost = s->matrix + (size_t)i * (size_t)n;                                                     \
+            T *m = (T *)p->m + (size_t)i * (size_t)n;                                                                  \
+            double sum = 0;                                                                                            \
+            for (j = 0; j < n; j++) {                                                                                  \
+                T q;                                                                                                   \
+                if (!(cost[j] < SOFTASSIGN__INFINITY) || s->capacity[j] == 0) continue;                                \
+                q = m[j] * ((T)cost[j] * scale - alpha);                                                               \
+                sum += (double)q;                                                                                      \
+                m[j] = (T)softassign__exp_clamped_##suffix((double)(-q * inverse)) * factor;                           \
+            }                                                                                                          \
+            p->row_cost[i] = sum;                                                                                      \
+        }                                                                                                              \
+    }                                                                                                                  \
+                                                                                                                       \
+    /* 1 / (sum_cols(M) + outlier) for a range of blocks of 64 columns */                                              \
+    static void softassign__sum_columns_##suffix(int begin, int end, int worker, void *context)                        \
+    {                                                                                                                  \
+        softassign__published *p = (softassign__published *)context;                                                   \
+        int j, n = p->s->columns, last = sat__min_int(n, end * 64);                                                    \
+        (void)worker;                                                                                                  \
+        for (j = begin * 64; j < last; j++) {                                                                          \
+            double sum = softassign__gather_##suffix((const T *)p->m + j, (size_t)p->s->rows, (size_t)n, p->s->options.gather); \
+            T all = (T)sum + ((T *)p->outlier)[j];                                                                     \
+            ((T *)p->column)[j] = all > 0 ? 1 / all : 0;                                                               \
+            if (p->evolves) ((T *)p->outlier)[j] *= ((T *)p->column)[j];                                               \
+        }                                                                                                              \
+    }                                                                                                                  \
+                                                                                                                       \
+    /* M = M ./ columns, then M = M ./ sum_rows(M) */                                                                  \
+    static void softassign__normalise_##suffix(int begin, int end, int worker, void *context)                          \
+    {                                                                                                                  \
+        softassign__published *p = (softassign__published *)context;                                                   \
+        int i, j, n = p->s->columns;                                                                                   \
+        (void)worker;                                                                                                  \
+        for (i = begin; i < end; i++) {                                                                                \
+            T *m = (T *)p->m + (size_t)i * (size_t)n, sum;                                                             \
+            const T *column = (const T *)p->column;                                                                    \
+            for (j = 0; j < n; j++) m[j] *= column[j];                                                                 \
+            sum = (T)softassign__gather_##suffix(m, (size_t)n, 1, p->s->options.gather);                               \
+            sum = sum > 0 ? 1 / sum : 0;                                                                               \
+            for (j = 0; j < n; j++) m[j] *= sum;                                                                       \
+        }                                                                                                              \
+    }                                                                                                                  \
+                                                                                                                       \
+    static void softassign__published_##suffix(softassign__published *p)                                               \
+    {                                                                                                                  \
+        softassign *s = p->s;                                                                                          \
+        const softassign_options *o = &s->options;                                                                     \
+        size_t cells = (size_t)s->rows * (size_t)s->columns, k;                                                        \
+        int cool, steady, turn, j, blocks = (s->columns + 63) / 64;                                                    \
+        uint64_t seed = o->seed;                                                                                       \
+        double lowest = (double)SOFTASSIGN__INFINITY;                                                                  \
+        T *m = (T *)p->m, *best = (T *)p->best;                                                                        \
+        p->t = o->temperature;                                                                                         \
+        for (k = 0; k < cells; k++) {                                                                                  \
+            int column = (int)(k % (size_t)s->columns);                                                                \
+            m[k] = (T)(1e-6 + 1e-3 * softassign__uniform(&seed));                                                      \
+            if (!(s->matrix[k] < SOFTASSIGN__INFINITY) || s->capacity[column] == 0) m[k] = 0;                          \
+            best[k] = m[k];                                                                                            \
+        }                                                                                                              \
+        for (cool = 0; cool < o->iterations[0]; cool++, p->t *= o->cooling) {                                          \
+            double cost = 0;                                                                                           \
+            if (!(p->t > 1e-30)) p->t = 1e-30;                                                                         \
+            for (steady = 0; steady < o->iterations[1]; steady++) {                                                    \
+                sat__parallel_for(&o->threads, s->rows, softassign__update_##suffix, p);                               \
+                for (j = 0; j < s->columns; j++) ((T *)p->outlier)[j] = (T)o->outlier;                                 \
+                for (turn = 0; turn < o->iterations[2]; turn++) {                                                      \
+                    sat__parallel_for(&o->threads, blocks, softassign__sum_columns_##suffix, p);                       \
+                    sat__parallel_for(&o->threads, s->rows, softassign__normalise_##suffix, p);                        \
+                    s->report.iterations++;                                                                            \
+                }                                                                                                      \
+            }                                                                                                          \
+            cost = softassign__gather_f64(p->row_cost, (size_t)s->rows, 1, o->gather);                                 \
+            if (cost < lowest) {                                                                                       \
+                lowest = cost;                                                                                         \
+                for (k = 0; k < cells; k++) best[k] = m[k];                                                            \
+            }                                                                                                          \
+            if (softassign__progress(s, NULL)) break;                                                                  \
+        }                                                                                                              \
+        s->report.soft_cost = lowest;                                                                                  \
+    }                                                                                                                  \
+                                                                                                                       \
+    /* Reads S: the largest element of each row to wanted, the report, the caller's copy */                            \
+    static void softassign__read_soft_##suffix(softassign__published *p, int *wanted)                                  \
+    {                                                                                                                  \
+        softassign *s = p->s;                                                                                          \
+        int i, j, n = s->columns;                                                                                      \
+        for (i = 0; i < s->rows; i++) {                                                                                \
+            const T *row = (const T *)p->best + (size_t)i * (size_t)n;                                                 \
+            T top = 0;                                                                                                 \
+            wanted[i] = -1;                                                                                            \
+            for (j = 0; j < n; j++) {                                                                                  \
+                if (row[j] > top) {                                                                                    \
+                    top = row[j];                                                                                      \
+                    wanted[i] = j;                                                                                     \
+                }                                                                                                      \
+                if (s->options.soft) s->options.soft[(ptrdiff_t)i * s->options.soft_stride + j] = (float)row[j];       \
+            }                                                                                                          \
+        }                                                                                                              \
+        for (j = 0; j < n; j++) {                                                                                      \
+            double sum = softassign__gather_##suffix((const T *)p->best + j, (size_t)s->rows, (size_t)n, s->options.gather); \
+            if (sum > s->report.column_sum_max) s->report.column_sum_max = sum;                                        \
+        }                                                                                                              \
+    }
+
+SOFTASSIGN__DEFINE_PUBLISHED(float, f32)
+SOFTASSIGN__DEFINE_PUBLISHED(double, f64)
+
+/* Hard assignment from the largest elements; duplicates are counted and repaired greedily. Returns rows left over. */
+static int softassign__extract(softassign *s, const int *wanted)
+{
+    int i, j, lost = 0;
+    for (i = 0; i < s->rows; i++) {
+        j = wanted[i];
+        if (j >= 0 && softassign__is_free(s, j)) softassign__greedy_take(s, i, j, softassign__cost(s, i, j));
+        else if (j >= 0) s->report.duplicate_rows++;
+    }
+    for (i = 0; i < s->rows; i++) {
+        float cost = 0;
+        if (s->slot_of_row[i] >= 0) continue;
+        j = softassign__nearest_free(s, i, &cost);
+        if (j >= 0) softassign__greedy_take(s, i, j, cost);
+        else lost++;
+    }
+    return lost;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Reports
+   ------------------------------------------------------------------------------------------------ */
+
+/* Fills cost, bound, gap and counts for an assignment given by slots. */
+static void softassign__report_slots(softassign *s, const int *slots)
+{
+    softassign__sum cost = {0, 0, 0};
+    int i, workers = sat__worker_count(&s->options.threads);
+    s->report.switched = 0;
+    for (i = 0; i < s->rows; i++) {
+        int column = softassign__column(s, slots[i]);
+        softassign__add(&cost, (double)softassign__pair(&s->problem, i, column));
+        s->report.switched += s->problem.previous && s->problem.previous[i] >= 0 && s->problem.previous[i] != column;
+    }
+    s->report.cost = softassign__total(&cost);
+    s->report.lower_bound = s->bound;
+    s->report.gap = softassign__gap(s->report.cost, s->bound);
+    s->report.bytes = s->bytes;
+    for (i = 0; i < workers; i++) {
+        s->report.distances_computed += s->scratch[i].distances;
+        s->scratch[i].distances = 0;
+    }
+}
+
+/* 1 when the caller wants to stop. slots: NULL while there is no assignment to show. */
+static int softassign__progress(softassign *s, const int *slots)
+{
+    int i;
+    if (!s->options.progress) return 0;
+    if (!slots) return s->options.progress(&s->report, NULL, s->options.progress_user) != 0;
+    softassign__report_slots(s, slots);
+    for (i = 0; i < s->rows; i++) s->shown_column[i] = softassign__column(s, slots[i]);
+    return s->options.progress(&s->report, s->shown_column, s->options.progress_user) != 0;
+}
+
+/* Completes the solver's assignment for the eye: rows without a slot get the nearest listed free one, else the first
+   free one. 0 when a row finds none. */
+static int softassign__fill(softassign *s, int *slots)
+{
+    int *used = s->touched, i, j, q, next = 0;
+    for (j = 0; j < s->slots; j++) used[j] = s->used[j];
+    for (i = 0; i < s->rows; i++) slots[i] = s->slot_of_row[i];
+    for (i = 0; i < s->rows; i++) {
+        if (slots[i] >= 0) continue;
+        for (q = 0; s->has_lists && q < s->list_length[i] && slots[i] < 0; q++) {
+            j = s->list_slot[(size_t)i * (size_t)s->list + (size_t)q];
+            if (used[j] < s->capacity[j]) slots[i] = j;
+        }
+        while (next < s->slots && used[next] >= s->capacity[next]) next++;
+        for (j = next; j < s->slots && slots[i] < 0; j++)
+            if (used[j] < s->capacity[j] && softassign__cost(s, i, j) < SOFTASSIGN__INFINITY) slots[i] = j;
+        if (slots[i] < 0) return 0;
+        used[slots[i]]++;
+    }
+    return 1;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Checks
+   ------------------------------------------------------------------------------------------------ */
+
+static int softassign__options_are_valid(const softassign_options *o)
+{
+    int i;
+    if ((unsigned)o->method > (unsigned)SOFTASSIGN_ANTS || !(o->gap >= 0) || o->capacity_default < 0) return 0;
+    if (o->neighbours < 4 || o->neighbours > 256 || o->gather < 2 || o->gather > 64 || o->ants < 1) return 0;
+    for (i = 0; i < 3; i++)
+        if (o->iterations[i] < 0) return 0;
+    if (!(o->temperature >= 0 && o->temperature < 1e30) || !(o->cooling >= 0 && o->cooling <= 1)) return 0;
+    if (!(fabs(o->alpha) < 1e30) || !(o->outlier >= 0 && o->outlier < 1e30)) return 0;
+    if (!(o->evaporation >= 0 && o->evaporation <= 1) || !(o->noise >= 0 && o->noise <= 1)) return 0;
+    if (!(o->switching >= 0 && o->switching < 1e6) || o->grid_width < 0) return 0;
+    if (!(o->min_distance >= 0 && o->min_distance < 1e9) || (o->min_distance > 0 && o->grid_width < 1)) return 0;
+    return sat__threads_are_valid(&o->threads);
+}
+
+static int softassign__problem_is_valid(const softassign_problem *p)
+{
+    int i;
+    if (!p || p->rows < 1 || p->columns < 1) return 0;
+    if (p->cost) {
+        if (p->stride < p->columns && p->stride > -(ptrdiff_t)p->columns && p->rows > 1) return 0;
+    } else if (!p->cost_fn && (!p->row_features || !p->column_features || p->feature_count < 1)) return 0;
+    for (i = 0; p->capacity && i < p->columns; i++)
+        if (p->capacity[i] < 0) return 0;
+    for (i = 0; p->minimum_use && i < p->columns; i++)
+        if (p->minimum_use[i] < 0) return 0;
+    for (i = 0; p->previous && i < p->rows; i++)
+        if (p->previous[i] < -1 || p->previous[i] >= p->columns) return 0;
+    return 1;
+}
+
+/* What is wrong with a row of costs; also the copy into the matrix. */
+static void softassign__check_range(int begin, int end, int worker, void *context)
+{
+    softassign *s = (softassign *)context;
+    const softassign_problem *p = &s->problem;
+    int i, j;
+    (void)worker;
+    for (i = begin; i < end; i++) {
+        int *wrong = &s->list_length[i], stay = p->previous ? p->previous[i] : -1;
+        *wrong = SAT_OK;
+        for (j = 0; j < s->columns; j++) {
+            float cost = softassign__pair(p, i, j);
+            if (sat__is_nan(cost) || cost < -3.4e38f) *wrong = SAT_ERR_NON_FINITE;
+            else if (sat__is_finite(cost) && fabsf(cost) > SOFTASSIGN__LARGEST_COST && *wrong == SAT_OK) *wrong = SAT_ERR_ARGUMENT;
+            if (s->dense) s->matrix[(size_t)i * (size_t)s->columns + (size_t)j] = j == stay ? cost - s->bonus : cost;
+        }
+    }
+}
+
+static sat_result softassign__check_feature(float f)
+{
+    return !sat__is_finite(f) ? SAT_ERR_NON_FINITE : fabsf(f) > SOFTASSIGN__LARGEST_FEATURE ? SAT_ERR_ARGUMENT : SAT_OK;
+}
+
+static sat_result softassign__check_costs(softassign *s)
+{
+    const softassign_problem *p = &s->problem;
+    size_t k, n = (size_t)p->feature_count;
+    sat_result result;
+    int i, from_features = !p->cost && !p->cost_fn;
+    for (k = 0; from_features && k < n * (size_t)s->rows; k++)
+        if ((result = softassign__check_feature(p->row_features[k])) != SAT_OK) {
+            s->report.row_error = (int)(k / n);
+            return result;
+        }
+    for (k = 0; from_features && k < n * (size_t)s->columns; k++)
+        if ((result = softassign__check_feature(p->column_features[k])) != SAT_OK) {
+            s->report.row_error = 0; /* every row meets it */
+            s->report.column_error = (int)(k / n);
+            return result;
+        }
+    if (from_features && !s->dense) return SAT_OK;
+    sat__parallel_for(&s->options.threads, s->rows, softassign__check_range, s);
+    if (!p->cost) s->report.distances_computed += (size_t)s->rows * (size_t)s->columns;
+    for (i = 0; i < s->rows; i++)
+        if (s->list_length[i] != SAT_OK) {
+            s->report.row_error = i;
+            return (sat_result)s->list_length[i];
+        }
+    return SAT_OK;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Starting a problem
+   ------------------------------------------------------------------------------------------------ */
+
+/* A mandatory slot's price starts so high that leaving it free costs more than any assignment saves. */
+static double softassign__mandatory_price(const softassign *s)
+{
+    double largest = 0;
+    int i, j;
+    if (!s->dense && !s->problem.cost && !s->problem.cost_fn) return 1e6 * (s->rows + 1.0) * (double)s->slack + 1e-30;
+    for (i = 0; i < s->rows; i++)
+        for (j = 0; j < s->columns; j++) {
+            double cost = fabs((double)softassign__cost(s, i, j));
+            if (cost < (double)SOFTASSIGN__INFINITY && cost > largest) largest = cost;
+        }
+    return 4 * largest * (s->rows + 1.0) + 1e-30;
+}
+
+static sat_result softassign__make_slots(softassign *s)
+{
+    const softassign_problem *p = &s->problem;
+    int64_t room = 0, needed = 0;
+    int j, units = 1;
+    s->slots = s->columns;
+    for (j = 0; j < s->columns; j++) {
+        int capacity = p->capacity ? p->capacity[j] : s->options.capacity_default, least = p->minimum_use ? p->minimum_use[j] : 0;
+        if (least > capacity) {
+            s->report.column_error = j;
+            return SAT_ERR_ARGUMENT;
+        }
+        room += sat__min_int(capacity, s->rows);
+        needed += least;
+        units &= capacity == 1 && least == 0;
+        s->slot_column[j] = j;
+        s->capacity[j] = sat__min_int(capacity - least, s->rows);
+        if (least == 0) continue;
+        if (s->slots == s->max_slots) return needed > s->rows ? SAT_ERR_LIMIT : SAT_ERR_ARGUMENT;
+        s->slot_column[s->slots] = j;
+        s->capacity[s->slots++] = least;
+    }
+    s->unit_capacities = units;
+    if (room >= s->rows && needed <= s->rows) return SAT_OK;
+    s->report.row_error = room < s->rows ? (int)room : s->rows - 1;
+    return SAT_ERR_LIMIT;
+}
+
+/* The bonus for staying, in units of cost: a share of the mean cost of staying. */
+static float softassign__switching_bonus(const softassign *s)
+{
+    softassign__sum sum = {0, 0, 0};
+    int i, count = 0;
+    if (!s->problem.previous || !(s->options.switching > 0)) return 0;
+    for (i = 0; i < s->rows; i++) {
+        float cost = s->problem.previous[i] < 0 ? SOFTASSIGN__INFINITY : softassign__pair(&s->problem, i, s->problem.previous[i]);
+        if (!(fabsf(cost) <= SOFTASSIGN__LARGEST_COST)) continue;
+        softassign__add(&sum, fabs((double)cost));
+        count++;
+    }
+    return count ? (float)(s->options.switching * softassign__total(&sum) / count) : 0;
+}
+
+/* Checks a problem and makes everything that does not depend on prices. */
+static sat_result softassign__start(softassign *s, const softassign_problem *problem)
+{
+    sat_result result;
+    int j, from_features = !problem->cost && !problem->cost_fn, known = s->prices_known;
+    s->problem = *problem;
+    s->phase = SOFTASSIGN__START;
+    memset(&s->report, 0, sizeof s->report);
+    s->report.row_error = s->report.column_error = -1;
+    s->bound = -(double)SOFTASSIGN__INFINITY;
+    result = softassign__make_slots(s);
+    if (result != SAT_OK) return result;
+    s->bonus = softassign__switching_bonus(s);
+    result = softassign__check_costs(s);
+    if (result != SAT_OK) return result;
+    for (j = 0; j < s->max_slots; j++) s->top[j] = 0;
+    s->dims = 0;
+    if (from_features && !s->dense) softassign__start_bound(s);
+    if (s->slots > s->columns) {
+        double high = softassign__mandatory_price(s);
+        for (j = s->columns; j < s->slots; j++) s->top[j] = high;
+    }
+    if (!known) softassign__reset_prices(s);
+    softassign__reset_assignment(s);
+    for (j = 0; j < s->rows; j++) {
+        s->list_length[j] = 0;
+        s->list_limit[j] = from_features ? 0 : -(double)SOFTASSIGN__INFINITY;
+    }
+    s->next = 0;
+    s->dense_paths = s->dense && s->unit_capacities && s->options.method == SOFTASSIGN_AUTO;
+    s->phase = s->dense_paths ? SOFTASSIGN__PATHS : SOFTASSIGN__LISTS;
+    return SAT_OK;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Public: create, step, destroy
+   ------------------------------------------------------------------------------------------------ */
+
+SOFTASSIGN_DEF int softassign_version(void) { return SOFTASSIGN_VERSION; }
+
+SOFTASSIGN_DEF softassign_options softassign_method_defaults(softassign_method method)
+{
+    softassign_options o;
+    memset(&o, 0, sizeof o);
+    o.method = method;
+    o.gap = 0.001;
+    o.capacity_default = 1;
+    o.neighbours = method == SOFTASSIGN_ANTS ? 192 : 64;
+    o.certify = 1;
+    o.seed = 1;
+    o.temperature = method == SOFTASSIGN_PUBLISHED ? 0.1 : method == SOFTASSIGN_ANNEALING ? 0.5 : 0.3;
+    o.cooling = method == SOFTASSIGN_PUBLISHED ? 0.9 : method == SOFTASSIGN_ANNEALING ? 0.95 : 0.5;
+    o.iterations[0] = method == SOFTASSIGN_PUBLISHED ? 50 : method == SOFTASSIGN_ANNEALING ? 120
+                    : method == SOFTASSIGN_ANTS ? 200 : method == SOFTASSIGN_GREEDY_2OPT ? 20 : 6;
+    o.iterations[1] = method == SOFTASSIGN_ANNEALING ? 400 : 10;
+    o.iterations[2] = 10;
+    o.alpha = 1;
+    o.outlier = 1e6;
+    o.gather = 4;
+    o.ants = 30;
+    o.evaporation = 0.1;
+    o.noise = 1;
+    return o;
+}
+
+SOFTASSIGN_DEF softassign_options softassign_defaults(void) { return softassign_method_defaults(SOFTASSIGN_AUTO); }
+
+/* What a solver of these sizes needs; `features` of the basis and `extra` mandatory slots are 0 where not wanted. */
+static sat_result softassign__allocate(softassign **out, int rows, int columns, int extra, int features, int lists,
+                                       const softassign_options *options)
+{
+    softassign *s, measure;
+    sat__arena arena = {NULL, 0, 0};
+    sat_allocator allocator;
+    int method = (int)options->method;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (!sat__resolve_allocator(&allocator, &options->allocator)) return SAT_ERR_ARGUMENT;
+    if (columns > 2147483647 / 2 - 64 || rows > 2147483647 / 2 - 64 || extra > 2147483647 / 2 - 64 - columns) return SAT_ERR_SIZE;
+    memset(&measure, 0, sizeof measure);
+    measure.options = *options;
+    measure.allocator = allocator;
+    measure.rows = rows;
+    measure.columns = columns;
+    measure.max_slots = columns + extra;
+    measure.padded = (measure.max_slots + SOFTASSIGN__BLOCK - 1) / SOFTASSIGN__BLOCK * SOFTASSIGN__BLOCK;
+    measure.dense = method == SOFTASSIGN_ENTROPIC || method == SOFTASSIGN_PUBLISHED ||
+                    (method == SOFTASSIGN_AUTO && (int64_t)rows * columns <= SOFTASSIGN__DENSE_CELLS);
+    measure.has_lists = lists;
+    measure.list = lists ? sat__min_int(options->neighbours, measure.max_slots) : 0;
+    sat__carve(&arena, 1, sizeof *s);
+    softassign__carve_solver(&measure, &arena, features);
+    if (arena.overflow || arena.used > SIZE_MAX / 2) return SAT_ERR_SIZE;
+    measure.bytes = arena.used + 63;
+    measure.block = sat__alloc(&allocator, measure.bytes);
+    if (!measure.block) return SAT_ERR_MEMORY;
+    arena.base = sat__align64(measure.block);
+    arena.used = 0;
+    s = (softassign *)sat__carve(&arena, 1, sizeof *s);
+    *s = measure;
+    softassign__carve_solver(s, &arena, features);
+    memset(s->stamp, 0, (size_t)s->max_slots * sizeof(int));
+    memset(s->row_stamp, 0, (size_t)rows * sizeof(int));
+    s->phase = SOFTASSIGN__START;
+    *out = s;
+    return SAT_OK;
+}
+
+SOFTASSIGN_DEF sat_result softassign_create(softassign **out, int rows, int columns, const softassign_options *options)
+{
+    softassign_options o;
+    int dense;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    o = options ? *options : softassign_defaults();
+    if (!softassign__options_are_valid(&o) || rows < 1 || columns < 1 || (unsigned)o.method > (unsigned)SOFTASSIGN_EXACT) return SAT_ERR_ARGUMENT;
+    dense = o.method == SOFTASSIGN_AUTO && (int64_t)rows * columns <= SOFTASSIGN__DENSE_CELLS;
+    return softassign__allocate(out, rows, columns, 0, dense ? 0 : SOFTASSIGN__BOUND_FEATURES, 1, &o);
+}
+
+SOFTASSIGN_DEF void softassign_destroy(softassign *solver)
+{
+    sat_allocator allocator;
+    if (!solver) return;
+    allocator = solver->allocator;
+    sat__release(&allocator, solver->block, solver->bytes);
+}
+
+SOFTASSIGN_DEF void softassign_next_frame(softassign *solver)
+{
+    if (!solver) return;
+    if (solver->phase < SOFTASSIGN__PATHS && solver->phase != SOFTASSIGN__START) solver->prices_known = 0;
+    solver->phase = SOFTASSIGN__START;
+}
+
+/* Bounds hold in every phase but while prices move up and down. */
+static void softassign__update_bound(softassign *s)
+{
+    double before = s->bound;
+    if (s->phase == SOFTASSIGN__PRICES || s->phase == SOFTASSIGN__RELIST) return;
+    softassign__certify(s);
+    if (before > s->bound) s->bound = before;
+}
+
+static sat_result softassign__step_slots(softassign *s, size_t budget, int *slots)
+{
+    sat_result result = softassign__advance(s, budget);
+    for (;;) {
+        if (s->dense_paths && s->phase == SOFTASSIGN__PATHS) softassign__dense_publish(s);
+        if (result != SAT_OK || softassign__fill(s, slots)) break;
+        result = softassign__advance(s, 1); /* forbidden pairs: the paths must decide */
+    }
+    if (result != SAT_OK) return result;
+    softassign__update_bound(s);
+    softassign__report_slots(s, slots);
+    s->report.complete = s->phase == SOFTASSIGN__DONE;
+    s->report.method = s->dense_paths ? SOFTASSIGN_AUTO : SOFTASSIGN_EXACT;
+    return SAT_OK;
+}
+
+SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row, const softassign_problem *problem,
+                                          size_t work_budget, softassign_report *report)
+{
+    softassign *s = solver;
+    sat_result result = SAT_OK;
+    int i;
+    if (!s || !column_of_row || !softassign__problem_is_valid(problem)) return SAT_ERR_ARGUMENT;
+    if (problem->rows != s->rows || problem->columns != s->columns) return SAT_ERR_MISMATCH;
+    if (problem->minimum_use) return SAT_ERR_ARGUMENT;
+    if (s->phase == SOFTASSIGN__START) result = softassign__start(s, problem);
+    else s->problem = *problem;
+    if (result == SAT_OK) result = softassign__step_slots(s, work_budget, s->shown);
+    if (report) *report = s->report;
+    if (result != SAT_OK) {
+        s->phase = SOFTASSIGN__START;
+        s->prices_known = 0;
+        return result;
+    }
+    for (i = 0; i < s->rows; i++) column_of_row[i] = softassign__column(s, s->shown[i]);
+    return SAT_OK;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Public: one problem, any method
+   ------------------------------------------------------------------------------------------------ */
+
+static sat_result softassign__list_all(softassign *s)
+{
+    s->next = 0;
+    s->phase = SOFTASSIGN__RELIST; /* goes on to the paths */
+    return softassign__list_phase(s, (size_t)-1);
+}
+
+static sat_result softassign__solve_exact(softassign *s)
+{
+    size_t budget = s->options.progress ? 2 * (size_t)s->rows : (size_t)-1 / 4;
+    sat_result result;
+    do {
+        result = softassign__step_slots(s, budget, s->shown);
+        if (result != SAT_OK) return result;
+    } while (!s->report.complete && !softassign__progress(s, s->shown));
+    return SAT_OK;
+}
+
+/* The optimum from the prices of the moment. */
+static sat_result softassign__solve_from_prices(softassign *s)
+{
+    softassign__reset_assignment(s);
+    softassign__list_all(s);
+    return softassign__solve_exact(s);
+}
+
+static sat_result softassign__solve_fast(softassign *s)
+{
+    double scale, eps;
+    if (!s->unit_capacities) return softassign__solve_exact(s);
+    softassign__list_all(s);
+    scale = softassign__mean_least(s);
+    eps = 1.6 * s->options.gap * scale; /* measured: the certified gap is 0.37 to 0.6 eps */
+    if (eps > 0 && softassign__auction(s, eps, 2000 * (size_t)s->rows)) {
+        s->phase = SOFTASSIGN__DONE;
+        softassign__keep_best(s, s->shown);
+        softassign__certify(s);
+        softassign__report_slots(s, s->shown);
+        s->report.complete = 1;
+        s->report.method = SOFTASSIGN_FAST;
+        if (s->report.gap <= s->options.gap) return SAT_OK;
+    }
+    return softassign__solve_from_prices(s);
+}
+
+static sat_result softassign__solve_entropic(softassign *s, softassign__sweep *w, double *best_price)
+{
+    sat_result result;
+    double swept;
+    w->s = s;
+    w->soft = NULL;
+    softassign__list_all(s);
+    softassign__entropic(s, w, best_price);
+    softassign__list_all(s);
+    softassign__certify(s);
+    swept = s->bound;
+    for (s->next = 0; s->phase == SOFTASSIGN__PATHS;) {
+        result = softassign__path_phase(s);
+        if (result != SAT_OK) return result;
+    }
+    softassign__certify(s);
+    if (swept > s->bound) s->bound = swept;
+    softassign__keep_best(s, s->shown);
+    return SAT_OK;
+}
+
+/* Rows that a greedy search could not place get an augmenting path, which exists if any assignment does. */
+static sat_result softassign__place_rest(softassign *s, int lost)
+{
+    int i;
+    softassign__reset_prices(s);
+    if (!lost) return SAT_OK;
+    softassign__list_all(s);
+    for (i = 0; i < s->rows; i++)
+        if (s->slot_of_row[i] < 0 && !softassign__augment(s, i)) {
+            s->report.row_error = i;
+            return SAT_ERR_LIMIT;
+        }
+    softassign__reset_prices(s);
+    return SAT_OK;
+}
+
+static sat_result softassign__solve_published(softassign *s, softassign__published *p)
+{
+    size_t k, cells = (size_t)s->rows * (size_t)s->columns;
+    int wide = s->options.double_precision;
+    p->s = s;
+    p->evolves = s->options.outlier_evolves;
+    p->largest = 0;
+    for (k = 0; k < cells; k++)
+        if (s->matrix[k] < SOFTASSIGN__INFINITY && fabs((double)s->matrix[k]) > p->largest) p->largest = fabs((double)s->matrix[k]);
+    if (!(p->largest > 1e-30)) p->largest = 1;
+    softassign__list_all(s);
+    softassign__certify(s);
+    if (wide) softassign__published_f64(p);
+    else softassign__published_f32(p);
+    if (wide) softassign__read_soft_f64(p, s->shown);
+    else softassign__read_soft_f32(p, s->shown);
+    return softassign__place_rest(s, softassign__extract(s, s->shown));
+}
+
+static sat_result softassign__solve_heuristic(softassign *s)
+{
+    const softassign_options *o = &s->options;
+    sat_result result;
+    softassign__list_all(s);
+    softassign__certify(s);
+    result = softassign__place_rest(s, softassign__greedy(s));
+    if (result != SAT_OK || o->method == SOFTASSIGN_GREEDY) return result;
+    if (o->method == SOFTASSIGN_GREEDY_2OPT) softassign__two_opt(s, o->iterations[0]);
+    else {
+        softassign__list_all(s);
+        softassign__keep_best(s, s->kept);
+        softassign__keep_best(s, s->leader);
+        if (o->method == SOFTASSIGN_ANNEALING) softassign__anneal(s, s->kept);
+        else softassign__run_ants(s, s->kept, s->leader, s->shown);
+    }
+    return SAT_OK;
+}
+
+/* A bound for the methods that have no prices: from the auction, or from the optimum where slots hold more than one. */
+static sat_result softassign__buy_bound(softassign *s)
+{
+    double before = s->bound;
+    softassign_report kept = s->report;
+    sat_result result = SAT_OK;
+    softassign_progress_fn *progress = s->options.progress;
+    s->options.progress = NULL;
+    softassign__keep_best(s, s->kept);
+    softassign__reset_assignment(s);
+    softassign__reset_prices(s);
+    if (s->unit_capacities) result = softassign__solve_fast(s);
+    else {
+        s->phase = SOFTASSIGN__LISTS;
+        s->next = 0;
+        result = softassign__solve_exact(s);
+    }
+    s->options.progress = progress;
+    if (before > s->bound) s->bound = before;
+    kept.distances_computed = s->report.distances_computed;
+    s->report = kept;
+    softassign__reset_assignment(s);
+    softassign__take_back(s, s->kept);
+    return result;
+}
+
+/* Undoes pairs of rows that have one column too close: each such row moves to its best column without conflict; then
+   moves and swaps that create none. The bound is that of the problem without distances, so it holds. */
+static void softassign__separate(softassign *s)
+{
+    int i, j, round;
+    for (j = 0; j < s->slots; j++) softassign__set_price(s, j, 0);
+    for (i = 0; i < s->rows; i++) {
+        softassign__scratch *w = &s->scratch[0];
+        float best = SOFTASSIGN__INFINITY;
+        int to = -1;
+        if (!softassign__conflicts(s, i, s->slot_of_row[i], -1)) continue;
+        softassign__keys(s, i, w);
+        for (j = 0; j < s->slots; j++) {
+            float cost;
+            if (!(w->keys[j] < best) || !softassign__is_free(s, j) || softassign__conflicts(s, i, j, -1)) continue;
+            cost = softassign__cost(s, i, j);
+            if (!(cost < best)) continue;
+            best = cost;
+            to = j;
+        }
+        if (to >= 0) softassign__assign(s, i, to, best);
+    }
+    for (round = 0; round < 4; round++) {
+        int changed = 0;
+        for (i = 0; i < s->rows; i++) changed += softassign__improve_row(s, i);
+        if (!changed) break;
+    }
+    s->report.conflicts = 0;
+    for (i = 0; i < s->rows; i++) s->report.conflicts += softassign__conflicts(s, i, s->slot_of_row[i], -1);
+    s->report.conflicts /= 2;
+}
+
+/* Scratch of the matrix methods, in one block of its own. */
+typedef struct softassign__matrix_work {
+    softassign__sweep sweep;
+    softassign__published published;
+    double *best_price;
+    void *block;
+    size_t bytes;
+} softassign__matrix_work;
+
+static sat_result softassign__allocate_matrix_work(softassign *s, softassign__matrix_work *w)
+{
+    sat__arena a = {NULL, 0, 0};
+    size_t columns = (size_t)s->columns, cells, element = s->options.double_precision ? sizeof(double) : sizeof(float);
+    int pass;
+    memset(w, 0, sizeof *w);
+    if (s->options.method != SOFTASSIGN_ENTROPIC && s->options.method != SOFTASSIGN_PUBLISHED) return SAT_OK;
+    if (!sat__multiply_size(&cells, (size_t)s->rows, columns)) return SAT_ERR_SIZE;
+    for (pass = 0; pass < 2; pass++) {
+        if (s->options.method == SOFTASSIGN_ENTROPIC) {
+            w->sweep.columns = (float *)sat__carve(&a, columns * SOFTASSIGN__CHUNKS, sizeof(float));
+            w->sweep.rows = (float *)sat__carve(&a, columns * SOFTASSIGN__CHUNKS, sizeof(float));
+            w->best_price = (double *)sat__carve(&a, columns, sizeof(double));
+        } else {
+            w->published.m = sat__carve(&a, cells, element);
+            w->published.best = sat__carve(&a, cells, element);
+            w->published.column = sat__carve(&a, columns, element);
+            w->published.outlier = sat__carve(&a, columns, element);
+            w->published.row_cost = (double *)sat__carve(&a, (size_t)s->rows, sizeof(double));
+        }
+        if (pass) break;
+        if (a.overflow) return SAT_ERR_SIZE;
+        w->bytes = a.used + 63;
+        w->block = sat__alloc(&s->allocator, w->bytes);
+        if (!w->block) {
+            w->bytes = 0;
+            return SAT_ERR_MEMORY;
+        }
+        a.base = sat__align64(w->block);
+        a.used = 0;
+    }
+    s->bytes += w->bytes; /* reported; the solver's own block is released with its own size */
+    return SAT_OK;
+}
+
+static sat_result softassign__run(softassign *s, softassign__matrix_work *w)
+{
+    sat_result result;
+    int method = (int)s->options.method, has_prices = method <= SOFTASSIGN_ENTROPIC;
+    if (method <= SOFTASSIGN_EXACT) result = softassign__solve_exact(s);
+    else if (method == SOFTASSIGN_FAST) result = softassign__solve_fast(s);
+    else if (method == SOFTASSIGN_ENTROPIC) result = softassign__solve_entropic(s, &w->sweep, w->best_price);
+    else if (method == SOFTASSIGN_PUBLISHED) result = softassign__solve_published(s, &w->published);
+    else result = softassign__solve_heuristic(s);
+    if (result != SAT_OK) return result;
+    if (!has_prices && s->options.certify) result = softassign__buy_bound(s);
+    if (method > SOFTASSIGN_FAST) {
+        s->report.method = s->options.method;
+        s->report.complete = 1;
+    }
+    if (s->options.min_distance > 0) {
+        if (s->dense_paths) softassign__dense_publish(s);
+        if (has_prices) softassign__take_back(s, s->shown);
+        softassign__separate(s);
+        softassign__keep_best(s, s->shown);
+    } else if (!has_prices) softassign__keep_best(s, s->shown);
+    softassign__report_slots(s, s->shown);
+    return result;
+}
+
+static int softassign__mandatory_count(const softassign_problem *p)
+{
+    int j, count = 0;
+    for (j = 0; p->minimum_use && j < p->columns; j++) count += p->minimum_use[j] > 0;
+    return count;
+}
+
+SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_problem *problem,
+                                           const softassign_options *options, softassign_report *report)
+{
+    softassign_options o = options ? *options : softassign_defaults();
+    softassign__matrix_work work;
+    softassign *s;
+    sat_result result;
+    int i, features;
+    if (report) {
+        memset(report, 0, sizeof *report);
+        report->row_error = report->column_error = -1;
+    }
+    if (!column_of_row || !softassign__problem_is_valid(problem) || !softassign__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    features = problem->cost || problem->cost_fn ? 0 : sat__min_int(problem->feature_count, SOFTASSIGN__BOUND_FEATURES);
+    result = softassign__allocate(&s, problem->rows, problem->columns, softassign__mandatory_count(problem), features, 1, &o);
+    if (result != SAT_OK) return result;
+    result = softassign__allocate_matrix_work(s, &work);
+    if (result == SAT_OK) result = softassign__start(s, problem);
+    if (result == SAT_OK) result = softassign__run(s, &work);
+    if (report) *report = s->report;
+    for (i = 0; result == SAT_OK && i < s->rows; i++) column_of_row[i] = softassign__column(s, s->shown[i]);
+    s->bytes -= work.bytes;
+    if (work.block) sat__release(&s->allocator, work.block, work.bytes);
+    softassign_destroy(s);
+    return result;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Public: photomosaics
+   ------------------------------------------------------------------------------------------------ */
+
+SOFTASSIGN_DEF sat_result softassign_features(float *out, const sat_image *image, int grid_width, int grid_height,
+                                              int parts_x, int parts_y, const softassign_options *options)
+{
+    sat_options o = sat_defaults();
+    sat_table *table;
+    sat_result result;
+    size_t size;
+    int cx, cy, u, v, c, channels;
+    if (!out || !sat__image_is_valid(image) || grid_width < 1 || grid_height < 1 || parts_x < 1 || parts_y < 1) return SAT_ERR_ARGUMENT;
+    if ((int64_t)grid_width * parts_x > 2147483647 || (int64_t)grid_height * parts_y > 2147483647) return SAT_ERR_SIZE;
+    channels = image->channels;
+    if (!sat__multiply_size(&size, (size_t)(grid_width * parts_x), (size_t)(grid_height * parts_y)) ||
+        !sat__multiply_size(&size, size, (size_t)channels * sizeof(float))) return SAT_ERR_SIZE;
+    if (options) {
+        o.allocator = options->allocator;
+        o.threads = options->threads;
+    }
+    result = sat_create(&table, image->width, image->height, channels, &o);
+    if (result != SAT_OK) return result;
+    result = sat_build(table, image);
+    for (cy = 0; result == SAT_OK && cy < grid_height; cy++)
+        for (cx = 0; cx < grid_width; cx++)
+            for (v = 0; v < parts_y; v++)
+                for (u = 0; u < parts_x; u++) {
+                    double step_x = (double)image->width / (grid_width * parts_x), step_y = (double)image->height / (grid_height * parts_y);
+                    double x0 = (cx * parts_x + u) * step_x, y0 = (cy * parts_y + v) * step_y;
+                    double x1 = (cx * parts_x + u + 1) * step_x, y1 = (cy * parts_y + v + 1) * step_y;
+                    for (c = 0; c < channels; c++)
+                        *out++ = (float)(sat_sum_fractional(table, c, x0, y0, x1, y1) / ((x1 - x0) * (y1 - y0)));
+                }
+    sat_destroy(table);
+    return result;
+}
+
+/* Mean of a cell's pixels, one channel, for the tint. */
+static float softassign__cell_mean(const sat_image *image, int grid_width, int grid_height, int x, int y, int channel)
+{
+    int x0 = (int)((int64_t)image->width * x / grid_width), x1 = (int)((int64_t)image->width * (x + 1) / grid_width);
+    int y0 = (int)((int64_t)image->height * y / grid_height), y1 = (int)((int64_t)image->height * (y + 1) / grid_height);
+    double sum = 0;
+    int i, j;
+    if (x1 <= x0) x1 = x0 + 1;
+    if (y1 <= y0) y1 = y0 + 1;
+    for (j = y0; j < y1; j++)
+        for (i = x0; i < x1; i++) {
+            float value;
+            sat__read_row(&value, image, j, i, i + 1, channel);
+            sum += (double)value;
+        }
+    return (float)(sum / ((double)(x1 - x0) * (y1 - y0)));
+}
+
+static unsigned char softassign__to_byte(float v) { return (unsigned char)(v < 0 ? 0 : v > 255 ? 255 : v + 0.5f); }
+
+SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride, const sat_image *tiles, int tile_width,
+                                            int tile_height, const int *column_of_row, int grid_width, int grid_height,
+                                            const sat_image *target, float blend)
+{
+    int across, count, cell, y, k, channels, tint = target && blend > 0;
+    ptrdiff_t row;
+    if (!out || !sat__image_is_valid(tiles) || tiles->format != SAT_U8 || !column_of_row || tile_width < 1 || tile_height < 1 ||
+        grid_width < 1 || grid_height < 1 || grid_width > 2147483647 / grid_height || !(blend >= 0 && blend <= 1)) return SAT_ERR_ARGUMENT;
+    channels = tiles->channels;
+    if (target && (!sat__image_is_valid(target) || target->channels != channels)) return SAT_ERR_MISMATCH;
+    across = tiles->width / tile_width;
+    count = across * (tiles->height / tile_height);
+    row = (ptrdiff_t)grid_width * tile_width * channels;
+    if (stride < row && stride > -row) return SAT_ERR_ARGUMENT;
+    for (cell = 0; cell < grid_width * grid_height; cell++)
+        if (column_of_row[cell] < 0 || column_of_row[cell] >= count) return SAT_ERR_ARGUMENT;
+    for (cell = 0; cell < grid_width * grid_height; cell++) {
+        int cx = cell % grid_width, cy = cell / grid_width, tile = column_of_row[cell], n = tile_width * channels;
+        float mean[4] = {0, 0, 0, 0};
+        for (k = 0; tint && k < channels; k++) mean[k] = softassign__cell_mean(target, grid_width, grid_height, cx, cy, k);
+        for (y = 0; y < tile_height; y++) {
+            const unsigned char *from = (const unsigned char *)sat__image_row(tiles, tile / across * tile_height + y) + (ptrdiff_t)(tile % across) * n;
+            unsigned char *to = out + ((ptrdiff_t)cy * tile_height + y) * stride + (ptrdiff_t)cx * n;
+            for (k = 0; k < n; k++)
+                to[k] = tint ? softassign__to_byte((float)from[k] * (1 - blend) + mean[k % channels] * blend) : from[k];
+        }
+    }
+    return SAT_OK;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SOFTASSIGN_IMPLEMENTATION */
