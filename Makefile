@@ -167,6 +167,7 @@ BENCH_NAMES   := $(sort $(patsubst tests/bench/bench_%.c,%,$(patsubst tests/benc
 BENCHES       := $(foreach l,$(PICK),$(filter $l $l_%,$(BENCH_NAMES)))
 PEERS         := $(OPENCV) $(EMBREE)
 
+build/bench/bench_%_avx2: CFLAGS += $(if $(filter x86_64,$(shell uname -m)),-mavx2)
 build/bench/bench_%: tests/bench/bench_%.c
 	$(COMPILE_C) -Itests/bench $(PICTURES) $(EMBREE) $< -o $@ $(PICTURE_LIBS) $(EMBREE_LIB) $(LDLIBS)
 build/bench/bench_%: tests/bench/bench_%.cpp
