@@ -1,6 +1,84 @@
 /* sat.h - 0.1.0 - prefix scans and summed-area tables - SPDX-License-Identifier: MIT-0 OR Unlicense
 
-   Box sums and box means of any size in constant time, right for high dynamic range images.
+   Box sums and box means of any size in constant time, right for high dynamic range images, on the CPU and in OpenGL.
+
+   USE
+
+       #define SAT_IMPLEMENTATION             // in exactly one C or C++ file
+       #include "sat.h"
+
+       sat_image image = sat_image_f32(pixels, width, height, 1);
+       sat_table *table;
+       if (sat_create(&table, width, height, 1, NULL) != SAT_OK) return 1;
+       sat_build(table, &image);              // again for every frame; allocates nothing
+       double mean = sat_mean(table, 0, x - 20, y - 20, x + 21, y + 21);
+       sat_destroy(table);
+
+   Build with `cc -std=c99 program.c -lm`; nothing else is needed. C99 and C++11.
+
+   WHAT IT DOES
+
+   - Tables that keep their precision where plain float tables lose it: over 14 decades, 3 x 3 boxes of an 8192^2 image come
+     out with a median relative error near 1e-6, where a float table has 1 (bench_sat, table "Precision"). The default,
+     SAT_KIND_TILED, holds float sums that restart in every 32 x 32 tile and double sums between the tiles.
+   - Exact tables in integers modulo 2^32 or 2^64: the same bits on CPU and GPU, for any order of additions.
+   - Means over boxes with real corners, beyond the border (clip, zero, clamp, mirror, wrap), with a radius for each pixel;
+     box filters of whole images, also of images that arrive a row at a time; dirty rectangles.
+   - An error bound and an expected error for every table, and a plan that picks the cheapest kind for a wanted error.
+   - k-ary scans by recursive doubling and by balanced trees, with the work they do counted (Slomp 2012, chapter 4), for any
+     type and operation.
+   - OpenGL 3.3 / ES 3.0 passes that build tables from textures, and GLSL functions that look boxes up.
+
+   WHAT IT DOES NOT
+
+   - No second-order (tent) tables, no tilted tables, no half-float tables: the first lose too many digits in float and
+     are two box filters otherwise, nobody but Haar cascades wants the second, the third overflow at 65504.
+   - No moments: pass x and x * x as two channels; the tiled table keeps the variance.
+   - It starts no thread, opens no window, creates no OpenGL context, keeps no global state.
+
+   OPTIONS (macros)
+
+     SAT_IMPLEMENTATION    off     implementing file   brings the code; LIGHTSCAN_IMPLEMENTATION does so for all six headers
+     SAT_STATIC            off     everywhere          all functions are private to each file
+     SAT_DEF               extern  everywhere          replaces the linkage, as in __declspec(dllexport)
+     SAT_GL                off     everywhere          OpenGL; needs no GL header, loader or library
+     SAT_GL_DUMP           off     implementing file   prints the numbered source of a shader that does not compile
+     SAT_NO_SIMD           off     implementing file   plain C instead of SSE2, AVX2 or NEON; the same bits
+     SAT_NO_STDLIB         off     implementing file   no malloc: every allocator must be given
+     SAT_ASSERT(c)         assert  implementing file   for broken promises inside the library, never for arguments
+
+   MEMORY, THREADS, ERRORS
+
+   sat_create makes one allocation, sat_stream_create two; building, updating, looking up and filtering make none. Scans
+   allocate their scratch, except sequential ones. Outputs belong to the caller. A table may be read by any number of
+   threads; build and update need it alone. Options may carry a parallel_for, which builds and filters then use.
+   Everything that can fail returns a sat_result and leaves outputs alone when it is not SAT_OK, but where a comment says so;
+   lookups of channels or boxes that are not there return 0.
+
+   NUMERICS
+
+   u = 2^-24, v = 2^-53; errors of one box sum, worst case for non-negative pixels; sat_error_bound knows the constants.
+
+     kind      error of a box sum                                      what a box error does not depend on
+     TILED     38 u x (sum of the tiles the box touches) + few v x all  the size of the image
+     FLOAT     (height + width / 8) u x (sum of the whole image)        -
+     DOUBLE    (height + width / 8) v x (sum of the whole image)        -
+     FIXED     quantum / 2 for each pixel of the box                    anything else; 0 for 8- and 16-bit input
+
+   - Input: any float. NaN counts as 0 and infinity as the largest value the kind can sum; both are counted, and a bad
+     pixel changes no box without it. TILED clamps a tile row's pixels to 3.3e35, FLOAT all pixels to 1.6e29, when their
+     sums would overflow otherwise. SAT_NON_FINITE_REFUSE returns an error instead.
+   - The same bits for any number of workers, for SSE2, AVX2, NEON and plain C, with and without contraction into fused
+     multiply-adds, as long as the compiler keeps to IEEE arithmetic (not with -ffast-math).
+   - Corners that share a tile row or column skip the sums these would cancel, so that 3 x 3 boxes beside a bright region
+     keep their digits: at the 99th percentile such a table beats doubles of 8 bytes a pixel.
+   - subtract_mean helps images of low contrast and harms dark boxes of high dynamic range.
+
+   COST
+
+   A build reads each pixel once and writes each sum once. Per pixel and channel: 4.5 bytes (TILED), 4 (FLOAT, FIXED32), 8
+   (DOUBLE, FIXED64). A lookup reads 4 sums (TILED: up to 12). Measured ratios, one core, SSE2 (bench_sat):
+     (filled in by the bench)
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SAT_IMPLEMENTATION)
@@ -281,7 +359,7 @@ typedef struct sat_gl_options {
                                      invocation writes k texels, so that k = 32 or 64 is best */
     int channel;                  /* 0; 0..3: the channel of the input texture */
     int unsigned_input;           /* 0; 1 (FIXED32): the input is an unsigned integer texture and is summed as it is */
-    double quantum;               /* 0: the finest that max_value and max_box_area allow; else a power of two. FIXED32 only */
+    double quantum;               /* 0: the finest that max_value and max_box_area allow; else a power of two. FIXED32 */
     double max_value;             /* 1e30; > 0: pixels beyond +-max_value are clamped to it; NaN counts as 0. Lower it
                                      for FIXED32: the quantum is proportional to it */
     double max_box_area;          /* 0: the whole table; FIXED32: no larger box is ever asked for */
@@ -310,12 +388,13 @@ SAT_DEF unsigned sat_gl_table(const sat_gl *gl);
 /* FIXED32: the value of 1 in the table, which the lookups ask for; 0 for the other formats. */
 SAT_DEF double sat_gl_quantum(const sat_gl *gl);
 
-/* The mean, after NaN and infinities were replaced, by a tree of two-float sums that takes k x k texels a step. It stays in
-   the texel of sat_gl_mean_texture (RG32F: the mean is x + y); with mean != NULL it comes back, which waits for the GPU. */
+/* The mean, after NaN and infinities were replaced, by a tree of two-float sums that takes k x k texels a step, k at
+   most 8. It stays in the one texel of sat_gl_mean_texture (RG32F: the mean is x + y); with mean != NULL it comes back,
+   which waits for the GPU. */
 SAT_DEF sat_result sat_gl_mean(sat_gl *gl, float *mean, unsigned texture, int width, int height);
 SAT_DEF unsigned sat_gl_mean_texture(const sat_gl *gl);
 
-/* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader, once or more; boxes are half-open and clipped, as in C:
+/* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader, once or more. Boxes are half-open and clipped:
 
        float sat_sum(sampler2D table, ivec2 low, ivec2 high)               4 fetches
        float sat_mean(sampler2D table, ivec2 low, ivec2 high)              by the clipped area; empty: 0
@@ -768,7 +847,8 @@ enum {
     SAT__GL_R8 = 0x8229, SAT__GL_RG8 = 0x822B, SAT__GL_RGBA8 = 0x8058, SAT__GL_SRGB8_ALPHA8 = 0x8C43,
     SAT__GL_R8UI = 0x8232, SAT__GL_R16F = 0x822D, SAT__GL_RG16F = 0x822F, SAT__GL_RGBA16F = 0x881A,
     SAT__GL_R32F = 0x822E, SAT__GL_RG32F = 0x8230, SAT__GL_RGB32F = 0x8815, SAT__GL_RGBA32F = 0x8814,
-    SAT__GL_R32I = 0x8235, SAT__GL_RGBA32I = 0x8D82, SAT__GL_R32UI = 0x8236, SAT__GL_RG32UI = 0x823C, SAT__GL_RGBA32UI = 0x8D70,
+    SAT__GL_R32I = 0x8235, SAT__GL_RGBA32I = 0x8D82, SAT__GL_R32UI = 0x8236, SAT__GL_RG32UI = 0x823C,
+    SAT__GL_RGBA32UI = 0x8D70,
     SAT__GL_R16UI = 0x8234, SAT__GL_DEPTH_COMPONENT24 = 0x81A6, SAT__GL_DEPTH_COMPONENT32F = 0x8CAC,
     SAT__GL_RENDERER = 0x1F01, SAT__GL_VERSION = 0x1F02, SAT__GL_FRAGMENT_SHADER = 0x8B30, SAT__GL_VERTEX_SHADER = 0x8B31,
     SAT__GL_COMPUTE_SHADER = 0x91B9, SAT__GL_COMPILE_STATUS = 0x8B81, SAT__GL_LINK_STATUS = 0x8B82,
@@ -999,7 +1079,8 @@ typedef struct sat__gl_shaders {
     const char *name;              /* for messages, such as "ssao_sat: accessibility" */
     const char *const *library;    /* what sat_gl_glsl() and its like give */
     const char *const *vertex;     /* NULL: a triangle over the whole viewport; use gl_FragCoord */
-    const char *const *fragment;   /* NULL: draws nothing, for transform feedback */
+    const char *const *fragment;   /* NULL: draws nothing, for transform feedback. Bind a framebuffer of yours even
+                                      so: a context without a window has none, and refuses to draw */
     const char *const *compute;    /* not NULL: a compute program, and the others are not looked at */
     const char *const *varyings;   /* not NULL: captured by transform feedback, interleaved */
 } sat__gl_shaders;
@@ -1050,7 +1131,9 @@ static inline void sat__gl_explain(sat__gl *gl, const char *const *parts, int co
 static inline unsigned sat__gl_compile(sat__gl *gl, unsigned type, const sat__gl_shaders *shaders, const char *const *text)
 {
     static const char es_precision[] = "precision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
-                                       "precision highp isampler2D;\nprecision highp usampler2D;\nprecision highp sampler2DArray;\n";
+                                       "precision highp isampler2D;\nprecision highp usampler2D;\n"
+                                       "precision highp sampler2DArray;\n";
+    const char *stage = type == SAT__GL_VERTEX_SHADER ? "vertex" : type == SAT__GL_COMPUTE_SHADER ? "compute" : "fragment";
     const char *parts[64];
     int count = 0, ok = 0;
     unsigned shader = gl->CreateShader(type);
@@ -1069,8 +1152,7 @@ static inline unsigned sat__gl_compile(sat__gl *gl, unsigned type, const sat__gl
     if (!ok) {
         char log[2048] = "";
         gl->GetShaderInfoLog(shader, (int)sizeof log, NULL, log);
-        snprintf(gl->message, sizeof gl->message, "%s: a %s shader does not compile\n%s", shaders->name,
-                 type == SAT__GL_VERTEX_SHADER ? "vertex" : type == SAT__GL_COMPUTE_SHADER ? "compute" : "fragment", log);
+        snprintf(gl->message, sizeof gl->message, "%s: a %s shader does not compile\n%s", shaders->name, stage, log);
         sat__gl_explain(gl, parts, count);
         gl->DeleteShader(shader);
         return 0;
@@ -1430,8 +1512,8 @@ static inline void sat__gl_save_pipeline(sat__gl *gl, sat__gl_state *state)
 
 static inline void sat__gl_save_buffers(sat__gl *gl, sat__gl_state *state)
 {
-    const unsigned *names = sat__gl_store_names(gl, &state->feedback);
-    int i, count = state->feedback;
+    int i, count;
+    const unsigned *names = sat__gl_store_names(gl, &count);
     for (i = 0; i < count; i++) gl->GetIntegerv(names[i], &state->stores[i]);
     for (i = 0; i < 4; i++) gl->GetIntegerv(sat__gl_buffer_names()[2 * i + 1], &state->buffers[i]);
     gl->GetIntegeri_v(SAT__GL_TRANSFORM_FEEDBACK_BUFFER_BINDING, 0, &state->feedback);
@@ -1585,7 +1667,6 @@ SAT_DEF sat_image sat_image_f32(const float *pixels, int width, int height, int 
     return image;
 }
 
-/* @CORE BEGIN@ */
 /* ---- scans */
 
 SAT_DEF sat_scan_options sat_scan_defaults(void)
@@ -3360,7 +3441,6 @@ SAT_DEF sat_result sat_stream_push(sat_stream *stream, float *out_row, int *rows
     return SAT_OK;
 }
 
-/* @CORE END@ */
 
 #ifdef __cplusplus
 }
@@ -3664,11 +3744,13 @@ SAT_DEF sat_gl_options sat_gl_defaults(void)
 static int sat__gl_options_are_valid(const sat_gl_options *o)
 {
     int exponent;
-    if ((unsigned)o->format > (unsigned)SAT_GL_FIXED32 || o->k < 2 || o->k > 64 || o->channel < 0 || o->channel > 3) return 0;
+    if ((unsigned)o->format > (unsigned)SAT_GL_FIXED32) return 0;
+    if (o->k < 2 || o->k > 64 || o->channel < 0 || o->channel > 3) return 0;
     if (o->algorithm != SAT_SCAN_BALANCED_TREE && o->algorithm != SAT_SCAN_RECURSIVE_DOUBLING) return 0;
     if (o->unsigned_input && o->format != SAT_GL_FIXED32) return 0;
-    if (!sat__is_finite_double(o->max_value) || !sat__is_finite_double(o->quantum) || !sat__is_finite_double(o->max_box_area)) return 0;
-    if (!(o->max_value > 0) || !(o->max_box_area >= 0) || !(o->quantum >= 0)) return 0;
+    if (!(o->max_value > 0) || !sat__is_finite_double(o->max_value)) return 0;
+    if (!(o->max_box_area >= 0) || !sat__is_finite_double(o->max_box_area)) return 0;
+    if (!(o->quantum >= 0) || !sat__is_finite_double(o->quantum)) return 0;
     if (!(o->quantum > 0)) return 1;
     return frexp(o->quantum, &exponent) <= 0.5 && exponent > -120 && exponent < 120;
 }
@@ -3680,8 +3762,8 @@ static unsigned sat__gl_internal(sat_gl_format format)
 
 /* ---- programs */
 
-static sat_result sat__gl_make_kernel(sat_gl *g, sat__gl_kernel *kernel, const char *name, const char *body, int reads_input,
-                                      sat_gl_format format, int k)
+static sat_result sat__gl_make_kernel(sat_gl *g, sat__gl_kernel *kernel, const char *name, const char *body,
+                                      int reads_input, sat_gl_format format, int k)
 {
     sat__gl *gl = &g->gl;
     const char *library[3], *text[3];
@@ -3721,16 +3803,16 @@ static sat_result sat__gl_make_kernel(sat_gl *g, sat__gl_kernel *kernel, const c
 static sat_result sat__gl_make_kernels(sat_gl *g)
 {
     const sat_gl_options *o = &g->options;
+    const char *expand = g->compute ? sat__glsl_expand_groups : sat__glsl_expand;
+    sat_gl_format format = o->format;
     sat_result result = SAT_OK;
-    int i;
+    int i, k = o->k;
     for (i = 0; i < 2 && result == SAT_OK; i++) {
         if (o->algorithm == SAT_SCAN_RECURSIVE_DOUBLING) {
-            result = sat__gl_make_kernel(g, &g->doubling[i], "sat: recursive doubling", sat__glsl_double, i, o->format, o->k);
+            result = sat__gl_make_kernel(g, &g->doubling[i], "sat: recursive doubling", sat__glsl_double, i, format, k);
         } else {
-            result = sat__gl_make_kernel(g, &g->reduce[i], "sat: reduction", sat__glsl_reduce, i, o->format, o->k);
-            if (result == SAT_OK)
-                result = sat__gl_make_kernel(g, &g->expand[i], "sat: expansion", g->compute ? sat__glsl_expand_groups : sat__glsl_expand,
-                                             i, o->format, o->k);
+            result = sat__gl_make_kernel(g, &g->reduce[i], "sat: reduction", sat__glsl_reduce, i, format, k);
+            if (result == SAT_OK) result = sat__gl_make_kernel(g, &g->expand[i], "sat: expansion", expand, i, format, k);
         }
         if (result == SAT_OK && !o->unsigned_input)
             result = sat__gl_make_kernel(g, &g->mean[i], "sat: mean", sat__glsl_mean, i, SAT_GL_TWO_FLOAT, g->mean_k);
@@ -3816,7 +3898,8 @@ static sat_result sat__gl_settle(sat_gl *g, int width, int height)
         largest = o->max_value < 3.4028234663852886e38 ? o->max_value : 3.4028234663852886e38;
         range = 2147483647.0 / (o->max_box_area > 0 ? o->max_box_area : (double)width * (double)height) - 0.5;
         g->quantum = o->unsigned_input && !(o->quantum > 0) ? 1 : o->quantum;
-        if (!o->unsigned_input && range < 1) return sat__gl_fail(&g->gl, SAT_ERR_LIMIT, "max_box_area leaves a pixel less than one quantum", NULL);
+        if (!o->unsigned_input && range < 1)
+            return sat__gl_fail(&g->gl, SAT_ERR_LIMIT, "max_box_area leaves a pixel less than one quantum", NULL);
         if (!(g->quantum > 0)) {
             int exponent;
             double fraction = frexp(largest / range, &exponent);
@@ -3872,7 +3955,8 @@ static void sat__gl_start(sat_gl *g, const sat__gl_kernel *kernel, int axis, int
     gl->BindSampler(1, 0);
 }
 
-static void sat__gl_expand(sat_gl *g, int axis, sat__gl_target target, int width, int height, unsigned source, int is_input, unsigned uncles)
+static void sat__gl_expand(sat_gl *g, int axis, sat__gl_target target, int width, int height, unsigned source,
+                           int is_input, unsigned uncles)
 {
     sat__gl *gl = &g->gl;
     const sat__gl_kernel *kernel = &g->expand[is_input];
@@ -3932,8 +4016,8 @@ static void sat__gl_double(sat_gl *g, int axes, sat__gl_target target, unsigned 
     for (axis = 0; axis < axes; axis++) {
         int distance = 1, skip = 0;
         for (i = 0; i < passes[axis]; i++, done++) {
-            const sat__gl_target *to = &halves[(total - done) & 1];
-            sat__gl_start(g, &g->doubling[done == 0], axis, distance, done ? halves[(total - done + 1) & 1].texture : source, 0);
+            const sat__gl_target *to = &halves[(total - done) & 1], *from = &halves[(total - done + 1) & 1];
+            sat__gl_start(g, &g->doubling[done == 0], axis, distance, done ? from->texture : source, 0);
             gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, to->framebuffer);
             if (axis) gl->Viewport(0, skip, g->width, g->height - skip);
             else gl->Viewport(skip, 0, g->width - skip, g->height);
@@ -4065,7 +4149,8 @@ SAT_DEF sat_result sat_gl_create(sat_gl **out, sat_gl_get_proc *get_proc, const 
     sat_gl *g;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
-    if (!get_proc || !sat__gl_options_are_valid(&chosen) || !sat__resolve_allocator(&allocator, &chosen.allocator)) return SAT_ERR_ARGUMENT;
+    if (!get_proc || !sat__gl_options_are_valid(&chosen)) return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(&allocator, &chosen.allocator)) return SAT_ERR_ARGUMENT;
     g = (sat_gl *)sat__alloc(&allocator, sizeof *g);
     if (!g) return SAT_ERR_MEMORY;
     memset(g, 0, sizeof *g);

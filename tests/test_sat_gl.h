@@ -1079,7 +1079,7 @@ TEST(transform_feedback_and_points)
     sat__gl *gl = &test_f.real;
     sat__gl_shaders shaders;
     sat__gl_state state;
-    unsigned buffers[2], program = 0, targets[2], depth = 0, framebuffer = 0, array = 0;
+    unsigned buffers[2], program = 0, targets[2] = {0, 0}, depth = 0, framebuffer = 0, array = 0;
     float *mapped, pixels[8 * 8 * 4];
     int i, covered = 0;
     if (!test_open()) return;
@@ -1091,6 +1091,10 @@ TEST(transform_feedback_and_points)
     sat__gl_define_float(gl, "OFFSET", 0.1f);
     if (!EXPECT_EQ(sat__gl_build(gl, &program, &shaders), SAT_OK)) puts(gl->message);
     EXPECT_EQ(gl->defines[0], 0);
+    EXPECT_EQ(sat__gl_texture(gl, &targets[0], SAT__GL_RGBA32F, 8, 8, NULL), SAT_OK);
+    EXPECT_EQ(sat__gl_texture(gl, &targets[1], SAT__GL_RGBA16F, 8, 8, NULL), SAT_OK);
+    EXPECT_EQ(sat__gl_texture(gl, &depth, SAT__GL_DEPTH_COMPONENT24, 8, 8, NULL), SAT_OK);
+    EXPECT_EQ(sat__gl_framebuffer(gl, &framebuffer, targets, 2, depth), SAT_OK);
     gl->GenVertexArrays(1, &array);
     gl->BindVertexArray(array);
     gl->GenBuffers(2, buffers);
@@ -1120,10 +1124,6 @@ TEST(transform_feedback_and_points)
     shaders.vertex = place;
     shaders.fragment = paint;
     if (!EXPECT_EQ(sat__gl_build(gl, &program, &shaders), SAT_OK)) puts(gl->message);
-    EXPECT_EQ(sat__gl_texture(gl, &targets[0], SAT__GL_RGBA32F, 8, 8, NULL), SAT_OK);
-    EXPECT_EQ(sat__gl_texture(gl, &targets[1], SAT__GL_RGBA16F, 8, 8, NULL), SAT_OK);
-    EXPECT_EQ(sat__gl_texture(gl, &depth, SAT__GL_DEPTH_COMPONENT24, 8, 8, NULL), SAT_OK);
-    EXPECT_EQ(sat__gl_framebuffer(gl, &framebuffer, targets, 2, depth), SAT_OK);
     sat__gl_pass(gl, program, framebuffer, 8, 8);
     gl->Enable(SAT__GL_PROGRAM_POINT_SIZE);
     gl->ClearBufferfv(SAT__GL_COLOR, 0, zero);

@@ -11,5 +11,8 @@ int main(void)
     sat_build(table, &image);
     sum = sat_sum(table, 0, 1, 0, 3, 2);
     sat_destroy(table);
+#ifdef SAT_GL
+    if (sat_gl_table(NULL) != 0) return 1;
+#endif
     return sum < 16 || sum > 16;
 }
