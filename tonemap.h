@@ -1,0 +1,1709 @@
+/* tonemap.h - 0.1.0 - photographic tone mapping - SPDX-License-Identifier: MIT-0 OR Unlicense */
+
+#if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(TONEMAP_IMPLEMENTATION)
+#define TONEMAP_IMPLEMENTATION
+#endif
+
+#ifndef TONEMAP_H
+#define TONEMAP_H
+
+#define TONEMAP_VERSION_MAJOR 0
+#define TONEMAP_VERSION_MINOR 1
+#define TONEMAP_VERSION_PATCH 0
+#define TONEMAP_VERSION (TONEMAP_VERSION_MAJOR * 10000 + TONEMAP_VERSION_MINOR * 100 + TONEMAP_VERSION_PATCH)
+
+#if defined(TONEMAP_IMPLEMENT) || defined(TONEMAP_IMPL)
+#error "tonemap.h: the macro is called TONEMAP_IMPLEMENTATION"
+#endif
+
+#if defined(TONEMAP_GL) && !defined(SAT_GL)
+#define SAT_GL
+#endif
+#include "sat.h"
+#if SAT_VERSION < 100
+#error "tonemap.h needs sat.h 0.1.0 or newer"
+#endif
+
+#ifndef TONEMAP_DEF
+#ifdef TONEMAP_STATIC
+#define TONEMAP_DEF static inline
+#else
+#define TONEMAP_DEF extern
+#endif
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Types
+   ------------------------------------------------------------------------------------------------ */
+
+typedef enum tonemap_operator {
+    TONEMAP_PHOTOGRAPHIC_LOCAL,  /* dodging and burning, Slomp 2012, eq A.4 to A.9 */
+    TONEMAP_PHOTOGRAPHIC_GLOBAL, /* one curve for all pixels, eq A.3 */
+    TONEMAP_ASHIKHMIN,           /* threshold against intensity, local; Michael 2010, section 4.3 */
+    TONEMAP_ASHIKHMIN_GLOBAL,    /* its curve alone */
+    TONEMAP_LINEAR               /* exposure only: eq A.2, clipped */
+} tonemap_operator;
+
+/* Reds fade towards orange in dim light (Slomp 2012, section A.5). */
+typedef enum tonemap_mesopic {
+    TONEMAP_MESOPIC_OFF,
+    TONEMAP_MESOPIC_UNIFORM, /* one light level, the mean of the picture */
+    TONEMAP_MESOPIC_LOCAL    /* the level around each pixel: a red lamp in the night stays red */
+} tonemap_mesopic;
+
+typedef struct tonemap_options {
+    tonemap_operator operation; /* TONEMAP_PHOTOGRAPHIC_LOCAL */
+    double key;                 /* 0.18; the display value of the log-average luminance before compression, 0..10;
+                                   <= 0: estimated from the log-average's place between dark and bright (Reinhard 2003) */
+    double white;               /* INFINITY (no burn-out); the smallest luminance shown as white, in units in which the
+                                   log-average is the key; 0: estimated, at least 1 */
+    double phi;                 /* 8; -16..16; sharpening of the scale test, eq A.5 */
+    double epsilon;             /* 0.05; > 0; threshold of the scale test, eq A.7 */
+    int scales;                 /* 8; 1..8: how many of the box lengths 1 3 5 7 11 17 27 41 */
+    double soft;                /* 0; 0..1: half width of the band around epsilon in which scales are mixed; against flicker */
+    tonemap_mesopic mesopic;    /* TONEMAP_MESOPIC_OFF */
+    double cd_per_unit;         /* 0; cd/m2 of a luminance of 1; 0: unknown, the log-average counts as 10 cd/m2 */
+    double lux_per_cd;          /* 1; illuminance that belongs to a luminance of 1 cd/m2, eq A.10 */
+    double tolerance_codes;     /* 0: every pixel is searched; > 0: pixels whose display value is known to within so many
+                                   8-bit sRGB codes without a search are not searched (local operator) */
+    double selective;           /* 0: off; > 0: only pixels whose Sobel gradient of the scaled luminance exceeds this
+                                   are searched (Michael 2010, section 4.4) */
+    double adapt_seconds;       /* 0: each picture for itself; > 0: time constant of the eye's adaptation */
+    sat_allocator allocator;    /* malloc; used by create and destroy only */
+    sat_threads threads;        /* serial; same bits for any worker count */
+} tonemap_options;
+TONEMAP_DEF tonemap_options tonemap_defaults(void);
+
+/* What the last picture was like and what was done to it. */
+typedef struct tonemap_stats {
+    double log_average, mean;      /* of the positive luminances; of all; measured */
+    double low, high;              /* 1 % and 99 % quantiles of the positive luminances */
+    double adapted, key, white;    /* log-average, key and white that were used, after adaptation */
+    size_t positive;               /* pixels with a finite luminance > 0: those that log_average, low and high are of */
+    size_t nan, infinite, negative; /* pixels whose luminance was replaced: by 0, by 2^100, by 0 */
+    size_t clamped;                /* pixels with a display component above 1 */
+    size_t scale[10];              /* searched pixels by the box that was taken, smallest first */
+    size_t searched, skipped;      /* pixels with and without a search */
+    double worst_codes;            /* proven bound of the error that skipping made, 8-bit sRGB codes */
+} tonemap_stats;
+
+typedef struct tonemap tonemap;
+
+/* ------------------------------------------------------------------------------------------------
+   Calls
+   ------------------------------------------------------------------------------------------------ */
+
+/* The version the implementation was compiled with: compare with TONEMAP_VERSION. */
+TONEMAP_DEF int tonemap_version(void);
+
+/* One picture, packed floats in, packed 8-bit sRGB of as many channels out. */
+TONEMAP_DEF sat_result tonemap_once_u8(unsigned char *out, const float *pixels, int width, int height, int channels,
+                                       const tonemap_options *options);
+
+/* An operator for pictures of one size; exactly one allocation. Sides up to 2^24. */
+TONEMAP_DEF sat_result tonemap_create(tonemap **out, int width, int height, const tonemap_options *options);
+/* hdr: linear, 1 (grey), 3 (RGB) or 4 (RGB and alpha) channels; out: as many channels, rows out_stride bytes apart.
+   dt_seconds: time since the last picture, >= 0; only adaptation looks at it. stats may be NULL. */
+TONEMAP_DEF sat_result tonemap_apply_u8(tonemap *map, unsigned char *out, ptrdiff_t out_stride, const sat_image *hdr,
+                                        double dt_seconds, tonemap_stats *stats);
+/* The same without sRGB encoding: linear display values in [0, 1]. May work in place. */
+TONEMAP_DEF sat_result tonemap_apply_f32(tonemap *map, float *out, ptrdiff_t out_stride, const sat_image *hdr,
+                                         double dt_seconds, tonemap_stats *stats);
+/* Other options from the next picture on; the adaptation goes on. Allocator and worker count stay those of create. */
+TONEMAP_DEF sat_result tonemap_set_options(tonemap *map, const tonemap_options *options);
+TONEMAP_DEF void tonemap_destroy(tonemap *map); /* NULL is fine */
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TONEMAP_H */
+
+/* ------------------------------------------------------------------------------------------------
+   Stop here if you only want to use the library.
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(TONEMAP_IMPLEMENTATION) && !defined(TONEMAP_IMPLEMENTED)
+#define TONEMAP_IMPLEMENTED
+
+#ifndef SAT_SIBLING
+#define SAT_SIBLING
+#endif
+#include "sat.h"
+#include <float.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum {
+    TONEMAP__LENGTHS = 8,  /* box lengths of the photographic operator */
+    TONEMAP__ASHIKHMIN = 10, /* neighbourhoods of Ashikhmin's operator; each is compared with the one of twice its size */
+    TONEMAP__BOXES = 20,   /* room for the boxes of one row */
+    TONEMAP__GROUP = 16,   /* pixels searched together */
+    TONEMAP__TILE = 8,     /* side of the tiles of which skipping bounds the result */
+    TONEMAP__BAND = 64,    /* rows of the smallest piece of work: 2 reach + 2 rows of sums are made anew for each */
+    TONEMAP__CHUNK = 64,   /* pixels converted to display values together */
+    TONEMAP__BINS = 16 * 201, /* of the luminance histogram: 16 an octave, from 2^-100 to 2^100 */
+    TONEMAP__CODES = 13 * 512 + 1 /* entries of the sRGB table */
+};
+
+/* Luminances outside are taken as 0 and as the largest: a range that no unit and no scene reaches, in which products
+   with any scale of eq A.2 stay normal floats. */
+#define TONEMAP__DARKEST 7.8886090522101181e-31f  /* 2^-100 */
+#define TONEMAP__BRIGHTEST 1.2676506002282294e30f /* 2^100 */
+#define TONEMAP__DARKEST_BITS 0x0d800000u
+#define TONEMAP__LOCAL_CAP 256.0f     /* of the scaled luminance in the sums: beyond it eq A.4 shows white in any case */
+#define TONEMAP__QUANTUM 4096.0f      /* steps a unit: 41 * 41 * 256 * 4096 < 2^31 */
+#define TONEMAP__ASHIKHMIN_QUANTUM 1048576.0f /* the same for luminances up to 1: 35 * 35 * 2^20 < 2^31 */
+
+TONEMAP_DEF int tonemap_version(void) { return TONEMAP_VERSION; }
+
+TONEMAP_DEF tonemap_options tonemap_defaults(void)
+{
+    tonemap_options o;
+    memset(&o, 0, sizeof o);
+    o.operation = TONEMAP_PHOTOGRAPHIC_LOCAL;
+    o.key = 0.18;
+    o.white = (double)INFINITY;
+    o.phi = 8;
+    o.epsilon = 0.05;
+    o.scales = TONEMAP__LENGTHS;
+    o.lux_per_cd = 1;
+    return o;
+}
+
+static inline int tonemap__is_infinite(double v) { return !sat__is_finite_double(v) && v > 0; }
+
+static inline int tonemap__in_range(double v, double low, double high)
+{
+    return sat__is_finite_double(v) && v >= low && v <= high;
+}
+
+static inline int tonemap__options_are_valid(const tonemap_options *o)
+{
+    if ((unsigned)o->operation > (unsigned)TONEMAP_LINEAR || (unsigned)o->mesopic > (unsigned)TONEMAP_MESOPIC_LOCAL) return 0;
+    if (!tonemap__in_range(o->key, -1e6, 10) || !(tonemap__is_infinite(o->white) || tonemap__in_range(o->white, 0, 1e12))) return 0;
+    if (!tonemap__in_range(o->phi, -16, 16) || !tonemap__in_range(o->epsilon, 1e-9, 1e9)) return 0;
+    if (o->scales < 1 || o->scales > TONEMAP__LENGTHS || !tonemap__in_range(o->soft, 0, 1)) return 0;
+    if (!tonemap__in_range(o->cd_per_unit, 0, 1e30) || !tonemap__in_range(o->lux_per_cd, 0, 1e6)) return 0;
+    if (!tonemap__in_range(o->tolerance_codes, 0, 255) || !tonemap__in_range(o->selective, 0, 1e30)) return 0;
+    return tonemap__in_range(o->adapt_seconds, 0, 1e30) && sat__threads_are_valid(&o->threads);
+}
+
+/* ---- the object */
+
+/* What one worker needs: sums of 2 reach + 2 rows, and rows of intermediate values. Rows are padded so that groups at
+   the right border may read and write past the last pixel. */
+typedef struct tonemap__worker {
+    uint32_t *sums;       /* ring of rows; row j is the sum of all pixels above j and left of x, modulo 2^32 */
+    float *pixels;        /* a row of the input as floats */
+    float *local;         /* La, eq A.4; then the factor from input to display */
+    float *rho;           /* eq A.11 */
+    float *edge;          /* Sobel gradient */
+    float *peak;          /* largest component of each column of a row of tiles */
+    uint32_t *bins, *histogram; /* memory; the same or NULL when nobody asks */
+    int64_t log_sum;      /* of log2 of the positive luminances, in 2^-16 */
+    tonemap_stats stats;
+} tonemap__worker;
+
+/* What adapts over time, all as base-2 logarithms. */
+enum { TONEMAP__AVERAGE, TONEMAP__KEY, TONEMAP__WHITE, TONEMAP__LOW, TONEMAP__HIGH, TONEMAP__STATES };
+
+/* The numbers of one picture that every pixel needs. */
+typedef struct tonemap__frame {
+    float scale;            /* scaled luminance = luminance * scale, eq A.2 */
+    float cap, quantum;     /* of the sums */
+    float inverse_white2;   /* 1 / white^2 */
+    float epsilon, term[TONEMAP__LENGTHS]; /* the test of eq A.5 and A.7: |c - v| < epsilon c + term[k] */
+    float soft;
+    float lux;              /* illuminance of a scaled luminance of 1 */
+    float rho;              /* eq A.11 of the whole picture; 1 where there is nothing to do */
+    float curve_low, curve_factor, cd; /* Ashikhmin: display = (C(L cd) - curve_low) curve_factor */
+    int reach, boxes;       /* largest radius; number of boxes */
+    int radius[TONEMAP__BOXES];
+} tonemap__frame;
+
+struct tonemap {
+    tonemap_options options;
+    sat_allocator allocator;
+    void *block;
+    size_t block_size;
+    int width, height, row, ring_row, workers, tiles_x, tiles_y, started;
+    float *luminance;       /* the picture, rows `row` floats apart */
+    float *row_sum;         /* of each row */
+    struct tonemap__range *tile_range, *tile_reached; /* of each tile: its own; with its neighbours in the row */
+    float *tile_peak;       /* largest component */
+    float *tile_local;      /* La where the tile is skipped, else -1 */
+    tonemap__worker *worker;
+    double state[TONEMAP__STATES];
+    tonemap__frame frame;
+    tonemap_stats stats;
+    unsigned char code[TONEMAP__CODES];
+};
+
+/* ---- base-2 logarithm: exponent plus a polynomial that is exact at both ends of the octave; error below 2.3e-6 */
+
+static inline float tonemap__log2_octave(float t)
+{
+    float q = 0.442544943f + t * (-0.275600307f + t * (0.18194886f + t * (-0.0959564262f + t * 0.0258414329f)));
+    return t + t * (1 - t) * q;
+}
+
+static inline float tonemap__log2(float v)
+{
+    uint32_t bits = sat__float_bits(v);
+    float t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
+    return (float)((int32_t)(bits >> 23) - 127) + tonemap__log2_octave(t);
+}
+
+/* |v| < 60; relative error below 5e-6 */
+static inline float tonemap__exp2(float v)
+{
+    float whole = (float)(int32_t)(v + 64) - 64, t = v - whole;
+    float q = -0.306996076f + t * (-0.0654462594f + t * -0.0137019985f);
+    float octave = sat__float_from_bits((uint32_t)(int32_t)((whole + 127) * 8388608.0f));
+    return octave * (1 + t + t * (1 - t) * q);
+}
+
+#ifdef SAT__VECTOR
+static inline sat__f32x4 tonemap__log2_octave4(sat__f32x4 t)
+{
+    static const float c[4] = {-0.0959564262f, 0.18194886f, -0.275600307f, 0.442544943f};
+    sat__f32x4 q = sat__f32x4_set1(0.0258414329f);
+    int i;
+    for (i = 0; i < 4; i++) q = sat__f32x4_add(sat__f32x4_set1(c[i]), sat__f32x4_mul(t, q));
+    return sat__f32x4_add(t, sat__f32x4_mul(sat__f32x4_mul(t, sat__f32x4_sub(sat__f32x4_set1(1), t)), q));
+}
+
+/* mantissa - 1 */
+static inline sat__f32x4 tonemap__octave4(sat__i32x4 bits)
+{
+    sat__i32x4 mantissa = sat__i32x4_or(sat__i32x4_and(bits, sat__i32x4_set1(0x007fffff)), sat__i32x4_set1(0x3f800000));
+    return sat__f32x4_sub(sat__f32x4_from_bits(mantissa), sat__f32x4_set1(1));
+}
+
+static inline sat__f32x4 tonemap__log2_4(sat__f32x4 v)
+{
+    sat__i32x4 bits = sat__f32x4_bits(v), exponent = sat__i32x4_sub(sat__i32x4_shift_right(bits, 23), sat__i32x4_set1(127));
+    return sat__f32x4_add(sat__i32x4_to_f32(exponent), tonemap__log2_octave4(tonemap__octave4(bits)));
+}
+
+static inline sat__f32x4 tonemap__exp2_4(sat__f32x4 v)
+{
+    sat__f32x4 one = sat__f32x4_set1(1);
+    sat__f32x4 whole = sat__f32x4_sub(sat__i32x4_to_f32(sat__f32x4_truncate(sat__f32x4_add(v, sat__f32x4_set1(64)))), sat__f32x4_set1(64));
+    sat__f32x4 t = sat__f32x4_sub(v, whole), q = sat__f32x4_add(sat__f32x4_set1(-0.0654462594f), sat__f32x4_mul(t, sat__f32x4_set1(-0.0137019985f)));
+    sat__i32x4 octave = sat__f32x4_truncate(sat__f32x4_mul(sat__f32x4_add(whole, sat__f32x4_set1(127)), sat__f32x4_set1(8388608.0f)));
+    q = sat__f32x4_add(sat__f32x4_set1(-0.306996076f), sat__f32x4_mul(t, q));
+    q = sat__f32x4_mul(sat__f32x4_mul(t, sat__f32x4_sub(one, t)), q);
+    return sat__f32x4_mul(sat__f32x4_from_bits(octave), sat__f32x4_add(sat__f32x4_add(one, t), q));
+}
+#endif
+
+/* ---- first pass: luminance, its logarithm, and what is wrong with it */
+
+/* The luminance that counts, and its number in the statistics. */
+static inline float tonemap__sane_luminance(float y, tonemap_stats *stats)
+{
+    if (sat__is_nan(y)) {
+        stats->nan++;
+        return 0;
+    }
+    if (!sat__is_finite(y) && y > 0) stats->infinite++;
+    if (y < 0) stats->negative++;
+    return y < TONEMAP__DARKEST ? 0 : y > TONEMAP__BRIGHTEST ? TONEMAP__BRIGHTEST : y;
+}
+
+/* Pixels [x, end) of a row. lane[x % 4] sums the luminances, so that four pixels at a time give the same sum. */
+static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, float *peak, float *lane, const float *pixels,
+                                          int channels, int x, int end)
+{
+    for (; x < end; x++) {
+        const float *p = pixels + (size_t)x * (size_t)channels;
+        float seen = channels == 1 ? p[0] : sat__luminance(p[0], p[1], p[2]), y = tonemap__sane_luminance(seen, &w->stats);
+        luminance[x] = y;
+        if (peak) {
+            int c;
+            for (c = 0; c < (channels == 1 ? 1 : 3); c++) peak[x] = p[c] > peak[x] ? p[c] : peak[x];
+        }
+        if (y > 0 && sat__is_finite(seen)) { /* infinity is shown as white, but says nothing about the light */
+            uint32_t bits = sat__float_bits(y);
+            float t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
+            w->log_sum += ((int64_t)(bits >> 23) - 127) * 65536 + (int32_t)(tonemap__log2_octave(t) * 65536 + 0.5f);
+            w->stats.positive++;
+            lane[x & 3] += y;
+            if (w->histogram) w->histogram[(bits - TONEMAP__DARKEST_BITS) >> 19]++;
+        }
+    }
+}
+
+#ifdef SAT__VECTOR
+static inline sat__f32x4 tonemap__load_pixels(const float *p, int channels, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b)
+{
+    sat__f32x4 alpha = sat__f32x4_set1(1);
+    if (channels == 3) sat__f32x4_load3(p, r, g, b);
+    else if (channels == 4) sat__f32x4_load4(p, r, g, b, &alpha);
+    else *r = *g = *b = sat__f32x4_load(p);
+    return alpha;
+}
+
+static inline sat__f32x4 tonemap__luminance4(int channels, sat__f32x4 r, sat__f32x4 g, sat__f32x4 b)
+{
+    sat__f32x4 y = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(0.2126729f), r), sat__f32x4_mul(sat__f32x4_set1(0.7151522f), g));
+    return channels == 1 ? r : sat__f32x4_add(y, sat__f32x4_mul(sat__f32x4_set1(0.0721750f), b));
+}
+
+static inline void tonemap__count4(uint32_t *histogram, sat__i32x4 bits)
+{
+    int32_t bin[4];
+    int i;
+    sat__i32x4_store(bin, sat__i32x4_shift_right(sat__i32x4_sub(bits, sat__i32x4_set1((int32_t)TONEMAP__DARKEST_BITS)), 19));
+    for (i = 0; i < 4; i++) histogram[bin[i]]++;
+}
+
+/* Whole groups of four of a row of at most 2^16 pixels; returns where it stopped. */
+static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, float *peak, float *lane, const float *pixels,
+                                          int channels, int x, int end)
+{
+    sat__f32x4 sum = sat__f32x4_load(lane), low = sat__f32x4_set1(TONEMAP__DARKEST), high = sat__f32x4_set1(TONEMAP__BRIGHTEST);
+    sat__i32x4 exponents = sat__i32x4_set1(0), fractions = sat__i32x4_set1(0);
+    int32_t e[4], f[4];
+    int i, groups = 0;
+    for (; x + 4 <= end; x += 4) {
+        sat__f32x4 r, g, b, y;
+        sat__i32x4 bits;
+        tonemap__load_pixels(pixels + (size_t)x * (size_t)channels, channels, &r, &g, &b);
+        y = tonemap__luminance4(channels, r, g, b);
+        if (!sat__i32x4_all(sat__i32x4_and(sat__f32x4_less_equal(low, y), sat__f32x4_less_equal(y, high)))) {
+            sat__f32x4_store(lane, sum);
+            tonemap__measure_plain(w, luminance, peak, lane, pixels, channels, x, x + 4);
+            sum = sat__f32x4_load(lane);
+            continue;
+        }
+        sat__f32x4_store(luminance + x, y);
+        if (peak) sat__f32x4_store(peak + x, sat__f32x4_max(sat__f32x4_max(sat__f32x4_max(r, g), b), sat__f32x4_load(peak + x)));
+        sum = sat__f32x4_add(sum, y);
+        bits = sat__f32x4_bits(y);
+        exponents = sat__i32x4_add(exponents, sat__i32x4_shift_right(bits, 23));
+        y = sat__f32x4_mul(tonemap__log2_octave4(tonemap__octave4(bits)), sat__f32x4_set1(65536));
+        fractions = sat__i32x4_add(fractions, sat__f32x4_truncate(sat__f32x4_add(y, sat__f32x4_set1(0.5f))));
+        if (w->histogram) tonemap__count4(w->histogram, bits);
+        groups++;
+    }
+    sat__f32x4_store(lane, sum);
+    sat__i32x4_store(e, exponents);
+    sat__i32x4_store(f, fractions);
+    for (i = 0; i < 4; i++) w->log_sum += ((int64_t)e[i] - 127 * (int64_t)groups) * 65536 + f[i];
+    w->stats.positive += 4 * (size_t)groups;
+    return x;
+}
+#endif
+
+static inline float tonemap__measure_row(tonemap__worker *w, float *luminance, float *peak, const float *pixels, int channels, int width)
+{
+    float lane[4] = {0, 0, 0, 0};
+    int x = 0, end;
+    while (x < width) {
+        end = width - x > 65536 ? x + 65536 : width;
+#ifdef SAT__VECTOR
+        x = tonemap__measure_vector(w, luminance, peak, lane, pixels, channels, x, end);
+#endif
+        tonemap__measure_plain(w, luminance, peak, lane, pixels, channels, x, end);
+        x = end;
+    }
+    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
+}
+
+/* A row of the input as packed floats: the input's own where it is that. */
+static inline const float *tonemap__float_row(float *scratch, const sat_image *hdr, int y)
+{
+    sat_image flat = *hdr;
+    if (hdr->format == SAT_F32) return (const float *)sat__image_row(hdr, y);
+    flat.width *= hdr->channels;
+    flat.channels = 1;
+    sat__read_row(scratch, &flat, y, 0, flat.width, 0);
+    return scratch;
+}
+
+/* One call of tonemap_apply: what the pieces of work share. */
+typedef struct tonemap__job {
+    tonemap *map;
+    const sat_image *hdr;
+    unsigned char *out;
+    ptrdiff_t out_stride;
+    int as_float;
+} tonemap__job;
+
+static inline int tonemap__skips(const tonemap_options *o)
+{
+    return o->tolerance_codes > 0 && o->operation == TONEMAP_PHOTOGRAPHIC_LOCAL;
+}
+
+/* The largest component of each tile of a row of tiles. */
+static inline void tonemap__store_peaks(tonemap *map, tonemap__worker *w, int tile_y)
+{
+    float *tile = map->tile_peak + (size_t)tile_y * (size_t)map->tiles_x;
+    int t, x;
+    for (t = 0; t < map->tiles_x; t++) {
+        tile[t] = 0;
+        for (x = t * TONEMAP__TILE; x < (t + 1) * TONEMAP__TILE; x++) {
+            tile[t] = w->peak[x] > tile[t] ? w->peak[x] : tile[t];
+            w->peak[x] = 0;
+        }
+    }
+}
+
+static void tonemap__measure_bands(int begin, int end, int worker, void *context)
+{
+    const tonemap__job *job = (const tonemap__job *)context;
+    tonemap *map = job->map;
+    tonemap__worker *w = &map->worker[worker];
+    int x, y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height), skips = tonemap__skips(&map->options);
+    for (; y < y1; y++) {
+        float *luminance = map->luminance + (size_t)y * (size_t)map->row;
+        const float *pixels = tonemap__float_row(w->pixels, job->hdr, y);
+        map->row_sum[y] = tonemap__measure_row(w, luminance, skips ? w->peak : NULL, pixels, job->hdr->channels, map->width);
+        for (x = map->width; x < map->row; x++) luminance[x] = luminance[map->width - 1];
+        if (skips && (y % TONEMAP__TILE == TONEMAP__TILE - 1 || y + 1 == map->height)) tonemap__store_peaks(map, w, y / TONEMAP__TILE);
+    }
+}
+
+/* ---- between the passes: key, white and range of the picture */
+
+/* The luminance below which a share of the positive ones lies, as log2; within a sixteenth of an octave. */
+static inline double tonemap__quantile(const uint32_t *histogram, size_t positive, double share)
+{
+    double wanted = share * (double)positive, seen = 0;
+    int bin;
+    for (bin = 0; bin < TONEMAP__BINS; bin++) {
+        double count = (double)histogram[bin];
+        if (count > 0 && seen + count >= wanted) {
+            double part = (bin % 16 + (wanted > seen ? (wanted - seen) / count : 0)) / 16;
+            return bin / 16 - 100 + log2(1 + part);
+        }
+        seen += count;
+    }
+    return 0;
+}
+
+/* Below two steps of the histogram a picture is flat. */
+static inline int tonemap__has_range(double low, double high) { return high - low > 0.125; }
+
+/* The key from where the log-average lies between dark and bright, and the white from their distance (Reinhard 2003, on
+   quantiles: minimum and maximum of a real picture are noise). All arguments and results are base-2 logarithms. A white
+   below 1 would brighten midtones more than highlights. */
+static inline double tonemap__estimated_key(double average, double low, double high)
+{
+    double place = (2 * average - low - high) / (high - low);
+    if (!tonemap__has_range(low, high)) place = 0;
+    return log2(0.18) + 2 * (place < -1 ? -1 : place > 1 ? 1 : place);
+}
+
+static inline double tonemap__estimated_white(double low, double high)
+{
+    double white = log2(1.5) + high - low - 5;
+    return white > 0 ? white : 0;
+}
+
+static inline int tonemap__is_ashikhmin(const tonemap_options *o)
+{
+    return o->operation == TONEMAP_ASHIKHMIN || o->operation == TONEMAP_ASHIKHMIN_GLOBAL;
+}
+
+static inline int tonemap__needs_histogram(const tonemap_options *o, const tonemap_stats *stats)
+{
+    return stats != NULL || o->key <= 0 || o->white <= 0 || tonemap__is_ashikhmin(o);
+}
+
+/* log2 of the log-average, eq A.1, over positive luminances only: a mean of integers, so that neither the order of the
+   pixels nor a unit that is a power of two changes it. */
+static inline double tonemap__log_average(int64_t log_sum, size_t positive)
+{
+    int64_t step = (int64_t)positive * 65536, whole = log_sum / step, rest = log_sum % step;
+    return (double)whole + (double)rest / (double)step;
+}
+
+static inline void tonemap__collect(tonemap *map, int64_t *log_sum)
+{
+    double sum = 0;
+    int i, y;
+    tonemap_stats *total = &map->stats;
+    *log_sum = 0;
+    for (i = 0; i < map->workers; i++) {
+        const tonemap__worker *w = &map->worker[i];
+        *log_sum += w->log_sum;
+        total->positive += w->stats.positive;
+        total->nan += w->stats.nan;
+        total->infinite += w->stats.infinite;
+        total->negative += w->stats.negative;
+        if (i > 0 && w->histogram)
+            for (y = 0; y < TONEMAP__BINS; y++) map->worker[0].histogram[y] += w->histogram[y];
+    }
+    for (y = 0; y < map->height; y++) sum += (double)map->row_sum[y];
+    total->mean = sum / ((double)map->width * map->height);
+}
+
+/* What this picture alone would ask for; 0 when it is black. */
+static inline int tonemap__measured_state(tonemap *map, double *state)
+{
+    const tonemap_options *o = &map->options;
+    const uint32_t *histogram = map->worker[0].histogram;
+    int ashikhmin = tonemap__is_ashikhmin(o);
+    double low = 0, high = 0, average;
+    int64_t log_sum;
+    tonemap__collect(map, &log_sum);
+    if (!map->stats.positive) return 0;
+    average = tonemap__log_average(log_sum, map->stats.positive);
+    if (histogram) {
+        low = tonemap__quantile(histogram, map->stats.positive, 0.01);
+        high = tonemap__quantile(histogram, map->stats.positive, 0.99);
+    }
+    state[TONEMAP__AVERAGE] = average;
+    state[TONEMAP__KEY] = o->key > 0 ? log2(o->key) : tonemap__estimated_key(average, low, high);
+    state[TONEMAP__WHITE] = o->white > 0 ? 0 : tonemap__estimated_white(low, high);
+    state[TONEMAP__LOW] = ashikhmin ? tonemap__quantile(histogram, map->stats.positive, 0.0005) : 0;
+    state[TONEMAP__HIGH] = ashikhmin ? tonemap__quantile(histogram, map->stats.positive, 0.9995) : 0;
+    map->stats.log_average = exp2(average);
+    map->stats.low = exp2(low);
+    map->stats.high = exp2(high);
+    return 1;
+}
+
+/* Exponential approach with a time constant, exact for any step: two steps of dt / 2 are one of dt. */
+static inline void tonemap__adapt(tonemap *map, const double *measured, double dt_seconds)
+{
+    double tau = map->options.adapt_seconds, weight = tau > 0 && map->started ? -expm1(-dt_seconds / tau) : 1;
+    int i;
+    for (i = 0; i < TONEMAP__STATES; i++) {
+        if (weight >= 1) map->state[i] = measured[i];
+        else map->state[i] += weight * (measured[i] - map->state[i]);
+    }
+    map->started = 1;
+}
+
+/* Ashikhmin's perceptual capacity C: the number of just noticeable steps below a luminance in cd/m2, the integral of
+   1 / threshold with thresholds 0.0014, 0.4027 L, 0.4027, 0.0556 L. The constants make it continuous: the published
+   2.4483 jumps at 0.0034. */
+static inline float tonemap__capacity(float cd)
+{
+    float ln = 0.693147181f * tonemap__log2(cd < TONEMAP__DARKEST ? TONEMAP__DARKEST : cd);
+    if (cd < 0.0034f) return cd * (1 / 0.0014f);
+    if (cd < 1) return 16.5431894f + ln * (1 / 0.4027f);
+    if (cd < 7.2444f) return 16.5431894f + (cd - 1) * (1 / 0.4027f);
+    return -3.56579561f + ln * (1 / 0.0556f);
+}
+
+/* Eq A.10 and A.11 with t = I^0.383: finite at I = 0, where the printed form is not. */
+static inline float tonemap__rho(float lux)
+{
+    float i = lux < 1e-8f ? 1e-8f : lux > 10 ? 10 : lux, t = tonemap__exp2(0.383f * tonemap__log2(i));
+    float rho = (t * (92 / 57.0f) + 22 * 2.41546083f / 57) / (t + 2.41546083f);
+    return rho < 1 ? rho : 1;
+}
+
+static inline void tonemap__frame_boxes(tonemap__frame *f, const tonemap_options *o, double key)
+{
+    static const int length[TONEMAP__LENGTHS] = {1, 3, 5, 7, 11, 17, 27, 41};
+    int i;
+    if (o->operation == TONEMAP_PHOTOGRAPHIC_LOCAL) {
+        f->boxes = o->scales;
+        for (i = 0; i < f->boxes; i++) {
+            f->radius[i] = length[i] / 2;
+            f->term[i] = (float)(o->epsilon * exp2(o->phi) * key / (length[i] * length[i]));
+        }
+    } else if (o->operation == TONEMAP_ASHIKHMIN) {
+        f->boxes = 2 * TONEMAP__ASHIKHMIN;
+        /* a box of the variance of a Gaussian whose standard deviation is s / 2 has length sqrt(3 s^2 + 1) */
+        for (i = 1; i < f->boxes; i++) f->radius[i] = (int)((sqrt(3.0 * (i + 1) * (i + 1) + 1) - 1) / 2 + 0.5);
+    } else {
+        f->boxes = 1;
+    }
+    f->reach = f->radius[f->boxes - 1];
+}
+
+static inline void tonemap__prepare_frame(tonemap *map)
+{
+    const tonemap_options *o = &map->options;
+    tonemap__frame *f = &map->frame;
+    double average = map->started ? map->state[TONEMAP__AVERAGE] : 0, key = map->started ? exp2(map->state[TONEMAP__KEY]) : 0.18;
+    double white = o->white > 0 ? o->white : exp2(map->state[TONEMAP__WHITE]);
+    double cd = o->cd_per_unit > 0 ? o->cd_per_unit : 10 / exp2(average);
+    memset(f, 0, sizeof *f);
+    f->scale = (float)(key * exp2(-average));
+    f->cap = TONEMAP__LOCAL_CAP;
+    f->quantum = TONEMAP__QUANTUM;
+    f->inverse_white2 = tonemap__is_infinite(white) ? 0 : (float)(1 / (white * white));
+    f->epsilon = (float)o->epsilon;
+    f->soft = (float)o->soft;
+    if (o->operation == TONEMAP_LINEAR && !tonemap__is_infinite(white)) f->curve_factor = (float)(1 / white);
+    else f->curve_factor = 1;
+    if (tonemap__is_ashikhmin(o)) {
+        double low = map->state[TONEMAP__LOW], high = map->state[TONEMAP__HIGH];
+        f->scale = (float)exp2(-high);
+        f->cap = 1;
+        f->quantum = TONEMAP__ASHIKHMIN_QUANTUM;
+        f->cd = (float)(cd * exp2(high));
+        f->curve_low = tonemap__capacity((float)(cd * exp2(low)));
+        f->curve_factor = 1 / (tonemap__capacity(f->cd) - f->curve_low);
+        if (!tonemap__has_range(low, high)) f->curve_low = f->curve_factor = 0; /* a flat picture has no range: it gets the key */
+    }
+    f->lux = (float)(cd * o->lux_per_cd / (double)f->scale);
+    f->rho = o->mesopic == TONEMAP_MESOPIC_UNIFORM ? tonemap__rho((float)(map->stats.mean * cd * o->lux_per_cd)) : 1;
+    tonemap__frame_boxes(f, o, key);
+    map->stats.adapted = exp2(average);
+    map->stats.key = key;
+    map->stats.white = white;
+}
+
+/* ---- guaranteed skipping: which tiles need no search
+
+   La is the mean over a box, or the pixel itself. Every length above 1 is a sum of twos and threes, so the mean over any
+   box lies between the smallest and the largest mean over the windows of 2 x 2, 3 x 2, 2 x 3 and 3 x 3 pixels inside it:
+   a much narrower range than that of the pixels, which are noisy. With La in [low, high], the display value of a
+   component v (of the input, scaled) lies between v / (1 + high) and v / (1 + low). The tile gets the La whose display
+   value stands in the middle, in sRGB codes. How far that can be off grows with v until the display value reaches 1, so
+   the tile's largest component is the worst case. */
+
+typedef struct tonemap__range { float low, high, pixel_low, pixel_high; } tonemap__range;
+
+/* low and high from the extremes of sums over 2 x 2, 3 x 2, 2 x 3 and 3 x 3 pixels */
+static inline void tonemap__set_range(tonemap__range *range, const float *low, const float *high)
+{
+    static const float share[4] = {1 / 4.0f, 1 / 6.0f, 1 / 6.0f, 1 / 9.0f};
+    int i;
+    range->low = low[0] * share[0];
+    range->high = high[0] * share[0];
+    for (i = 1; i < 4; i++) {
+        if (low[i] * share[i] < range->low) range->low = low[i] * share[i];
+        if (high[i] * share[i] > range->high) range->high = high[i] * share[i];
+    }
+}
+
+/* Windows that begin in rows [y, y1) of a tile's columns. The rows are padded with the last pixel, and the last row
+   stands for those below it: that adds no new values. */
+static inline void tonemap__tile_range_plain(tonemap__range *range, const tonemap *map, int x, int y, int y1)
+{
+    float low[4], high[4];
+    int i, k, begin = y, end = x + TONEMAP__TILE, last = map->height - 1;
+    for (k = 0; k < 4; k++) {
+        low[k] = FLT_MAX;
+        high[k] = 0;
+    }
+    range->pixel_low = range->pixel_high = map->luminance[(size_t)y * (size_t)map->row + (size_t)x];
+    for (; x < end; x++)
+        for (y = begin; y < y1; y++) {
+            float sum[4], h2[3], h3[3];
+            for (i = 0; i < 3; i++) {
+                const float *p = map->luminance + (size_t)sat__min_int(y + i, last) * (size_t)map->row + x;
+                h2[i] = p[0] + p[1];
+                h3[i] = h2[i] + p[2];
+                if (i == 0) range->pixel_low = p[0] < range->pixel_low ? p[0] : range->pixel_low;
+                if (i == 0) range->pixel_high = p[0] > range->pixel_high ? p[0] : range->pixel_high;
+            }
+            sum[0] = h2[0] + h2[1];
+            sum[1] = h3[0] + h3[1];
+            sum[2] = sum[0] + h2[2];
+            sum[3] = sum[1] + h3[2];
+            for (k = 0; k < 4; k++) {
+                low[k] = sum[k] < low[k] ? sum[k] : low[k];
+                high[k] = sum[k] > high[k] ? sum[k] : high[k];
+            }
+        }
+    tonemap__set_range(range, low, high);
+}
+
+#ifdef SAT__VECTOR
+static inline float tonemap__lowest4(sat__f32x4 v)
+{
+    float a[4];
+    sat__f32x4_store(a, v);
+    a[0] = a[1] < a[0] ? a[1] : a[0];
+    a[2] = a[3] < a[2] ? a[3] : a[2];
+    return a[2] < a[0] ? a[2] : a[0];
+}
+
+static inline float tonemap__highest4(sat__f32x4 v)
+{
+    float a[4];
+    sat__f32x4_store(a, v);
+    a[0] = a[1] > a[0] ? a[1] : a[0];
+    a[2] = a[3] > a[2] ? a[3] : a[2];
+    return a[2] > a[0] ? a[2] : a[0];
+}
+
+/* Two rows of sums over two and three columns are carried down: the windows that begin in a row need the next two. */
+static inline void tonemap__tile_range_vector(tonemap__range *range, const tonemap *map, int x, int y, int y1)
+{
+    sat__f32x4 low22 = sat__f32x4_set1(FLT_MAX), low32 = low22, low23 = low22, low33 = low22, darkest = low22;
+    sat__f32x4 high22 = sat__f32x4_set1(0), high32 = high22, high23 = high22, high33 = high22, brightest = high22;
+    float low[4], high[4];
+    int at, end = x + TONEMAP__TILE, last = map->height - 1;
+    for (; x < end; x += 4) {
+        const float *row = map->luminance + (size_t)y * (size_t)map->row + x;
+        sat__f32x4 pixel = sat__f32x4_load(row), next, two, three, two_below, three_below;
+        two = sat__f32x4_add(pixel, sat__f32x4_load(row + 1));
+        three = sat__f32x4_add(two, sat__f32x4_load(row + 2));
+        row = map->luminance + (size_t)sat__min_int(y + 1, last) * (size_t)map->row + x;
+        next = sat__f32x4_load(row);
+        two_below = sat__f32x4_add(next, sat__f32x4_load(row + 1));
+        three_below = sat__f32x4_add(two_below, sat__f32x4_load(row + 2));
+        for (at = y; at < y1; at++) {
+            sat__f32x4 sum2 = sat__f32x4_add(two, two_below), sum3 = sat__f32x4_add(three, three_below);
+            darkest = sat__f32x4_min(darkest, pixel);
+            brightest = sat__f32x4_max(brightest, pixel);
+            low22 = sat__f32x4_min(low22, sum2);
+            high22 = sat__f32x4_max(high22, sum2);
+            low32 = sat__f32x4_min(low32, sum3);
+            high32 = sat__f32x4_max(high32, sum3);
+            two = two_below;
+            three = three_below;
+            pixel = next;
+            row = map->luminance + (size_t)sat__min_int(at + 2, last) * (size_t)map->row + x;
+            next = sat__f32x4_load(row);
+            two_below = sat__f32x4_add(next, sat__f32x4_load(row + 1));
+            three_below = sat__f32x4_add(two_below, sat__f32x4_load(row + 2));
+            sum2 = sat__f32x4_add(sum2, two_below);
+            sum3 = sat__f32x4_add(sum3, three_below);
+            low23 = sat__f32x4_min(low23, sum2);
+            high23 = sat__f32x4_max(high23, sum2);
+            low33 = sat__f32x4_min(low33, sum3);
+            high33 = sat__f32x4_max(high33, sum3);
+        }
+    }
+    low[0] = tonemap__lowest4(low22);
+    low[1] = tonemap__lowest4(low32);
+    low[2] = tonemap__lowest4(low23);
+    low[3] = tonemap__lowest4(low33);
+    high[0] = tonemap__highest4(high22);
+    high[1] = tonemap__highest4(high32);
+    high[2] = tonemap__highest4(high23);
+    high[3] = tonemap__highest4(high33);
+    range->pixel_low = tonemap__lowest4(darkest);
+    range->pixel_high = tonemap__highest4(brightest);
+    tonemap__set_range(range, low, high);
+}
+#endif
+
+static inline void tonemap__merge_range(tonemap__range *range, const tonemap__range *other)
+{
+    range->low = other->low < range->low ? other->low : range->low;
+    range->high = other->high > range->high ? other->high : range->high;
+}
+
+/* The ranges of a row of tiles, and what the boxes around their pixels reach in that row. */
+static void tonemap__range_tiles(int begin, int end, int worker, void *context)
+{
+    const tonemap__job *job = (const tonemap__job *)context;
+    const tonemap *map = job->map;
+    int x, i, reach = (map->frame.reach + TONEMAP__TILE - 1) / TONEMAP__TILE;
+    (void)worker;
+    for (; begin < end; begin++) {
+        tonemap__range *range = map->tile_range + (size_t)begin * (size_t)map->tiles_x;
+        tonemap__range *reached = map->tile_reached + (size_t)begin * (size_t)map->tiles_x;
+        int y = begin * TONEMAP__TILE, y1 = sat__min_int(y + TONEMAP__TILE, map->height);
+        for (x = 0; x < map->tiles_x; x++) {
+#ifdef SAT__VECTOR
+            tonemap__tile_range_vector(range + x, map, x * TONEMAP__TILE, y, y1);
+#else
+            tonemap__tile_range_plain(range + x, map, x * TONEMAP__TILE, y, y1);
+#endif
+        }
+        for (x = 0; x < map->tiles_x; x++) {
+            int x1 = sat__min_int(x + reach + 1, map->tiles_x);
+            reached[x] = range[x];
+            for (i = sat__max_int(x - reach, 0); i < x1; i++) tonemap__merge_range(&reached[x], &range[i]);
+        }
+    }
+}
+
+/* v^(1 / 2.4): sRGB codes are 269.025 times it less 14.025. Below 0.0031308 they are fewer; the bound is larger there. */
+static inline float tonemap__power(float v) { return tonemap__exp2(tonemap__log2(v) * (1 / 2.4f)); }
+
+/* The La of a tile that needs no search, or -1; *error is how many codes it may be off. */
+static inline float tonemap__skipped_local(const tonemap *map, const tonemap__range *range, float peak, float *error)
+{
+    const tonemap__frame *f = &map->frame;
+    float half = 0.5f / f->quantum, low = range->low, high = range->high, most = range->pixel_high * f->scale;
+    float tolerance = (float)map->options.tolerance_codes, a, b, middle, upper, lower, above, below;
+    if (most > f->cap) most = f->cap;
+    if (!(most < f->term[0] && high * f->scale < f->term[0])) { /* the first step may fail: La is then the pixel */
+        low = range->pixel_low < low ? range->pixel_low : low;
+        high = range->pixel_high > high ? range->pixel_high : high;
+    }
+    high = high * f->scale < f->cap ? high * f->scale : f->cap;
+    a = 1 / (1 + (low * f->scale > half ? low * f->scale - half : 0)); /* the means are of rounded pixels */
+    b = 1 / (1 + high + half);
+    peak *= f->scale * (1 + most * f->inverse_white2);
+    peak = peak > TONEMAP__DARKEST ? peak * a < 1 ? peak : 1 / a : TONEMAP__DARKEST;
+    /* a quick refusal: x^p >= x and 1 - x^p >= p (1 - x) for p = 1 / 2.4 and x <= 1 */
+    if (269.025f / 2.4f * peak * (a - b) > 2.1f * tolerance) return -1;
+    upper = tonemap__power(a);
+    lower = tonemap__power(b);
+    middle = (upper + lower) / 2;
+    peak = tonemap__power(peak);
+    above = 269.025f * peak * (upper - middle);
+    below = 269.025f * (peak * upper < 0.9999f ? peak : 1 / middle) * (middle - lower); /* a clipped component: up to its own limit */
+    *error = (above > below ? above : below) + 0.05f; /* of the polynomials */
+    return *error <= tolerance ? tonemap__exp2(-2.4f * tonemap__log2(middle)) - 1 : -1;
+}
+
+static inline void tonemap__bound_tile(tonemap *map, tonemap__worker *w, int tx, int ty)
+{
+    int reach = (map->frame.reach + TONEMAP__TILE - 1) / TONEMAP__TILE, y = sat__max_int(ty - reach, 0), y1 = sat__min_int(ty + reach + 1, map->tiles_y);
+    size_t at = (size_t)ty * (size_t)map->tiles_x + (size_t)tx;
+    tonemap__range range = map->tile_range[at];
+    float error, peak = map->tile_peak[at];
+    map->tile_local[at] = tonemap__skipped_local(map, &range, peak, &error);
+    if (map->tile_local[at] < 0) return; /* its own windows are too different already */
+    for (; y < y1; y++) tonemap__merge_range(&range, &map->tile_reached[(size_t)y * (size_t)map->tiles_x + (size_t)tx]);
+    map->tile_local[at] = tonemap__skipped_local(map, &range, peak, &error);
+    if (!(map->tile_local[at] < 0) && (double)error > w->stats.worst_codes) w->stats.worst_codes = (double)error;
+}
+
+static void tonemap__bound_tiles(int begin, int end, int worker, void *context)
+{
+    const tonemap__job *job = (const tonemap__job *)context;
+    int x;
+    for (; begin < end; begin++)
+        for (x = 0; x < job->map->tiles_x; x++) tonemap__bound_tile(job->map, &job->map->worker[worker], x, begin);
+}
+
+/* ---- second pass: sums. A ring of rows of a summed-area table of the scaled luminance, rounded to a quantum and added
+   modulo 2^32. A box never reaches further than the ring, and the difference of two sums is right wherever the sums
+   began; so each worker begins its own, needs 42 rows of it instead of a table, and every box mean is exact. (sat.h's
+   SAT_KIND_FIXED32 gives the same bits; it would cost a second pass over the picture and a table of its size.) */
+
+static inline uint32_t *tonemap__ring_row(const tonemap *map, const tonemap__worker *w, int j)
+{
+    return w->sums + (size_t)(j % (2 * TONEMAP__BOXES + 2)) * (size_t)map->ring_row;
+}
+
+static inline void tonemap__quantize(int32_t *out, const float *luminance, int width, const tonemap__frame *f)
+{
+    int x = 0;
+#ifdef SAT__VECTOR
+    sat__f32x4 scale = sat__f32x4_set1(f->scale), cap = sat__f32x4_set1(f->cap), quantum = sat__f32x4_set1(f->quantum);
+    for (; x + 4 <= width; x += 4) {
+        sat__f32x4 v = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), scale), cap);
+        sat__i32x4_store(out + x, sat__f32x4_truncate(sat__f32x4_add(sat__f32x4_mul(v, quantum), sat__f32x4_set1(0.5f))));
+    }
+#endif
+    for (; x < width; x++) {
+        float v = luminance[x] * f->scale;
+        v = v < f->cap ? v : f->cap;
+        out[x] = (int32_t)(v * f->quantum + 0.5f);
+    }
+}
+
+/* Row j + 1 of the ring from row j and the picture's row j. Columns left of the picture hold 0, those right of it the
+   row's sum, so that boxes over the border need no case of their own. */
+static inline void tonemap__add_ring_row(const tonemap *map, tonemap__worker *w, int j)
+{
+    const uint32_t *above = tonemap__ring_row(map, w, j) + TONEMAP__BOXES + 1;
+    uint32_t *row = tonemap__ring_row(map, w, j + 1) + TONEMAP__BOXES + 1, sum = 0;
+    int32_t *quanta = (int32_t *)(void *)w->edge;
+    int x, end = map->ring_row - TONEMAP__BOXES - 1;
+    tonemap__quantize(quanta, map->luminance + (size_t)j * (size_t)map->row, map->width, &map->frame);
+    memset(row - TONEMAP__BOXES - 1, 0, (TONEMAP__BOXES + 1) * sizeof *row);
+    for (x = 0; x < map->width; x++) {
+        sum += (uint32_t)quanta[x];
+        row[x] = above[x] + sum;
+    }
+    for (; x < end; x++) row[x] = row[map->width - 1];
+}
+
+/* The boxes around the pixels of one row: sums above and below, and the number of rows between them. */
+typedef struct tonemap__window {
+    const uint32_t *top[TONEMAP__BOXES], *bottom[TONEMAP__BOXES]; /* both at x = 0 */
+    int rows[TONEMAP__BOXES];
+    float inverse[TONEMAP__BOXES]; /* 1 / (area quantum) of an unclipped row */
+    int width;
+} tonemap__window;
+
+static inline void tonemap__open_window(tonemap__window *window, const tonemap *map, const tonemap__worker *w, int y)
+{
+    const tonemap__frame *f = &map->frame;
+    int k;
+    window->width = map->width;
+    for (k = 1; k < f->boxes; k++) {
+        int r = f->radius[k], y0 = sat__max_int(y - r, 0), y1 = sat__min_int(y + r + 1, map->height);
+        window->top[k] = tonemap__ring_row(map, w, y0) + TONEMAP__BOXES;
+        window->bottom[k] = tonemap__ring_row(map, w, y1) + TONEMAP__BOXES;
+        window->rows[k] = y1 - y0;
+        window->inverse[k] = 1 / ((float)((y1 - y0) * (2 * r + 1)) * f->quantum);
+    }
+}
+
+static inline float tonemap__box_mean(const tonemap__window *window, const tonemap__frame *f, int k, int x)
+{
+    int r = f->radius[k], x0 = x - r, x1 = x + r + 1;
+    const uint32_t *top = window->top[k] + x, *bottom = window->bottom[k] + x;
+    uint32_t sum = (bottom[r + 1] - bottom[-r]) - (top[r + 1] - top[-r]);
+    float inverse = window->inverse[k];
+    if (x0 < 0 || x1 > window->width)
+        inverse = 1 / ((float)(window->rows[k] * (sat__min_int(x1, window->width) - sat__max_int(x0, 0))) * f->quantum);
+    return (float)(int32_t)sum * inverse;
+}
+
+#ifdef SAT__VECTOR
+/* The inverse areas of four boxes of which some are clipped. */
+static inline sat__f32x4 tonemap__inverse4(const tonemap__window *window, const tonemap__frame *f, int k, int x)
+{
+    float inverse[4];
+    int i, r = f->radius[k];
+    for (i = 0; i < 4; i++) {
+        int columns = sat__min_int(x + i + r + 1, window->width) - sat__max_int(x + i - r, 0);
+        inverse[i] = 1 / ((float)(window->rows[k] * sat__max_int(columns, 1)) * f->quantum);
+    }
+    return sat__f32x4_load(inverse);
+}
+
+static inline sat__f32x4 tonemap__box_sum4(const tonemap__window *window, const tonemap__frame *f, int k, int x)
+{
+    int r = f->radius[k];
+    const int32_t *top = (const int32_t *)(const void *)(window->top[k] + x), *bottom = (const int32_t *)(const void *)(window->bottom[k] + x);
+    return sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_sub(sat__i32x4_load(bottom + r + 1), sat__i32x4_load(bottom - r)),
+                                            sat__i32x4_sub(sat__i32x4_load(top + r + 1), sat__i32x4_load(top - r))));
+}
+
+/* All ones where x + lane < end. */
+static inline sat__i32x4 tonemap__inside4(int x, int end)
+{
+    static const int32_t lanes[4] = {0, 1, 2, 3};
+    return sat__i32x4_greater(sat__i32x4_set1(end - x), sat__i32x4_load(lanes));
+}
+#endif
+
+/* ---- the photographic operator's search for the largest even neighbourhood, eq A.5 to A.9
+
+   Centre and surround of step k are the boxes k and k + 1; s of eq A.5 is the centre's length in pixels. The first step
+   that fails gives its centre; when none fails, the last box is taken. (Eq A.7 does not say what happens when the first
+   step fails; this is the reading under which it has an answer.) */
+
+static inline void tonemap__search_plain(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                         size_t *scale, int x, int end)
+{
+    for (; x < end; x++) {
+        float c = luminance[x] * f->scale;
+        int k;
+        c = c < f->cap ? c : f->cap;
+        for (k = 0; k + 1 < f->boxes; k++) {
+            float v = tonemap__box_mean(window, f, k + 1, x);
+            if (!(fabsf(c - v) < f->epsilon * c + f->term[k])) break;
+            c = v;
+        }
+        local[x] = c;
+        scale[k]++;
+    }
+}
+
+#ifdef SAT__VECTOR
+/* A group is done when all its pixels are. */
+static inline void tonemap__search_vector(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                          size_t *scale, int x, int end)
+{
+    enum { PARTS = TONEMAP__GROUP / 4 };
+    sat__f32x4 cap = sat__f32x4_set1(f->cap), epsilon = sat__f32x4_set1(f->epsilon), factor = sat__f32x4_set1(f->scale);
+    sat__i32x4 passed[TONEMAP__LENGTHS];
+    int i, k;
+    for (k = 0; k < TONEMAP__LENGTHS; k++) passed[k] = sat__i32x4_set1(0);
+    for (; x < end; x += TONEMAP__GROUP) {
+        sat__f32x4 c[PARTS], taken[PARTS];
+        sat__i32x4 live[PARTS];
+        int border = x < f->reach || x + TONEMAP__GROUP + f->reach > window->width, partial = x + TONEMAP__GROUP > end;
+        for (i = 0; i < PARTS; i++) {
+            c[i] = taken[i] = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 4 * i), factor), cap);
+            live[i] = partial ? tonemap__inside4(x + 4 * i, end) : sat__i32x4_set1(-1);
+        }
+        for (k = 0; k + 1 < f->boxes; k++) {
+            sat__f32x4 inverse = sat__f32x4_set1(window->inverse[k + 1]), term = sat__f32x4_set1(f->term[k]);
+            sat__i32x4 any = sat__i32x4_set1(0);
+            for (i = 0; i < PARTS; i++) {
+                sat__f32x4 v;
+                if (border) inverse = tonemap__inverse4(window, f, k + 1, x + 4 * i);
+                v = sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 4 * i), inverse);
+                live[i] = sat__i32x4_and(live[i], sat__f32x4_less(sat__f32x4_abs(sat__f32x4_sub(c[i], v)),
+                                                                  sat__f32x4_add(sat__f32x4_mul(epsilon, c[i]), term)));
+                taken[i] = sat__f32x4_select(live[i], v, taken[i]);
+                c[i] = v;
+                any = sat__i32x4_or(any, live[i]);
+                passed[k] = sat__i32x4_sub(passed[k], live[i]);
+            }
+            if (!sat__i32x4_any(any)) break;
+        }
+        for (i = 0; i < PARTS; i++) sat__f32x4_store(local + x + 4 * i, taken[i]);
+    }
+    for (k = 0; k + 1 < f->boxes; k++) {
+        int32_t n[4];
+        sat__i32x4_store(n, passed[k]);
+        scale[k] -= (size_t)(n[0] + n[1] + n[2] + n[3]);
+        scale[k + 1] += (size_t)(n[0] + n[1] + n[2] + n[3]);
+    }
+}
+#endif
+
+/* The same with scales mixed: the weight of what lies beyond a step falls from 1 to 0 while the step's contrast grows
+   through a band around epsilon, so that noise moves La a little instead of across a scale. */
+static inline void tonemap__search_soft_plain(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                              size_t *scale, int x, int end)
+{
+    float top = 1 + f->soft, slope = 1 / (2 * f->soft);
+    for (; x < end; x++) {
+        float c = luminance[x] * f->scale, taken, weight = 1;
+        int k, reached = 0;
+        c = c < f->cap ? c : f->cap;
+        taken = c;
+        for (k = 0; k + 1 < f->boxes; k++) {
+            float v = tonemap__box_mean(window, f, k + 1, x), limit = f->epsilon * c + f->term[k];
+            float pass = (top - fabsf(c - v) / limit) * slope;
+            weight = weight * (pass < 0 ? 0 : pass > 1 ? 1 : pass);
+            if (!(weight > 0)) break;
+            taken = taken + weight * (v - c);
+            if (weight >= 0.5f) reached = k + 1;
+            c = v;
+        }
+        local[x] = taken;
+        scale[reached]++;
+    }
+}
+
+#ifdef SAT__VECTOR
+static inline void tonemap__search_soft_vector(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                               size_t *scale, int x, int end)
+{
+    sat__f32x4 one = sat__f32x4_set1(1), zero = sat__f32x4_set1(0), half = sat__f32x4_set1(0.5f), top = sat__f32x4_set1(1 + f->soft);
+    sat__f32x4 slope = sat__f32x4_set1(1 / (2 * f->soft)), cap = sat__f32x4_set1(f->cap);
+    sat__i32x4 passed[TONEMAP__LENGTHS];
+    int32_t n[4];
+    int k;
+    for (k = 0; k < TONEMAP__LENGTHS; k++) passed[k] = sat__i32x4_set1(0);
+    for (; x < end; x += 4) {
+        int border = x < f->reach || x + 4 + f->reach > window->width;
+        sat__f32x4 c = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale)), cap), taken = c;
+        sat__f32x4 weight = sat__f32x4_select(tonemap__inside4(x, end), one, zero);
+        for (k = 0; k + 1 < f->boxes; k++) {
+            sat__f32x4 inverse = border ? tonemap__inverse4(window, f, k + 1, x) : sat__f32x4_set1(window->inverse[k + 1]);
+            sat__f32x4 v = sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse);
+            sat__f32x4 limit = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(f->epsilon), c), sat__f32x4_set1(f->term[k]));
+            sat__f32x4 pass = sat__f32x4_sub(top, sat__f32x4_div(sat__f32x4_abs(sat__f32x4_sub(c, v)), limit));
+            pass = sat__f32x4_min(sat__f32x4_max(sat__f32x4_mul(pass, slope), zero), one);
+            weight = sat__f32x4_mul(weight, pass);
+            if (!sat__i32x4_any(sat__f32x4_less(zero, weight))) break;
+            taken = sat__f32x4_add(taken, sat__f32x4_mul(weight, sat__f32x4_sub(v, c)));
+            passed[k] = sat__i32x4_sub(passed[k], sat__f32x4_less_equal(half, weight));
+            c = v;
+        }
+        sat__f32x4_store(local + x, taken);
+    }
+    for (k = 0; k + 1 < f->boxes; k++) {
+        sat__i32x4_store(n, passed[k]);
+        scale[k] -= (size_t)(n[0] + n[1] + n[2] + n[3]);
+        scale[k + 1] += (size_t)(n[0] + n[1] + n[2] + n[3]);
+    }
+}
+#endif
+
+/* ---- Ashikhmin's search: the first neighbourhood s = 1..10 whose mean differs from that of twice its size by half of
+   itself; else the last. A mean below the quantum says nothing: the pixel then stands for itself. */
+
+static inline void tonemap__search_ashikhmin_plain(float *local, const float *luminance, const tonemap__window *window,
+                                                   const tonemap__frame *f, size_t *scale, int x, int end)
+{
+    for (; x < end; x++) {
+        float own = luminance[x] * f->scale, g = own < f->cap ? own : f->cap;
+        int s = 0;
+        for (;;) {
+            float wide = tonemap__box_mean(window, f, 2 * s + 1, x);
+            if (!(fabsf(g - wide) < 0.5f * g) || s == TONEMAP__ASHIKHMIN - 1) break;
+            s++;
+            g = tonemap__box_mean(window, f, s, x);
+        }
+        local[x] = g * f->quantum < 1 ? own : g;
+        scale[s]++;
+    }
+}
+
+#ifdef SAT__VECTOR
+static inline void tonemap__search_ashikhmin_vector(float *local, const float *luminance, const tonemap__window *window,
+                                                    const tonemap__frame *f, size_t *scale, int x, int end)
+{
+    sat__f32x4 half = sat__f32x4_set1(0.5f), quantum = sat__f32x4_set1(1 / f->quantum);
+    sat__i32x4 passed[TONEMAP__ASHIKHMIN];
+    int32_t n[4];
+    int s;
+    for (s = 0; s < TONEMAP__ASHIKHMIN; s++) passed[s] = sat__i32x4_set1(0);
+    for (; x < end; x += 4) {
+        int border = x < f->reach || x + 4 + f->reach > window->width;
+        sat__f32x4 own = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale));
+        sat__f32x4 g = sat__f32x4_min(own, sat__f32x4_set1(f->cap)), taken = g;
+        sat__i32x4 live = tonemap__inside4(x, end);
+        for (s = 0; s + 1 < TONEMAP__ASHIKHMIN; s++) {
+            int k = 2 * s + 1;
+            sat__f32x4 wide = sat__f32x4_mul(tonemap__box_sum4(window, f, k, x), border ? tonemap__inverse4(window, f, k, x) : sat__f32x4_set1(window->inverse[k]));
+            live = sat__i32x4_and(live, sat__f32x4_less(sat__f32x4_abs(sat__f32x4_sub(g, wide)), sat__f32x4_mul(half, g)));
+            if (!sat__i32x4_any(live)) break;
+            k = s + 1;
+            g = sat__f32x4_mul(tonemap__box_sum4(window, f, k, x), border ? tonemap__inverse4(window, f, k, x) : sat__f32x4_set1(window->inverse[k]));
+            taken = sat__f32x4_select(live, g, taken);
+            passed[s] = sat__i32x4_sub(passed[s], live);
+        }
+        sat__f32x4_store(local + x, sat__f32x4_select(sat__f32x4_less(taken, quantum), own, taken));
+    }
+    for (s = 0; s + 1 < TONEMAP__ASHIKHMIN; s++) {
+        sat__i32x4_store(n, passed[s]);
+        scale[s] -= (size_t)(n[0] + n[1] + n[2] + n[3]);
+        scale[s + 1] += (size_t)(n[0] + n[1] + n[2] + n[3]);
+    }
+}
+#endif
+
+/* Searches pixels [x, end) of a row and may overwrite what follows them in the group; x is a multiple of the tile. */
+static inline void tonemap__search(tonemap__worker *w, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                   int ashikhmin, int x, int end)
+{
+    size_t *scale = w->stats.scale;
+#ifdef SAT__VECTOR
+    scale[0] += (size_t)(end - x);
+    if (ashikhmin) tonemap__search_ashikhmin_vector(w->local, luminance, window, f, scale, x, end);
+    else if (f->soft > 0) tonemap__search_soft_vector(w->local, luminance, window, f, scale, x, end);
+    else tonemap__search_vector(w->local, luminance, window, f, scale, x, end);
+#else
+    if (ashikhmin) tonemap__search_ashikhmin_plain(w->local, luminance, window, f, scale, x, end);
+    else if (f->soft > 0) tonemap__search_soft_plain(w->local, luminance, window, f, scale, x, end);
+    else tonemap__search_plain(w->local, luminance, window, f, scale, x, end);
+#endif
+    w->stats.searched += (size_t)(end - x);
+}
+
+/* ---- selective tone mapping (Michael 2010, section 4.4): the squared Sobel gradient of the luminance; outside the
+   picture its border goes on */
+
+static inline float tonemap__sobel(const float *above, const float *row, const float *below, int left, int x, int right)
+{
+    float gx = (above[right] + 2 * row[right] + below[right]) - (above[left] + 2 * row[left] + below[left]);
+    float gy = (below[left] + 2 * below[x] + below[right]) - (above[left] + 2 * above[x] + above[right]);
+    return gx * gx + gy * gy;
+}
+
+static inline void tonemap__sobel_row(float *out, const float *above, const float *row, const float *below, int width)
+{
+    int x = 1;
+    out[0] = tonemap__sobel(above, row, below, 0, 0, width > 1);
+#ifdef SAT__VECTOR
+    for (; x + 5 <= width; x += 4) {
+        sat__f32x4 a0 = sat__f32x4_load(above + x - 1), a1 = sat__f32x4_load(above + x), a2 = sat__f32x4_load(above + x + 1);
+        sat__f32x4 b0 = sat__f32x4_load(below + x - 1), b1 = sat__f32x4_load(below + x), b2 = sat__f32x4_load(below + x + 1);
+        sat__f32x4 r0 = sat__f32x4_load(row + x - 1), r2 = sat__f32x4_load(row + x + 1), two = sat__f32x4_set1(2);
+        sat__f32x4 gx = sat__f32x4_sub(sat__f32x4_add(sat__f32x4_add(a2, sat__f32x4_mul(two, r2)), b2),
+                                       sat__f32x4_add(sat__f32x4_add(a0, sat__f32x4_mul(two, r0)), b0));
+        sat__f32x4 gy = sat__f32x4_sub(sat__f32x4_add(sat__f32x4_add(b0, sat__f32x4_mul(two, b1)), b2),
+                                       sat__f32x4_add(sat__f32x4_add(a0, sat__f32x4_mul(two, a1)), a2));
+        sat__f32x4_store(out + x, sat__f32x4_add(sat__f32x4_mul(gx, gx), sat__f32x4_mul(gy, gy)));
+    }
+#endif
+    for (; x < width; x++) out[x] = tonemap__sobel(above, row, below, x - 1, x, sat__min_int(x + 1, width - 1));
+}
+
+/* ---- La for one row */
+
+/* The pixel for itself: what the global operators take, and pixels that are not worth a search. */
+static inline void tonemap__own_luminance(float *local, const float *luminance, float scale, int x, int end)
+{
+    for (; x < end; x++) local[x] = luminance[x] * scale;
+}
+
+/* Tiles without a search get their constant; runs of the others are searched. */
+static inline void tonemap__search_tiles(tonemap *map, tonemap__worker *w, const float *luminance, const tonemap__window *window, int y)
+{
+    const float *tile = map->tile_local + (size_t)(y / TONEMAP__TILE) * (size_t)map->tiles_x;
+    int t = 0, tiles = map->tiles_x, begin, x, end;
+    while (t < tiles) {
+        for (begin = t; t < tiles && tile[t] < 0; t++) {}
+        if (t > begin) tonemap__search(w, luminance, window, &map->frame, 0, begin * TONEMAP__TILE, sat__min_int(t * TONEMAP__TILE, map->width));
+        for (; t < tiles && !(tile[t] < 0); t++) {
+            end = sat__min_int((t + 1) * TONEMAP__TILE, map->width);
+            for (x = t * TONEMAP__TILE; x < end; x++) w->local[x] = tile[t];
+            w->stats.skipped += (size_t)(end - t * TONEMAP__TILE);
+        }
+    }
+}
+
+static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const float *luminance, const tonemap__window *window, int y)
+{
+    const tonemap__frame *f = &map->frame;
+    const float *above = y > 0 ? luminance - map->row : luminance, *below = y + 1 < map->height ? luminance + map->row : luminance;
+    float threshold = (float)map->options.selective / f->scale, *edge = w->edge;
+    int x, end, important;
+    threshold *= threshold;
+    tonemap__sobel_row(edge, above, luminance, below, map->width);
+    for (x = 0; x < map->width; x = end) {
+        int i;
+        end = sat__min_int(x + TONEMAP__GROUP, map->width);
+        for (important = 0, i = x; i < end; i++) important |= edge[i] > threshold;
+        if (important) tonemap__search(w, luminance, window, f, map->options.operation == TONEMAP_ASHIKHMIN, x, end);
+        else w->stats.skipped += (size_t)(end - x);
+        for (i = x; i < end; i++)
+            if (!(edge[i] > threshold)) w->local[i] = luminance[i] * f->scale;
+    }
+}
+
+static inline void tonemap__local_row(tonemap *map, tonemap__worker *w, int y)
+{
+    const tonemap_options *o = &map->options;
+    const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
+    tonemap__window window;
+    if (map->frame.boxes < 2) {
+        tonemap__own_luminance(w->local, luminance, map->frame.scale, 0, map->width);
+        return;
+    }
+    tonemap__open_window(&window, map, w, y);
+    if (tonemap__skips(o)) tonemap__search_tiles(map, w, luminance, &window, y);
+    else if (o->selective > 0) tonemap__search_edges(map, w, luminance, &window, y);
+    else tonemap__search(w, luminance, &window, &map->frame, o->operation == TONEMAP_ASHIKHMIN, 0, map->width);
+}
+
+/* ---- mesopic vision
+
+   Eq A.12 scales a > 0 of Lab by rho; L and b stay. Y then stays, so Z does, and only X moves. With the pixel's own
+   luminance as the white of Lab (which makes the result independent of exposure) q = X / (Xn Y), a > 0 means q > 1, and
+   X' = Xn Y (1 + rho (cbrt q - 1))^3: one cube root in place of two conversions. */
+
+static inline float tonemap__cbrt(float q)
+{
+    float y = sat__float_from_bits((uint32_t)(int32_t)((float)(int32_t)sat__float_bits(q) * (1 / 3.0f)) + 0x2a514067u), y3 = y * y * y;
+    return y * ((y3 + 2 * q) / (2 * y3 + q)); /* Halley; error below 3e-5 */
+}
+
+static inline void tonemap__shift_red_plain(float *r, float *g, float *b, float luminance, float rho)
+{
+    float x = 0.4124564f * *r + 0.3575761f * *g + 0.1804375f * *b, y = luminance > TONEMAP__DARKEST ? luminance : TONEMAP__DARKEST;
+    float q = x / (0.95047f * y), c, dx;
+    if (!(q > 1)) return;
+    q = q < 1048576 ? q : 1048576;
+    c = 1 + rho * (tonemap__cbrt(q) - 1);
+    dx = (c * c * c - q) * (0.95047f * y);
+    *r += 3.2404542f * dx;
+    *g += -0.9692660f * dx;
+    *b += 0.0556434f * dx;
+}
+
+static inline void tonemap__rho_row(float *rho, const float *local, float lux, int end)
+{
+    int x = 0;
+#ifdef SAT__VECTOR
+    sat__f32x4 ten = sat__f32x4_set1(10), least = sat__f32x4_set1(1e-8f), half = sat__f32x4_set1(2.41546083f);
+    for (; x + 4 <= end; x += 4) {
+        sat__f32x4 i = sat__f32x4_min(sat__f32x4_max(sat__f32x4_mul(sat__f32x4_load(local + x), sat__f32x4_set1(lux)), least), ten), t;
+        if (!sat__i32x4_any(sat__f32x4_less(i, ten))) {
+            sat__f32x4_store(rho + x, sat__f32x4_set1(1));
+            continue;
+        }
+        t = tonemap__exp2_4(sat__f32x4_mul(sat__f32x4_set1(0.383f), tonemap__log2_4(i)));
+        i = sat__f32x4_add(sat__f32x4_mul(t, sat__f32x4_set1(92 / 57.0f)), sat__f32x4_set1(22 * 2.41546083f / 57));
+        sat__f32x4_store(rho + x, sat__f32x4_min(sat__f32x4_div(i, sat__f32x4_add(t, half)), sat__f32x4_set1(1)));
+    }
+#endif
+    for (; x < end; x++) rho[x] = local[x] * lux < 10 ? tonemap__rho(local[x] * lux) : 1;
+}
+
+#ifdef SAT__VECTOR
+static inline sat__f32x4 tonemap__cbrt4(sat__f32x4 q)
+{
+    sat__i32x4 third = sat__f32x4_truncate(sat__f32x4_mul(sat__i32x4_to_f32(sat__f32x4_bits(q)), sat__f32x4_set1(1 / 3.0f)));
+    sat__f32x4 y = sat__f32x4_from_bits(sat__i32x4_add(third, sat__i32x4_set1(0x2a514067))), y3 = sat__f32x4_mul(sat__f32x4_mul(y, y), y);
+    sat__f32x4 two = sat__f32x4_set1(2);
+    return sat__f32x4_mul(y, sat__f32x4_div(sat__f32x4_add(y3, sat__f32x4_mul(two, q)), sat__f32x4_add(sat__f32x4_mul(two, y3), q)));
+}
+
+static inline void tonemap__shift_red4(sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 luminance, sat__f32x4 rho)
+{
+    sat__f32x4 one = sat__f32x4_set1(1), x = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(0.4124564f), *r), sat__f32x4_mul(sat__f32x4_set1(0.3575761f), *g));
+    sat__f32x4 y = sat__f32x4_mul(sat__f32x4_set1(0.95047f), sat__f32x4_max(luminance, sat__f32x4_set1(TONEMAP__DARKEST))), q, c, dx;
+    sat__i32x4 red;
+    q = sat__f32x4_div(sat__f32x4_add(x, sat__f32x4_mul(sat__f32x4_set1(0.1804375f), *b)), y);
+    red = sat__f32x4_less(one, q);
+    if (!sat__i32x4_any(sat__i32x4_and(red, sat__f32x4_less(rho, one)))) return;
+    q = sat__f32x4_min(q, sat__f32x4_set1(1048576));
+    c = sat__f32x4_add(one, sat__f32x4_mul(rho, sat__f32x4_sub(tonemap__cbrt4(q), one)));
+    dx = sat__f32x4_mul(sat__f32x4_sub(sat__f32x4_mul(sat__f32x4_mul(c, c), c), q), y);
+    dx = sat__f32x4_select(red, dx, sat__f32x4_set1(0));
+    *r = sat__f32x4_add(*r, sat__f32x4_mul(sat__f32x4_set1(3.2404542f), dx));
+    *g = sat__f32x4_add(*g, sat__f32x4_mul(sat__f32x4_set1(-0.9692660f), dx));
+    *b = sat__f32x4_add(*b, sat__f32x4_mul(sat__f32x4_set1(0.0556434f), dx));
+}
+#endif
+
+/* ---- the factor from input to display, Ld / L: multiplying R, G and B by it is what replacing Y in Yxy does */
+
+/* Eq A.3 and A.4 with burn-out: Ld = Lr (1 + Lr / white^2) / (1 + La), and Lr = scale L. */
+static inline void tonemap__gain_photographic(float *gain, const float *local, const float *luminance, const tonemap__frame *f, int end)
+{
+    int x = 0;
+    float most = 1.1529215e18f; /* 2^60: larger scaled luminances are white too, and infinity times 0 is no number */
+#ifdef SAT__VECTOR
+    sat__f32x4 one = sat__f32x4_set1(1), zero = sat__f32x4_set1(0), scale = sat__f32x4_set1(f->scale), burn = sat__f32x4_set1(f->inverse_white2);
+    for (; x + 4 <= end; x += 4) {
+        sat__f32x4 y = sat__f32x4_load(luminance + x), lr = sat__f32x4_min(sat__f32x4_mul(y, scale), sat__f32x4_set1(most));
+        sat__f32x4 v = sat__f32x4_mul(scale, sat__f32x4_add(one, sat__f32x4_mul(lr, burn)));
+        v = sat__f32x4_div(v, sat__f32x4_add(one, sat__f32x4_load(local + x)));
+        sat__f32x4_store(gain + x, sat__f32x4_select(sat__f32x4_less(zero, y), v, zero));
+    }
+#endif
+    for (; x < end; x++) {
+        float lr = luminance[x] * f->scale;
+        lr = lr < most ? lr : most;
+        gain[x] = luminance[x] > 0 ? f->scale * (1 + lr * f->inverse_white2) / (1 + local[x]) : 0;
+    }
+}
+
+/* Ld = TM(La) L / La; a flat picture gets the key. */
+static inline void tonemap__gain_ashikhmin(float *gain, const float *local, const float *luminance, const tonemap__frame *f, float key, int end)
+{
+    int x;
+    for (x = 0; x < end; x++) {
+        float la = local[x] > TONEMAP__DARKEST ? local[x] : TONEMAP__DARKEST;
+        float display = f->curve_factor > 0 ? (tonemap__capacity(la * f->cd) - f->curve_low) * f->curve_factor : key;
+        gain[x] = luminance[x] > 0 && display > 0 ? display * f->scale / la : 0;
+    }
+}
+
+static inline void tonemap__gain_row(tonemap *map, tonemap__worker *w, int y)
+{
+    const tonemap__frame *f = &map->frame;
+    const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
+    int x;
+    if (tonemap__is_ashikhmin(&map->options)) {
+        tonemap__gain_ashikhmin(w->local, w->local, luminance, f, (float)map->stats.key, map->width);
+    } else if (map->options.operation == TONEMAP_LINEAR) {
+        for (x = 0; x < map->width; x++) w->local[x] = luminance[x] > 0 ? f->scale * f->curve_factor : 0;
+    } else {
+        tonemap__gain_photographic(w->local, w->local, luminance, f, map->width);
+    }
+}
+
+/* ---- display values */
+
+typedef float tonemap__planes[3][TONEMAP__CHUNK];
+
+/* Pixels [x, x + n) times their gain, clipped to [floor, 1]. rho is NULL where nothing is mesopic. Comparisons are
+   written so that NaN becomes the floor: it comes from pixels that are black. */
+static inline void tonemap__shade_plain(tonemap__planes out, const float *pixels, int channels, const float *luminance, const float *gain,
+                                        const float *rho, float floor, int x, int i, int n, size_t *clamped)
+{
+    for (; i < n; i++) {
+        const float *p = pixels + (size_t)(x + i) * (size_t)channels;
+        float v[3];
+        int c, over = 0;
+        v[0] = p[0];
+        v[1] = p[channels > 1 ? 1 : 0];
+        v[2] = p[channels > 1 ? 2 : 0];
+        if (rho && rho[x + i] < 1) tonemap__shift_red_plain(v, v + 1, v + 2, luminance[x + i], rho[x + i]);
+        for (c = 0; c < 3; c++) {
+            float d = v[c] * gain[x + i];
+            over |= d > 1;
+            d = d > floor ? d : floor;
+            out[c][i] = d < 1 ? d : 1;
+        }
+        *clamped += (size_t)over;
+    }
+}
+
+#ifdef SAT__VECTOR
+static inline int tonemap__shade_vector(tonemap__planes out, const float *pixels, int channels, const float *luminance, const float *gain,
+                                        const float *rho, float floor, int x, int n, size_t *clamped)
+{
+    sat__f32x4 one = sat__f32x4_set1(1), least = sat__f32x4_set1(floor);
+    sat__i32x4 over = sat__i32x4_set1(0);
+    int32_t count[4];
+    int i;
+    for (i = 0; i + 4 <= n; i += 4) {
+        sat__f32x4 r, g, b, factor = sat__f32x4_load(gain + x + i);
+        tonemap__load_pixels(pixels + (size_t)(x + i) * (size_t)channels, channels, &r, &g, &b);
+        if (rho) tonemap__shift_red4(&r, &g, &b, sat__f32x4_load(luminance + x + i), sat__f32x4_load(rho + x + i));
+        r = sat__f32x4_max(sat__f32x4_mul(r, factor), least);
+        g = sat__f32x4_max(sat__f32x4_mul(g, factor), least);
+        b = sat__f32x4_max(sat__f32x4_mul(b, factor), least);
+        over = sat__i32x4_sub(over, sat__f32x4_less(one, sat__f32x4_max(sat__f32x4_max(r, g), b)));
+        sat__f32x4_store(out[0] + i, sat__f32x4_min(r, one));
+        sat__f32x4_store(out[1] + i, sat__f32x4_min(g, one));
+        sat__f32x4_store(out[2] + i, sat__f32x4_min(b, one));
+    }
+    sat__i32x4_store(count, over);
+    *clamped += (size_t)(count[0] + count[1] + count[2] + count[3]);
+    return i;
+}
+#endif
+
+/* sRGB codes by a table over the float's exponent and 9 bits of its mantissa, from 2^-13 (code 0) to 1: at most one code
+   from the rounded value, and that only within 0.1 of a step. */
+enum { TONEMAP__CODE_BASE = 0xe400, TONEMAP__CODE_SHIFT = 14 };
+#define TONEMAP__CODE_FLOOR 0.0001220703125f /* 2^-13 */
+
+static inline unsigned char tonemap__code(const tonemap *map, float v)
+{
+    return map->code[(sat__float_bits(v) >> TONEMAP__CODE_SHIFT) - TONEMAP__CODE_BASE];
+}
+
+static inline void tonemap__fill_codes(unsigned char *code)
+{
+    uint32_t i;
+    for (i = 0; i < TONEMAP__CODES; i++) {
+        uint32_t middle = ((i + TONEMAP__CODE_BASE) << TONEMAP__CODE_SHIFT) + (1u << (TONEMAP__CODE_SHIFT - 1));
+        code[i] = (unsigned char)(255 * sat__srgb_encode(sat__float_from_bits(middle)) + 0.5f);
+    }
+    code[0] = 0;
+}
+
+static inline void tonemap__write_u8(const tonemap *map, unsigned char *out, int channels, tonemap__planes v, int n)
+{
+    int i;
+    if (channels == 1) {
+        for (i = 0; i < n; i++) out[i] = tonemap__code(map, v[0][i]);
+        return;
+    }
+    for (i = 0; i < n; i++, out += channels) {
+        out[0] = tonemap__code(map, v[0][i]);
+        out[1] = tonemap__code(map, v[1][i]);
+        out[2] = tonemap__code(map, v[2][i]);
+    }
+}
+
+static inline void tonemap__write_f32(float *out, int channels, tonemap__planes v, int n)
+{
+    int i, c, colours = channels == 1 ? 1 : 3;
+    for (i = 0; i < n; i++, out += channels)
+        for (c = 0; c < colours; c++) out[c] = v[c][i];
+}
+
+static inline float tonemap__unit(float v) { return v > 0 ? v < 1 ? v : 1 : 0; }
+
+static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *w, const float *pixels, const float *rho, int y)
+{
+    tonemap *map = job->map;
+    const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
+    unsigned char *row = job->out + (ptrdiff_t)y * job->out_stride;
+    int x, i, n, channels = job->hdr->channels;
+    float floor = job->as_float ? 0 : TONEMAP__CODE_FLOOR;
+    tonemap__planes v;
+    for (x = 0; x < map->width; x += n) {
+        size_t at = (size_t)x * (size_t)channels;
+        float *as_float = (float *)(void *)row + at;
+        n = sat__min_int(TONEMAP__CHUNK, map->width - x);
+        i = 0;
+#ifdef SAT__VECTOR
+        i = tonemap__shade_vector(v, pixels, channels, luminance, w->local, rho, floor, x, n, &w->stats.clamped);
+#endif
+        tonemap__shade_plain(v, pixels, channels, luminance, w->local, rho, floor, x, i, n, &w->stats.clamped);
+        if (channels == 4) /* alpha: before the colours, which may overwrite the input */
+            for (i = 0; i < n; i++) {
+                float alpha = tonemap__unit(pixels[at + 4 * (size_t)i + 3]);
+                if (job->as_float) as_float[4 * i + 3] = alpha;
+                else row[at + 4 * (size_t)i + 3] = (unsigned char)(alpha * 255 + 0.5f);
+            }
+        if (job->as_float) tonemap__write_f32(as_float, channels, v, n);
+        else tonemap__write_u8(map, row + at, channels, v, n);
+    }
+}
+
+static void tonemap__map_bands(int begin, int end, int worker, void *context)
+{
+    const tonemap__job *job = (const tonemap__job *)context;
+    tonemap *map = job->map;
+    tonemap__worker *w = &map->worker[worker];
+    const tonemap__frame *f = &map->frame;
+    int y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height), next = sat__max_int(y - f->reach, 0), x;
+    int mesopic = map->options.mesopic != TONEMAP_MESOPIC_OFF && job->hdr->channels > 1;
+    if (map->options.mesopic == TONEMAP_MESOPIC_UNIFORM) {
+        mesopic = mesopic && f->rho < 1;
+        for (x = 0; x < map->width; x++) w->rho[x] = f->rho;
+    }
+    if (f->reach > 0) memset(tonemap__ring_row(map, w, next), 0, (size_t)map->ring_row * sizeof(uint32_t));
+    for (; y < y1; y++) {
+        const float *pixels = tonemap__float_row(w->pixels, job->hdr, y);
+        if (f->reach > 0)
+            for (; next < sat__min_int(y + f->reach + 1, map->height); next++) tonemap__add_ring_row(map, w, next);
+        tonemap__local_row(map, w, y);
+        if (mesopic && map->options.mesopic == TONEMAP_MESOPIC_LOCAL) tonemap__rho_row(w->rho, w->local, f->lux, map->width);
+        tonemap__gain_row(map, w, y);
+        tonemap__write_row(job, w, pixels, mesopic ? w->rho : NULL, y);
+    }
+}
+
+/* ---- calls */
+
+static inline void tonemap__carve(tonemap *map, sat__arena *arena)
+{
+    size_t row = (size_t)map->row, height = (size_t)map->height, tiles = (size_t)map->tiles_x * (size_t)map->tiles_y;
+    int i;
+    map->worker = (tonemap__worker *)sat__carve(arena, (size_t)map->workers, sizeof *map->worker);
+    map->luminance = (float *)sat__carve(arena, height, row * sizeof(float));
+    map->row_sum = (float *)sat__carve(arena, height, sizeof(float));
+    map->tile_range = (tonemap__range *)sat__carve(arena, tiles, sizeof *map->tile_range);
+    map->tile_reached = (tonemap__range *)sat__carve(arena, tiles, sizeof *map->tile_reached);
+    map->tile_peak = (float *)sat__carve(arena, tiles, sizeof(float));
+    map->tile_local = (float *)sat__carve(arena, tiles, sizeof(float));
+    for (i = 0; i < map->workers; i++) {
+        tonemap__worker ignored, *w = arena->base ? &map->worker[i] : &ignored;
+        w->sums = (uint32_t *)sat__carve(arena, 2 * TONEMAP__BOXES + 2, (size_t)map->ring_row * sizeof(uint32_t));
+        w->pixels = (float *)sat__carve(arena, 4 * row, sizeof(float));
+        w->local = (float *)sat__carve(arena, row, sizeof(float));
+        w->rho = (float *)sat__carve(arena, row, sizeof(float));
+        w->edge = (float *)sat__carve(arena, row, sizeof(float));
+        w->peak = (float *)sat__carve(arena, row, sizeof(float));
+        w->bins = (uint32_t *)sat__carve(arena, TONEMAP__BINS, sizeof(uint32_t));
+    }
+}
+
+TONEMAP_DEF sat_result tonemap_create(tonemap **out, int width, int height, const tonemap_options *options)
+{
+    tonemap_options o = options ? *options : tonemap_defaults();
+    tonemap shape, *map;
+    sat__arena arena;
+    void *block;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (width < 1 || height < 1 || width > 1 << 24 || height > 1 << 24 || !tonemap__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    memset(&shape, 0, sizeof shape);
+    if (!sat__resolve_allocator(&shape.allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
+    shape.options = o;
+    shape.width = width;
+    shape.height = height;
+    shape.row = (width + 2 * TONEMAP__GROUP - 1) / TONEMAP__GROUP * TONEMAP__GROUP;
+    shape.ring_row = shape.row + 2 * TONEMAP__BOXES + TONEMAP__GROUP + 8;
+    shape.tiles_x = (width + TONEMAP__TILE - 1) / TONEMAP__TILE;
+    shape.tiles_y = (height + TONEMAP__TILE - 1) / TONEMAP__TILE;
+    shape.workers = sat__worker_count(&o.threads);
+    memset(&arena, 0, sizeof arena);
+    sat__carve(&arena, 1, sizeof shape);
+    tonemap__carve(&shape, &arena);
+    if (arena.overflow || arena.used > SIZE_MAX / 2 - 63) return SAT_ERR_SIZE;
+    shape.block_size = arena.used + 63;
+    block = sat__alloc(&shape.allocator, shape.block_size);
+    if (!block) return SAT_ERR_MEMORY;
+    memset(block, 0, shape.block_size);
+    memset(&arena, 0, sizeof arena);
+    arena.base = sat__align64(block);
+    map = (tonemap *)sat__carve(&arena, 1, sizeof shape);
+    *map = shape;
+    map->block = block;
+    tonemap__carve(map, &arena);
+    tonemap__fill_codes(map->code);
+    *out = map;
+    return SAT_OK;
+}
+
+TONEMAP_DEF void tonemap_destroy(tonemap *map)
+{
+    if (map) {
+        sat_allocator allocator = map->allocator;
+        sat__release(&allocator, map->block, map->block_size);
+    }
+}
+
+TONEMAP_DEF sat_result tonemap_set_options(tonemap *map, const tonemap_options *options)
+{
+    tonemap_options o = options ? *options : tonemap_defaults();
+    if (!map || !tonemap__options_are_valid(&o) || sat__worker_count(&o.threads) > map->workers) return SAT_ERR_ARGUMENT;
+    map->options = o;
+    return SAT_OK;
+}
+
+static inline void tonemap__finish_stats(tonemap *map)
+{
+    int i, k;
+    for (i = 0; i < map->workers; i++) {
+        const tonemap_stats *s = &map->worker[i].stats;
+        map->stats.clamped += s->clamped;
+        map->stats.searched += s->searched;
+        map->stats.skipped += s->skipped;
+        for (k = 0; k < 10; k++) map->stats.scale[k] += s->scale[k];
+        if (s->worst_codes > map->stats.worst_codes) map->stats.worst_codes = s->worst_codes;
+    }
+}
+
+static inline sat_result tonemap__apply(tonemap__job *job, double dt_seconds, tonemap_stats *stats)
+{
+    tonemap *map = job->map;
+    const sat_threads *threads = &map->options.threads;
+    double measured[TONEMAP__STATES];
+    int i, bands = (map->height + TONEMAP__BAND - 1) / TONEMAP__BAND;
+    int histogram = tonemap__needs_histogram(&map->options, stats);
+    memset(&map->stats, 0, sizeof map->stats);
+    for (i = 0; i < map->workers; i++) {
+        tonemap__worker *w = &map->worker[i];
+        memset(&w->stats, 0, sizeof w->stats);
+        w->log_sum = 0;
+        w->histogram = histogram ? w->bins : NULL;
+        memset(w->bins, 0, TONEMAP__BINS * sizeof *w->bins);
+    }
+    sat__parallel_for(threads, bands, tonemap__measure_bands, job);
+    if (tonemap__measured_state(map, measured)) tonemap__adapt(map, measured, dt_seconds);
+    tonemap__prepare_frame(map);
+    if (tonemap__skips(&map->options)) {
+        sat__parallel_for(threads, map->tiles_y, tonemap__range_tiles, job);
+        sat__parallel_for(threads, map->tiles_y, tonemap__bound_tiles, job);
+    }
+    sat__parallel_for(threads, bands, tonemap__map_bands, job);
+    tonemap__finish_stats(map);
+    if (stats) *stats = map->stats;
+    return SAT_OK;
+}
+
+static inline sat_result tonemap__check_call(const tonemap *map, const void *out, ptrdiff_t out_stride, size_t element, const sat_image *hdr,
+                                             double dt_seconds)
+{
+    size_t step = out_stride < 0 ? (size_t)0 - (size_t)out_stride : (size_t)out_stride;
+    if (!map || !out || !sat__image_is_valid(hdr) || hdr->channels == 2) return SAT_ERR_ARGUMENT;
+    if (hdr->width != map->width || hdr->height != map->height) return SAT_ERR_MISMATCH;
+    if (map->height > 1 && step < (size_t)hdr->width * (size_t)hdr->channels * element) return SAT_ERR_ARGUMENT;
+    if (step % element || (uintptr_t)out % element) return SAT_ERR_ARGUMENT;
+    return tonemap__in_range(dt_seconds, 0, 1e300) || tonemap__is_infinite(dt_seconds) ? SAT_OK : SAT_ERR_ARGUMENT;
+}
+
+static inline sat_result tonemap__call(tonemap *map, void *out, ptrdiff_t out_stride, int as_float, const sat_image *hdr, double dt_seconds,
+                                       tonemap_stats *stats)
+{
+    sat_result result = tonemap__check_call(map, out, out_stride, as_float ? sizeof(float) : 1, hdr, dt_seconds);
+    tonemap__job job;
+    if (result != SAT_OK) return result;
+    job.map = map;
+    job.hdr = hdr;
+    job.out = (unsigned char *)out;
+    job.out_stride = out_stride;
+    job.as_float = as_float;
+    return tonemap__apply(&job, dt_seconds, stats);
+}
+
+TONEMAP_DEF sat_result tonemap_apply_u8(tonemap *map, unsigned char *out, ptrdiff_t out_stride, const sat_image *hdr,
+                                        double dt_seconds, tonemap_stats *stats)
+{
+    return tonemap__call(map, out, out_stride, 0, hdr, dt_seconds, stats);
+}
+
+TONEMAP_DEF sat_result tonemap_apply_f32(tonemap *map, float *out, ptrdiff_t out_stride, const sat_image *hdr,
+                                         double dt_seconds, tonemap_stats *stats)
+{
+    return tonemap__call(map, out, out_stride, 1, hdr, dt_seconds, stats);
+}
+
+TONEMAP_DEF sat_result tonemap_once_u8(unsigned char *out, const float *pixels, int width, int height, int channels,
+                                       const tonemap_options *options)
+{
+    tonemap *map;
+    sat_image image = sat_image_f32(pixels, width, height, channels);
+    sat_result result = tonemap_create(&map, width, height, options);
+    if (result != SAT_OK) return result;
+    result = tonemap_apply_u8(map, out, (ptrdiff_t)width * channels, &image, 0, NULL);
+    tonemap_destroy(map);
+    return result;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TONEMAP_IMPLEMENTATION */
