@@ -735,6 +735,36 @@ static void test_disturb(unsigned texture, unsigned framebuffer, unsigned progra
     sat__gl_clear_errors(gl);
 }
 
+/* Everything that sat__gl_end promises to put back, changed once more. */
+static void test_change(unsigned texture)
+{
+    sat__gl *gl = &test_f.real;
+    const unsigned *names;
+    int i, count;
+    gl->UseProgram(0);
+    gl->BindVertexArray(0);
+    gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, 0);
+    gl->Viewport(0, 0, 1, 1);
+    for (i = 0; i < 6; i++) {
+        gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)i);
+        gl->BindTexture(SAT__GL_TEXTURE_2D, 0);
+        gl->BindSampler((unsigned)i, 0);
+    }
+    names = sat__gl_capability_names(gl, &count);
+    for (i = 0; i < count; i++) (gl->IsEnabled(names[i]) ? gl->Disable : gl->Enable)(names[i]);
+    names = sat__gl_store_names(gl, &count);
+    for (i = 0; i < count; i++) gl->PixelStorei(names[i], i < 2 ? 4 : 0);
+    for (i = 0; i < 4; i++) gl->BindBuffer(sat__gl_buffer_names()[2 * i], 0);
+    gl->BindBufferBase(SAT__GL_TRANSFORM_FEEDBACK_BUFFER, 0, 0);
+    gl->PolygonMode(SAT__GL_FRONT_AND_BACK, SAT__GL_FILL);
+    gl->ColorMask(1, 0, 1, 0);
+    gl->DepthMask(1);
+    gl->DepthFunc(SAT__GL_LESS);
+    gl->BlendFuncSeparate(SAT__GL_ONE, SAT__GL_ZERO, SAT__GL_ONE, SAT__GL_ZERO);
+    gl->BlendEquationSeparate(0x8006, 0x8006);
+    if (gl->has_compute) gl->BindImageTexture(0, texture, 0, 0, 0, SAT__GL_WRITE_ONLY, SAT__GL_R32F);
+}
+
 static unsigned test_plain_program(void)
 {
     static const char *const fragment[] = {"out vec4 colour;\nvoid main() { colour = vec4(1.0); }\n", NULL};
@@ -775,6 +805,12 @@ TEST(state_is_restored)
         g = test_create(SAT_GL_TWO_FLOAT, kind == 1 ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE, 4, kind == 2 && gl->has_compute);
         EXPECT_EQ(sat_gl_build(g, 0, texture, 97, 101), SAT_OK);
         EXPECT_EQ(sat_gl_mean(g, &mean, texture, 97, 101), SAT_OK);
+        test_snapshot(&after);
+        for (i = 0; i < before.count; i++)
+            if (!EXPECT_EQ(after.values[i], before.values[i])) printf("value %d\n", i);
+        sat__gl_begin(gl, &state, 6);
+        test_change(target);
+        sat__gl_end(gl, &state);
         test_snapshot(&after);
         for (i = 0; i < before.count; i++)
             if (!EXPECT_EQ(after.values[i], before.values[i])) printf("value %d\n", i);
