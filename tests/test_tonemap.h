@@ -616,3 +616,611 @@ TEST(codes_are_srgb)
     REPORT("sRGB codes that differ from the rounded value", off / 40.96, "%");
     tonemap_destroy(map);
 }
+
+/* ---- leaving out searches */
+
+static double code_of(float linear) { return metrics_code((double)linear); }
+
+/* The proven error holds on every value, and is not far too large. */
+static void check_skipping(const sat_image *view, double tolerance, double *share)
+{
+    tonemap_options o = tonemap_defaults();
+    shot full = shoot(view, &o), fast;
+    size_t n = (size_t)view->width * (size_t)view->height * (size_t)view->channels, i;
+    double worst = 0;
+    int worst8 = 0;
+    o.tolerance_codes = tolerance;
+    fast = shoot(view, &o);
+    for (i = 0; i < n; ++i) {
+        double off = fabs(code_of(full.f32[i]) - code_of(fast.f32[i]));
+        if (!(off <= worst)) worst = off;
+        if (abs((int)full.u8[i] - (int)fast.u8[i]) > worst8) worst8 = abs((int)full.u8[i] - (int)fast.u8[i]);
+    }
+    EXPECT(worst <= fast.stats.worst_codes && fast.stats.worst_codes <= tolerance);
+    EXPECT(worst8 <= (int)ceil(tolerance) + 1); /* the table may add one */
+    EXPECT_EQ(fast.stats.searched + fast.stats.skipped, n / (size_t)view->channels);
+    *share = (double)fast.stats.skipped / (double)(n / (size_t)view->channels);
+    shot_free(&full);
+    shot_free(&fast);
+}
+
+TEST(skipping_keeps_its_promise)
+{
+    enum { W = 211, H = 180 };
+    float *pixels = room_pixels(W, H, 21);
+    sat_image view = sat_image_f32(pixels, W, H, 3), grey;
+    double tolerance, share = 0, before = 0;
+    int i;
+    for (tolerance = 0.25; tolerance <= 8; tolerance *= 2) {
+        check_skipping(&view, tolerance, &share);
+        EXPECT(share >= before);
+        before = share;
+    }
+    EXPECT(share > 0.3);
+    for (i = 0; i < W * H; ++i) pixels[i] = pixels[3 * i + 1];
+    grey = sat_image_f32(pixels, W, H, 1);
+    check_skipping(&grey, 2, &share);
+    EXPECT(share > 0.1);
+    support_fill(pixels, W * H * 3, 0.01, 1, 5);
+    check_skipping(&view, 2, &share);
+    EXPECT(share == 0);
+    support_hdr_image(pixels, W, H, 3, 3);
+    check_skipping(&view, 2, &share);
+    free(pixels);
+}
+
+TEST(skipping_keeps_its_promise_with_other_options)
+{
+    enum { W = 100, H = 90 };
+    float *pixels = room_pixels(W, H, 22);
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    int kind, i;
+    for (kind = 0; kind < 5; ++kind) {
+        tonemap_options o = tonemap_defaults();
+        shot full, fast;
+        double worst = 0;
+        if (kind == 0) o.white = 2;
+        if (kind == 1) o.epsilon = 0.01, o.phi = 2; /* first steps fail */
+        if (kind == 2) o.scales = 3;
+        if (kind == 3) o.key = 3;
+        if (kind == 4) o.soft = 1;
+        full = shoot(&view, &o);
+        o.tolerance_codes = kind == 3 ? 12 : 3;
+        fast = shoot(&view, &o);
+        for (i = 0; i < W * H * 3; ++i) {
+            double off = fabs(code_of(full.f32[i]) - code_of(fast.f32[i]));
+            if (!(off <= worst)) worst = off;
+        }
+        EXPECT(fast.stats.skipped > 0);
+        EXPECT(worst <= fast.stats.worst_codes && fast.stats.worst_codes <= o.tolerance_codes);
+        shot_free(&full);
+        shot_free(&fast);
+    }
+    free(pixels);
+}
+
+#ifdef SAT__VECTOR
+TEST(tile_ranges_hold_every_box_mean)
+{
+    enum { W = 75, H = 61 };
+    float *pixels = room_pixels(W, H, 23);
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    unsigned char *out = (unsigned char *)malloc(W * H * 3);
+    double *plane = metrics_alloc(W * H), *mean = metrics_alloc(W * H);
+    tonemap_options o = tonemap_defaults();
+    tonemap *map = NULL;
+    int x, y, k, tx, ty, outside = 0, differ = 0;
+    o.tolerance_codes = 1;
+    tonemap_create(&map, W, H, &o);
+    EXPECT_EQ(tonemap_apply_u8(map, out, W * 3, &view, 0, NULL), SAT_OK);
+    for (y = 0; y < H; ++y)
+        for (x = 0; x < W; ++x) plane[y * W + x] = (double)map->luminance[y * map->row + x];
+    for (k = 1; k < 8; ++k) {
+        reference_box(mean, plane, W, H, reference_length[k] / 2);
+        for (y = 0; y < H; ++y)
+            for (x = 0; x < W; ++x) {
+                tonemap__range r = map->tile_range[y / 8 * map->tiles_x + x / 8];
+                for (ty = y / 8 - 3; ty <= y / 8 + 3; ++ty)
+                    if (ty >= 0 && ty < map->tiles_y) tonemap__merge_range(&r, &map->tile_reached[ty * map->tiles_x + x / 8]);
+                outside += mean[y * W + x] < (double)r.low * (1 - 1e-6) || mean[y * W + x] > (double)r.high * (1 + 1e-6);
+            }
+    }
+    EXPECT_EQ(outside, 0);
+    for (ty = 0; ty < map->tiles_y; ++ty)
+        for (tx = 0; tx < map->tiles_x; ++tx) {
+            tonemap__range a, b;
+            tonemap__tile_range_plain(&a, map, tx * 8, ty * 8, sat__min_int(ty * 8 + 8, H));
+            tonemap__tile_range_vector(&b, map, tx * 8, ty * 8, sat__min_int(ty * 8 + 8, H));
+            differ += memcmp(&a, &b, sizeof a) != 0;
+        }
+    EXPECT_EQ(differ, 0);
+    tonemap_destroy(map);
+    free(out);
+    free(plane);
+    free(mean);
+    free(pixels);
+}
+#endif
+
+/* Michael 2010, section 4.4: where the Sobel gradient is small La is the pixel itself. */
+TEST(selective_searches_only_edges)
+{
+    enum { W = 97, H = 66 };
+    float *pixels = room_pixels(W, H, 24);
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    shot full = shoot(&view, &o), global, selective;
+    double *lr = metrics_alloc(W * H), average = full.stats.adapted;
+    int x, y, wrong = 0, marked = 0;
+    o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
+    global = shoot(&view, &o);
+    o.operation = TONEMAP_PHOTOGRAPHIC_LOCAL;
+    o.selective = 0.1;
+    selective = shoot(&view, &o);
+    reference_luminance(lr, pixels, W * H);
+    for (y = 0; y < H; ++y)
+        for (x = 0; x < W; ++x) {
+            double g[2] = {0, 0}, size;
+            int i, j;
+            for (j = -1; j <= 1; ++j)
+                for (i = -1; i <= 1; ++i) {
+                    int px = x + i < 0 ? 0 : x + i >= W ? W - 1 : x + i, py = y + j < 0 ? 0 : y + j >= H ? H - 1 : y + j;
+                    double v = 0.18 / average * lr[py * W + px];
+                    g[0] += i * (2 - abs(j)) * v;
+                    g[1] += j * (2 - abs(i)) * v;
+                }
+            size = hypot(g[0], g[1]);
+            marked += size > 0.1;
+            if (fabs(size - 0.1) < 1e-4) continue;
+            wrong += memcmp(selective.f32 + 3 * (y * W + x), (size > 0.1 ? full : global).f32 + 3 * (y * W + x), 12) != 0;
+        }
+    EXPECT_EQ(wrong, 0);
+    EXPECT(marked > 100 && marked < W * H - 100);
+    EXPECT(selective.stats.skipped > 0);
+    EXPECT_EQ(selective.stats.skipped + selective.stats.searched, W * H);
+    shot_free(&full);
+    shot_free(&global);
+    shot_free(&selective);
+    free(lr);
+    free(pixels);
+}
+
+/* ---- mesopic vision */
+
+/* Random colours inside Rec. 709, against the eight steps of section A.5.3 with the pixel's own white. */
+static void check_mesopic(tonemap_mesopic mode, double cd)
+{
+    enum { W = 64, H = 64 };
+    float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    double *luminance = metrics_alloc(W * H), mean = 0, worst = 0;
+    shot s;
+    int i, c;
+    support_fill(pixels, W * H * 3, 0, 1, 31);
+    for (i = 0; i < W * H; i += 5) pixels[3 * i + 1] = pixels[3 * i + 2] = 0; /* primaries, too */
+    for (i = 1; i < W * H; i += 7) pixels[3 * i] = pixels[3 * i + 1] = 0;
+    o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
+    o.mesopic = mode;
+    o.cd_per_unit = cd;
+    o.lux_per_cd = 2;
+    s = shoot(&view, &o);
+    reference_luminance(luminance, pixels, W * H);
+    for (i = 0; i < W * H; ++i) mean += luminance[i] / (W * H);
+    EXPECT_REL(s.stats.mean, mean, 1e-5);
+    for (i = 0; i < W * H; ++i) {
+        double rgb[3], lr = 0.18 * luminance[i] / s.stats.adapted;
+        double rho = reference_rho(2 * cd * (mode == TONEMAP_MESOPIC_UNIFORM ? mean : luminance[i]));
+        reference_colour(rgb, pixels + 3 * i, lr / (1 + lr), rho, 0);
+        for (c = 0; c < 3; ++c) {
+            double off = fabs(metrics_code(rgb[c]) - code_of(s.f32[3 * i + c]));
+            if (!(off <= worst)) worst = off;
+        }
+    }
+    EXPECT(worst <= 0.25); /* 8-bit codes */
+    shot_free(&s);
+    free(luminance);
+    free(pixels);
+}
+
+TEST(mesopic_filter_is_eq_A10_to_A14)
+{
+    check_mesopic(TONEMAP_MESOPIC_UNIFORM, 0.01);
+    check_mesopic(TONEMAP_MESOPIC_UNIFORM, 3);
+    check_mesopic(TONEMAP_MESOPIC_LOCAL, 1e-6);
+    check_mesopic(TONEMAP_MESOPIC_LOCAL, 0.5);
+    check_mesopic(TONEMAP_MESOPIC_LOCAL, 8);
+    EXPECT_NEAR(tonemap__rho(0), 22.0 / 57, 2e-3);
+    EXPECT_NEAR(tonemap__rho(0.01f), reference_rho(0.01), 1e-4);
+    EXPECT_NEAR(tonemap__rho(1), reference_rho(1), 1e-4);
+    EXPECT_NEAR(tonemap__rho(10), 1, 1e-5);
+    EXPECT_NEAR(tonemap__rho(FLT_MAX), 1, 1e-5);
+}
+
+TEST(bright_scenes_and_greys_are_not_mesopic)
+{
+    enum { W = 60, H = 40 };
+    float *pixels = room_pixels(W, H, 32);
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    shot plain = shoot(&view, &o), bright;
+    int i, mode;
+    for (mode = 1; mode <= 2; ++mode) {
+        o.mesopic = (tonemap_mesopic)mode;
+        o.cd_per_unit = 1e6;
+        bright = shoot(&view, &o);
+        EXPECT(memcmp(plain.f32, bright.f32, W * H * 12) == 0);
+        shot_free(&bright);
+    }
+    shot_free(&plain);
+    for (i = 0; i < W * H * 3; i += 3) pixels[i] = pixels[i + 2] = pixels[i + 1];
+    o.mesopic = TONEMAP_MESOPIC_OFF;
+    plain = shoot(&view, &o);
+    o.mesopic = TONEMAP_MESOPIC_LOCAL;
+    o.cd_per_unit = 1e-3;
+    bright = shoot(&view, &o);
+    for (i = 0; i < W * H * 3; ++i) EXPECT_NEAR(plain.f32[i], bright.f32[i], 2e-5);
+    shot_free(&plain);
+    shot_free(&bright);
+    free(pixels);
+}
+
+TEST(a_red_lamp_stays_red_only_with_the_local_filter)
+{
+    enum { W = 80, H = 80, LAMP = 3 * (40 * W + 40), WALL = 3 * (5 * W + 5) };
+    float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    shot off, uniform, local;
+    int x, y;
+    for (y = 0; y < H; ++y)
+        for (x = 0; x < W; ++x) {
+            int lamp = abs(x - 40) < 8 && abs(y - 40) < 8;
+            pixels[3 * (y * W + x)] = lamp ? 100.0f : 0.02f;
+            pixels[3 * (y * W + x) + 1] = pixels[3 * (y * W + x) + 2] = lamp ? 10.0f : 0.002f;
+        }
+    o.cd_per_unit = 1;
+    o.white = 0;
+    off = shoot(&view, &o);
+    o.mesopic = TONEMAP_MESOPIC_UNIFORM;
+    o.cd_per_unit = 0.05;
+    uniform = shoot(&view, &o);
+    o.mesopic = TONEMAP_MESOPIC_LOCAL;
+    o.cd_per_unit = 1;
+    local = shoot(&view, &o);
+    EXPECT(local.u8[LAMP + 1] == off.u8[LAMP + 1]);
+    EXPECT(uniform.u8[LAMP + 1] > off.u8[LAMP + 1]);
+    EXPECT(local.u8[WALL] < off.u8[WALL] - 10 && local.u8[WALL + 1] > off.u8[WALL + 1]);
+    shot_free(&off);
+    shot_free(&uniform);
+    shot_free(&local);
+    free(pixels);
+}
+
+/* ---- Ashikhmin */
+
+TEST(capacity_is_continuous_and_rises)
+{
+    double cd, before = 0;
+    for (cd = 1e-5; cd < 1e6; cd *= 1.01) {
+        double c = (double)tonemap__capacity((float)cd);
+        EXPECT_NEAR(c, reference_capacity(cd, 1), 4e-4 + 2e-6 * c);
+        EXPECT(c > before && c - before < 1.3);
+        EXPECT_NEAR(c, reference_capacity(cd, 0), 0.05);
+        before = c;
+    }
+}
+
+static void check_ashikhmin(tonemap_operator operation, double cd)
+{
+    enum { W = 140, H = 111, N = W * H };
+    float *pixels = room_pixels(W, H, 41);
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    double *luminance = metrics_alloc(N), *rounded = metrics_alloc(N), *la = metrics_alloc(N), low, high, unit;
+    int i, k, off = 0;
+    shot s;
+    tonemap *map = NULL;
+    o.operation = operation;
+    o.cd_per_unit = cd;
+    s = shoot(&view, &o);
+    tonemap_create(&map, W, H, &o);
+    tonemap_apply_u8(map, s.u8, W * 3, &view, 0, NULL);
+    low = exp2(map->state[TONEMAP__LOW]);
+    high = exp2(map->state[TONEMAP__HIGH]);
+    tonemap_destroy(map);
+    reference_luminance(luminance, pixels, N);
+    unit = cd > 0 ? cd : 10 / s.stats.adapted;
+    for (i = 0; i < N; ++i) {
+        rounded[i] = luminance[i] / high < 1 ? luminance[i] / high : 1;
+        rounded[i] = floor(rounded[i] * 1048576 + 0.5) / 1048576;
+    }
+    if (operation == TONEMAP_ASHIKHMIN) reference_ashikhmin(la, rounded, W, H, 0);
+    for (i = 0; i < N; ++i) {
+        double rgb[3], c0 = reference_capacity(low * unit, 1), c1 = reference_capacity(high * unit, 1), tm;
+        double a = operation == TONEMAP_ASHIKHMIN ? la[i] * high : luminance[i];
+        if (rounded[i] * 1048576 < 64) continue; /* the operator takes the pixel itself unrounded */
+        tm = (reference_capacity(a * unit, 1) - c0) / (c1 - c0);
+        reference_colour(rgb, pixels + 3 * i, (tm > 0 ? tm : 0) * luminance[i] / a, 1, 1);
+        for (k = 1, rgb[1] = rgb[1] < 0 ? 0 : rgb[1] > 1 ? 1 : rgb[1]; k < 2; ++k) off += fabs(rgb[k] - (double)s.f32[3 * i + k]) > 2e-3 * rgb[k] + 2e-4;
+    }
+    EXPECT(off <= N / 200);
+    shot_free(&s);
+    free(luminance);
+    free(rounded);
+    free(la);
+    free(pixels);
+}
+
+TEST(ashikhmin_is_its_equations)
+{
+    check_ashikhmin(TONEMAP_ASHIKHMIN_GLOBAL, 0);
+    check_ashikhmin(TONEMAP_ASHIKHMIN_GLOBAL, 50);
+    check_ashikhmin(TONEMAP_ASHIKHMIN, 0);
+    check_ashikhmin(TONEMAP_ASHIKHMIN, 0.01);
+}
+
+TEST(a_firefly_does_not_darken_ashikhmin)
+{
+    enum { W = 200, H = 160 };
+    float *pixels = room_pixels(W, H, 42), *centre = pixels + 3 * (H / 2 * W + W / 2);
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    shot clean, firefly;
+    o.operation = TONEMAP_ASHIKHMIN;
+    clean = shoot(&view, &o);
+    centre[0] = centre[1] = centre[2] = 5e9f; /* a million times the largest */
+    firefly = shoot(&view, &o);
+    EXPECT(worst_outside(clean.u8, firefly.u8, W, H) <= 1);
+    shot_free(&clean);
+    shot_free(&firefly);
+    free(pixels);
+}
+
+/* ---- key and white */
+
+TEST(key_and_white_are_reinhards_estimate)
+{
+    enum { W = 200, H = 150, N = W * H };
+    float *pixels = hdr_pixels(W, H, 3, 51);
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    double *sorted = metrics_alloc(N), low, high, average;
+    shot s;
+    o.key = o.white = 0;
+    s = shoot(&view, &o);
+    reference_luminance(sorted, pixels, N);
+    average = log2(reference_log_average(sorted, N));
+    qsort(sorted, N, sizeof *sorted, support_compare_doubles);
+    low = log2(sorted[N / 100]);
+    high = log2(sorted[N - N / 100]);
+    EXPECT_NEAR(log2(s.stats.low), low, 1.0 / 16);
+    EXPECT_NEAR(log2(s.stats.high), high, 1.0 / 16);
+    EXPECT_REL(s.stats.key, 0.18 * pow(4, (2 * average - low - high) / (high - low)), 0.02);
+    EXPECT_NEAR(log2(s.stats.white), log2(1.5) + high - low - 5, 2.0 / 16);
+    shot_free(&s);
+    free(sorted);
+    free(pixels);
+}
+
+/* ---- adaptation */
+
+static tonemap *adapting(int width, int height, double seconds)
+{
+    tonemap_options o = tonemap_defaults();
+    tonemap *map = NULL;
+    o.adapt_seconds = seconds;
+    o.key = o.white = 0;
+    EXPECT_EQ(tonemap_create(&map, width, height, &o), SAT_OK);
+    return map;
+}
+
+static double frame(tonemap *map, float light, double dt)
+{
+    static float pixels[16 * 16];
+    static unsigned char out[16 * 16];
+    sat_image view = sat_image_f32(pixels, 16, 16, 1);
+    tonemap_stats stats;
+    int i;
+    for (i = 0; i < 256; ++i) pixels[i] = light * (1 + (float)(i % 9));
+    EXPECT_EQ(tonemap_apply_u8(map, out, 16, &view, dt, &stats), SAT_OK);
+    return log2(stats.adapted / (double)light);
+}
+
+TEST(adaptation_follows_the_clock_not_the_frames)
+{
+    tonemap *map = adapting(16, 16, 0.5), *twin = adapting(16, 16, 0.5);
+    double steady = frame(map, 1, 0), v, step = log2(1e9);
+    int i;
+    frame(twin, 1, 0);
+    EXPECT_NEAR(frame(map, 1e9f, 0), steady - step, 1e-4);                            /* no time, no change */
+    EXPECT_NEAR(frame(map, 1e9f, 1e-6), steady - step * exp(-2e-6), 1e-4);
+    for (i = 0; i < 10; ++i) v = frame(map, 1e9f, 0.05);                              /* ten small steps ... */
+    EXPECT_NEAR(v, steady - step * exp(-1 - 2e-6), 1e-4);
+    frame(twin, 1e9f, 1e-6);
+    EXPECT_NEAR(frame(twin, 1e9f, 0.5), v, 1e-6);                                     /* ... are one large */
+    EXPECT_NEAR(frame(map, 1e9f, 1), steady - step * exp(-3 - 2e-6), 1e-4);
+    EXPECT_NEAR(frame(map, 1e9f, 1e6), steady, 1e-5);
+    EXPECT_NEAR(frame(map, 1e-9f, (double)INFINITY), steady, 1e-5);
+    tonemap_destroy(map);
+    tonemap_destroy(twin);
+}
+
+TEST(black_frames_leave_the_adaptation_alone)
+{
+    tonemap *map = adapting(16, 16, 1);
+    double steady;
+    frame(map, 0, 1);                       /* black first: the next picture is the first to be seen */
+    steady = frame(map, 4, 1);
+    EXPECT_NEAR(frame(map, 4, 1), steady, 1e-12);
+    frame(map, 0, 100);
+    EXPECT_NEAR(frame(map, 4, 0), steady, 1e-12);
+    tonemap_destroy(map);
+}
+
+/* A camera that turns over an unchanging scene: what it sees keeps its bits, there is no trail. */
+TEST(a_pan_leaves_no_trail)
+{
+    enum { W = 96, H = 64, WIDE = 4 * W };
+    float *scene = room_pixels(W, H, 61), *wide = (float *)malloc(WIDE * H * 3 * sizeof(float));
+    unsigned char *a = (unsigned char *)malloc(W * H * 3), *b = (unsigned char *)malloc(W * H * 3);
+    tonemap *map = adapting(W, H, 0.5), *still = adapting(W, H, 0.5);
+    int x, y, i, step;
+    for (y = 0; y < H; ++y)                 /* periodic: the same pixels in every frame, in another place */
+        for (i = 0; i < 4; ++i) memcpy(wide + 3 * (y * WIDE + i * W), scene + 3 * y * W, W * 12);
+    for (step = 0; step < 30; ++step) {
+        sat_image view = sat_image_f32(wide + 3 * (step * 7), W, H, 3);
+        int differ = 0;
+        view.stride = WIDE * 12;
+        EXPECT_EQ(tonemap_apply_u8(map, a, W * 3, &view, 0.02, NULL), SAT_OK);
+        view.pixels = wide;
+        EXPECT_EQ(tonemap_apply_u8(still, b, W * 3, &view, 0.02, NULL), SAT_OK);
+        for (y = 0; y < H; ++y)             /* away from the borders, whose boxes are clipped */
+            for (x = 21; x < W - 21; ++x) {
+                int from = x + step * 7 % W;
+                if (from < 21 || from >= W - 21) continue;
+                differ += memcmp(a + 3 * (y * W + x), b + 3 * (y * W + from), 3) != 0;
+            }
+        EXPECT_EQ(differ, 0);
+    }
+    tonemap_destroy(map);
+    tonemap_destroy(still);
+    free(scene);
+    free(wide);
+    free(a);
+    free(b);
+}
+
+TEST(options_change_between_frames)
+{
+    tonemap *map = adapting(16, 16, 10);
+    tonemap_options o = tonemap_defaults();
+    double steady = frame(map, 1, 0);
+    o.adapt_seconds = 10;
+    o.operation = TONEMAP_ASHIKHMIN;
+    EXPECT_EQ(tonemap_set_options(map, &o), SAT_OK);
+    EXPECT_NEAR(frame(map, 1, 0.1), steady, 1e-4);
+    EXPECT_EQ(tonemap_set_options(map, NULL), SAT_OK);
+    EXPECT_NEAR(frame(map, 100, 0), steady, 1e-4);  /* without adaptation each picture is for itself */
+    tonemap_destroy(map);
+}
+
+/* ---- soft scales */
+
+static void flicker(double soft, double *rms, double *largest)
+{
+    enum { W = 160, H = 120, N = W * H };
+    float *pixels = room_pixels(W, H, 71), *noisy = (float *)malloc(N * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3), other = sat_image_f32(noisy, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    uint64_t seed = 5;
+    double *a = metrics_alloc(N), *b = metrics_alloc(N);
+    metrics_codes m;
+    shot s, t;
+    int i;
+    for (i = 0; i < N * 3; ++i) {
+        if (i % 3 == 0) noisy[i] = (float)(1 + 0.01 * (support_uniform(&seed) - 0.5));
+        else noisy[i] = noisy[i - i % 3] * pixels[i] ;
+        if (i % 3 == 2) noisy[i - 2] *= pixels[i - 2];
+    }
+    o.soft = soft;
+    s = shoot(&view, &o);
+    t = shoot(&other, &o);
+    for (i = 0; i < N; ++i) {
+        a[i] = code_of(s.f32[3 * i + 1]);
+        b[i] = code_of(t.f32[3 * i + 1]);
+    }
+    m = metrics_compare_codes(a, b, N);
+    *rms = m.rms;
+    *largest = m.largest;
+    shot_free(&s);
+    shot_free(&t);
+    free(a);
+    free(b);
+    free(pixels);
+    free(noisy);
+}
+
+TEST(soft_scales_flicker_less)
+{
+    double hard[2], soft[2];
+    flicker(0, &hard[0], &hard[1]);
+    flicker(1, &soft[0], &soft[1]);
+    REPORT("hard scales under 0.5 % noise, RMS", hard[0], "codes");
+    REPORT("hard scales under 0.5 % noise, largest", hard[1], "codes");
+    REPORT("soft scales under 0.5 % noise, RMS", soft[0], "codes");
+    REPORT("soft scales under 0.5 % noise, largest", soft[1], "codes");
+    EXPECT(soft[0] < 0.8 * hard[0] && soft[1] < 0.5 * hard[1] && soft[0] <= 0.3 && soft[1] <= 10);
+}
+
+/* ---- the measures themselves */
+
+TEST(metrics_know_equal_pictures_and_scale)
+{
+    enum { W = 40, H = 36, N = W * H };
+    double *a = metrics_alloc(3 * N), *b = metrics_alloc(3 * N);
+    metrics_codes m;
+    int i;
+    for (i = 0; i < 3 * N; ++i) a[i] = b[i] = 100 + 60 * sin(i * 0.37) + i % 7;
+    m = metrics_compare_codes(a, b, N);
+    EXPECT(m.rms == 0 && m.largest == 0 && m.over1 == 0);
+    EXPECT_NEAR(metrics_ssim(a, b, W, H), 1, 1e-12);
+    EXPECT_NEAR(metrics_flip(a, b, W, H, 67), 0, 1e-12);
+    EXPECT_NEAR(metrics_scielab(a, b, W, H, 23), 0, 1e-12);
+    for (i = 0; i < 3 * N; ++i) b[i] += i % 2 ? 6 : -6;
+    m = metrics_compare_codes(a, b, N);
+    EXPECT_NEAR(m.rms, 6, 1e-12);
+    EXPECT(m.over1 == 1 && m.over5 == 1);
+    EXPECT(metrics_ssim(a, b, W, H) < 0.999);
+    for (i = 0; i < 3 * N; ++i) a[i] = 0, b[i] = 255;
+    EXPECT_NEAR(metrics_scielab(a, b, W, H, 23), 100, 1);   /* black and white are 100 L apart */
+    EXPECT(metrics_flip(a, b, W, H, 67) > 0.9);
+    EXPECT_NEAR(metrics_ssim(a, b, W, H), 6.5025 / (65025 + 6.5025), 1e-6);
+}
+
+/* ---- pictures */
+
+#ifdef HAVE_OPENEXR
+/* Luminance codes of the local operator against the exact Gaussian one. */
+TEST(boxes_are_close_to_gaussians_on_photographs)
+{
+    const char *names[2] = {"hdr/memorial.exr", "hdr/Desk.exr"};
+    int i;
+    size_t k;
+    for (i = 0; i < 2; ++i) {
+        const char *path = support_data(names[i]);
+        image picture;
+        sat_image view;
+        shot s;
+        size_t n;
+        double *scaled, *la, *a, *b, ssim;
+        reference_photographic r = reference_photographic_defaults(1);
+        if (!path) SKIP("needs ../shared/data/hdr");
+        if (!EXPECT(image_load(&picture, path))) return;
+        view = image_view(&picture);
+        n = (size_t)picture.width * (size_t)picture.height;
+        s = shoot(&view, NULL);
+        scaled = metrics_alloc(n);
+        la = metrics_alloc(n);
+        a = metrics_alloc(n);
+        b = metrics_alloc(n);
+        reference_luminance(scaled, picture.pixels, n);
+        for (k = 0; k < n; ++k) scaled[k] *= 0.18 / s.stats.adapted;
+        reference_local(la, scaled, picture.width, picture.height, &r);
+        reference_codes(a, scaled, la, n);
+        for (k = 0; k < n; ++k) { /* luminance from green: the factor is the same for the three */
+            float green = picture.pixels[3 * k + 1];
+            b[k] = s.f32[3 * k + 1] > 0 && s.f32[3 * k + 1] < 1 ? metrics_code((double)s.f32[3 * k + 1] / (double)green * scaled[k] * s.stats.adapted / 0.18) : a[k];
+        }
+        ssim = metrics_ssim(a, b, picture.width, picture.height);
+        REPORT(names[i], ssim, "SSIM of boxes against Gaussians");
+        EXPECT(ssim >= 0.985);
+        shot_free(&s);
+        free(scaled);
+        free(la);
+        free(a);
+        free(b);
+        image_free(&picture);
+    }
+}
+#endif
