@@ -180,6 +180,50 @@ SOFTASSIGN_DEF void softassign_destroy(softassign *solver); /* NULL is fine */
 }
 #endif
 #endif /* SOFTASSIGN_H */
+
+/* ------------------------------------------------------------------------------------------------
+   OpenGL: the matrix methods on the GPU, for GL 3.3 core and ES 3.0 / WebGL 2 with float render targets
+   (define SOFTASSIGN_GL)
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(SOFTASSIGN_GL) && !defined(SOFTASSIGN__GL_API)
+#define SOFTASSIGN__GL_API
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL
+   state as it was (but for pending errors, which are lost). Columns and rows up to the largest texture; capacities of 1. */
+typedef struct softassign_gl softassign_gl;
+
+/* On an OpenGL error *out only answers softassign_gl_message, and is to be destroyed; on the others it is NULL.
+   Options read: alpha, temperature, cooling, iterations, outlier, outlier_evolves, gather, seed, allocator. */
+SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc, const softassign_options *options);
+SOFTASSIGN_DEF void softassign_gl_destroy(softassign_gl *gl); /* NULL is fine */
+/* What the last SAT_ERR_GL_... was about; never NULL. */
+SOFTASSIGN_DEF const char *softassign_gl_message(const softassign_gl *gl);
+
+/* The distance matrix: uploaded, or by a pass from features (eq 3.1). Costs must be finite or +infinity, |cost| <= 1e30. */
+SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softassign_problem *problem);
+
+/* Slomp 2012, section 3.7: the whole schedule of the options, as SOFTASSIGN_PUBLISHED in float. soft: rows x columns
+   floats, soft_stride apart, or NULL; soft_cost: the lowest sum of Q, or NULL. Waits for one texel a temperature. */
+SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft, ptrdiff_t soft_stride, double *soft_cost);
+
+/* `sweeps` sweeps of softassign with inequality columns at one temperature (in units of cost), from the prices given,
+   one a column and all <= 0; they are replaced. lower_bound: of the last sweep's start, less its rounding; or NULL. */
+SOFTASSIGN_DEF sat_result softassign_gl_sweep(softassign_gl *gl, float *price, double *lower_bound, double temperature, int sweeps);
+
+/* GLSL (3.30 or ES 3.00) of one step of the entropic reduction, for shaders of your own; put it behind the #version line:
+
+       vec2 softassign_join(vec2 a, vec2 b, float inverse_temperature)   of (minimum, sum of exp((minimum - x) / t)) */
+SOFTASSIGN_DEF const char *softassign_gl_glsl(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SOFTASSIGN__GL_API */
 /* ------------------------------------------------------------------------------------------------
    Stop here if you only want to use the library.
    ------------------------------------------------------------------------------------------------ */
@@ -389,7 +433,10 @@ static void softassign__project_keys(const softassign *s, int row, softassign__s
             a2 = sat__f32x4_add(a2, sat__f32x4_mul(d2, d2));
             a3 = sat__f32x4_add(a3, sat__f32x4_mul(d3, d3));
         }
-        acc[0] = a0, acc[1] = a1, acc[2] = a2, acc[3] = a3;
+        acc[0] = a0;
+        acc[1] = a1;
+        acc[2] = a2;
+        acc[3] = a3;
         least = sat__f32x4_set1(SOFTASSIGN__INFINITY);
         for (l = 0; l < 4; l++) {
             sat__f32x4 bound = sat__f32x4_mul(sat__f32x4_sqrt(acc[l]), sat__f32x4_set1(s->shrink));
@@ -2991,8 +3038,599 @@ SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride
     }
     return SAT_OK;
 }
-
 #ifdef __cplusplus
 }
 #endif
 #endif /* SOFTASSIGN_IMPLEMENTATION */
+
+/* ------------------------------------------------------------------------------------------------
+   OpenGL (Slomp 2012, section 3.7)
+
+   Textures are columns x rows, R32F. Sums are trees: a pass writes the sum of `gather` texels along one axis, until one
+   is left; texels beyond the border count as the neutral element. No texture is read and written by one pass.
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(SOFTASSIGN_IMPLEMENTATION) && defined(SOFTASSIGN_GL) && !defined(SOFTASSIGN__GL_IMPLEMENTED)
+#define SOFTASSIGN__GL_IMPLEMENTED
+
+#ifndef SAT_SIBLING_GL
+#define SAT_SIBLING_GL
+#endif
+#include "sat.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+SOFTASSIGN_DEF const char *softassign_gl_glsl(void)
+{
+    return "#ifndef SOFTASSIGN_GLSL\n"
+           "#define SOFTASSIGN_GLSL\n"
+           "vec2 softassign_join(vec2 a, vec2 b, float inverse_temperature) {\n"
+           "    float least = min(a.x, b.x);\n"
+           "    float left = a.y > 0.0 ? a.y * exp((least - a.x) * inverse_temperature) : 0.0;\n"
+           "    float right = b.y > 0.0 ? b.y * exp((least - b.x) * inverse_temperature) : 0.0;\n"
+           "    return vec2(least, left + right);\n"
+           "}\n"
+           "#endif\n";
+}
+
+static const char softassign__glsl_inputs[] =
+    "uniform sampler2D source, first, second;\n" /* second: per column, first: per row, as the pass says */
+    "uniform ivec2 size;\n"                       /* of the source */
+    "uniform float alpha, inverse_t, factor, scale;\n"
+    "out vec4 result;\n"
+    "ivec2 here() { return ivec2(gl_FragCoord.xy); }\n"
+    "float at(sampler2D s, ivec2 p) { return texelFetch(s, p, 0).x; }\n";
+
+/* D from features, four to a texel: first = rows, second = columns (eq 3.1). */
+static const char softassign__glsl_distance[] =
+    "void main() {\n"
+    "    float sum = 0.0;\n"
+    "    for (int k = 0; k < size.x; k++) {\n"
+    "        vec4 d = texelFetch(first, ivec2(k, here().y), 0) - texelFetch(second, ivec2(k, here().x), 0);\n"
+    "        sum += dot(d, d);\n"
+    "    }\n"
+    "    result = vec4(sqrt(sum));\n"
+    "}\n";
+
+/* source = M, first = D: Q, or M = exp(clamp(-Q / t)) / sqrt(t). */
+static const char softassign__glsl_update[] =
+    "void main() {\n"
+    "    float d = at(first, here()), q = at(source, here()) * (d * scale - alpha);\n"
+    "    bool allowed = d < 1e37;\n"
+    "#if WRITES_Q\n"
+    "    result = vec4(allowed ? q : 0.0);\n"
+    "#else\n"
+    "    result = vec4(allowed ? exp(clamp(-q * inverse_t, -70.0, 70.0)) * factor : 0.0);\n"
+    "#endif\n"
+    "}\n";
+
+/* The sum of K texels along an axis. */
+static const char softassign__glsl_reduce[] =
+    "void main() {\n"
+    "    float sum = 0.0;\n"
+    "    ivec2 p = VERTICAL == 1 ? ivec2(here().x, here().y * K) : ivec2(here().x * K, here().y);\n"
+    "    for (int k = 0; k < K; k++) {\n"
+    "        if (p.x < size.x && p.y < size.y) sum += at(source, p);\n"
+    "        p += VERTICAL == 1 ? ivec2(0, 1) : ivec2(1, 0);\n"
+    "    }\n"
+    "    result = vec4(sum);\n"
+    "}\n";
+
+/* source = M, first = sums of columns or of rows. */
+static const char softassign__glsl_divide[] =
+    "void main() {\n"
+    "    float sum = VERTICAL == 1 ? at(first, ivec2(here().x, 0)) + at(second, ivec2(here().x, 0)) : at(first, ivec2(0, here().y));\n"
+    "    result = vec4(sum > 0.0 ? at(source, here()) / sum : 0.0);\n"
+    "}\n";
+
+/* The outlier row of the next iteration: o / (sum + o) where it evolves. source = outliers, first = sums of columns. */
+static const char softassign__glsl_outlier[] =
+    "void main() {\n"
+    "    float o = at(source, ivec2(here().x, 0)), sum = at(first, ivec2(here().x, 0)) + o;\n"
+    "    result = vec4(sum > 0.0 ? o / sum : 0.0);\n"
+    "}\n";
+
+/* Entropic rows: (minimum, sum of weights) of K columns; the first level reads D and the prices (second). */
+static const char softassign__glsl_rows[] =
+    "void main() {\n"
+    "    vec2 both = vec2(3e38, 0.0);\n"
+    "    for (int k = 0; k < K; k++) {\n"
+    "        int x = here().x * K + k;\n"
+    "        if (x >= size.x) break;\n"
+    "#if FIRST_LEVEL\n"
+    "        float d = at(source, ivec2(x, here().y));\n"
+    "        vec2 other = d < 1e37 ? vec2(d - at(second, ivec2(x, 0)), 1.0) : vec2(3e38, 0.0);\n"
+    "#else\n"
+    "        vec2 other = texelFetch(source, ivec2(x, here().y), 0).xy;\n"
+    "#endif\n"
+    "        both = softassign_join(both, other, inverse_t);\n"
+    "    }\n"
+    "    result = vec4(both, 0.0, 0.0);\n"
+    "}\n";
+
+/* Entropic columns, first level: weights of K rows. source = D, first = (minimum, sum) per row, second = prices. */
+static const char softassign__glsl_columns[] =
+    "void main() {\n"
+    "    float sum = 0.0, price = at(second, ivec2(here().x, 0));\n"
+    "    for (int k = 0; k < K; k++) {\n"
+    "        int y = here().y * K + k;\n"
+    "        if (y >= size.y) break;\n"
+    "        vec2 row = texelFetch(first, ivec2(0, y), 0).xy;\n"
+    "        float d = at(source, ivec2(here().x, y));\n"
+    "        if (d < 1e37) sum += exp((row.x - (d - price)) * inverse_t) / row.y;\n"
+    "    }\n"
+    "    result = vec4(sum);\n"
+    "}\n";
+
+/* v <- min(0, v - t ln s). source = prices, first = column sums; factor = t. */
+static const char softassign__glsl_prices[] =
+    "void main() {\n"
+    "    float v = at(source, ivec2(here().x, 0)), s = at(first, ivec2(here().x, 0));\n"
+    "    result = vec4(min(0.0, s < 1e-36 ? v + 82.0 * factor : v - factor * log(s)));\n"
+    "}\n";
+
+/* A plain copy. */
+static const char softassign__glsl_copy[] = "void main() { result = vec4(at(source, here())); }\n";
+
+/* ---- the object */
+
+enum {
+    SOFTASSIGN__DISTANCE, SOFTASSIGN__UPDATE_Q, SOFTASSIGN__UPDATE_M, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__SUM_ACROSS,
+    SOFTASSIGN__DIVIDE_COLUMNS, SOFTASSIGN__DIVIDE_ROWS, SOFTASSIGN__OUTLIER, SOFTASSIGN__ROWS_FIRST, SOFTASSIGN__ROWS_NEXT,
+    SOFTASSIGN__COLUMNS, SOFTASSIGN__UPDATE_PRICES, SOFTASSIGN__COPY, SOFTASSIGN__PROGRAMS
+};
+
+enum {
+    SOFTASSIGN__D, SOFTASSIGN__M, SOFTASSIGN__A, SOFTASSIGN__S, SOFTASSIGN__DOWN, SOFTASSIGN__DOWN_2, SOFTASSIGN__ACROSS,
+    SOFTASSIGN__ACROSS_2, SOFTASSIGN__OUTLIERS, SOFTASSIGN__OUTLIERS_2, SOFTASSIGN__V, SOFTASSIGN__V_2, SOFTASSIGN__TEXTURES
+};
+
+typedef struct softassign__gl_program {
+    unsigned program;
+    int size, alpha, inverse_t, factor, scale;
+} softassign__gl_program;
+
+struct softassign_gl {
+    sat__gl gl;
+    softassign_options options;
+    sat_allocator allocator;
+    softassign__gl_program programs[SOFTASSIGN__PROGRAMS];
+    unsigned texture[SOFTASSIGN__TEXTURES], framebuffer[SOFTASSIGN__TEXTURES];
+    int rows, columns;
+    float largest; /* cost */
+};
+
+static void softassign__gl_delete_textures(softassign_gl *g)
+{
+    int i;
+    for (i = 0; i < SOFTASSIGN__TEXTURES; i++) {
+        if (g->framebuffer[i]) g->gl.DeleteFramebuffers(1, &g->framebuffer[i]);
+        if (g->texture[i]) g->gl.DeleteTextures(1, &g->texture[i]);
+        g->framebuffer[i] = g->texture[i] = 0;
+    }
+    g->rows = g->columns = 0;
+}
+
+static sat_result softassign__gl_make_program(softassign_gl *g, int which, const char *name, const char *body, int vertical, int first)
+{
+    softassign__gl_program *p = &g->programs[which];
+    const char *library[2], *text[3];
+    sat__gl_shaders shaders;
+    sat_result result;
+    memset(&shaders, 0, sizeof shaders);
+    library[0] = softassign_gl_glsl();
+    library[1] = NULL;
+    text[0] = softassign__glsl_inputs;
+    text[1] = body;
+    text[2] = NULL;
+    shaders.name = name;
+    shaders.library = library;
+    shaders.fragment = text;
+    sat__gl_define(&g->gl, "K", g->options.gather);
+    sat__gl_define(&g->gl, "VERTICAL", vertical);
+    sat__gl_define(&g->gl, "FIRST_LEVEL", first);
+    sat__gl_define(&g->gl, "WRITES_Q", first);
+    result = sat__gl_build(&g->gl, &p->program, &shaders);
+    if (result != SAT_OK) return result;
+    p->size = g->gl.GetUniformLocation(p->program, "size");
+    p->alpha = g->gl.GetUniformLocation(p->program, "alpha");
+    p->inverse_t = g->gl.GetUniformLocation(p->program, "inverse_t");
+    p->factor = g->gl.GetUniformLocation(p->program, "factor");
+    p->scale = g->gl.GetUniformLocation(p->program, "scale");
+    g->gl.UseProgram(p->program);
+    sat__gl_set_int(&g->gl, p->program, "source", 0);
+    sat__gl_set_int(&g->gl, p->program, "first", 1);
+    sat__gl_set_int(&g->gl, p->program, "second", 2);
+    return SAT_OK;
+}
+
+static sat_result softassign__gl_make_programs(softassign_gl *g)
+{
+    const struct { int which; const char *name, *body; int vertical, first; } all[SOFTASSIGN__PROGRAMS] = {
+        {SOFTASSIGN__DISTANCE, "softassign: distances", softassign__glsl_distance, 0, 0},
+        {SOFTASSIGN__UPDATE_Q, "softassign: Q", softassign__glsl_update, 0, 1},
+        {SOFTASSIGN__UPDATE_M, "softassign: M", softassign__glsl_update, 0, 0},
+        {SOFTASSIGN__SUM_DOWN, "softassign: sum_cols", softassign__glsl_reduce, 1, 0},
+        {SOFTASSIGN__SUM_ACROSS, "softassign: sum_rows", softassign__glsl_reduce, 0, 0},
+        {SOFTASSIGN__DIVIDE_COLUMNS, "softassign: columns", softassign__glsl_divide, 1, 0},
+        {SOFTASSIGN__DIVIDE_ROWS, "softassign: rows", softassign__glsl_divide, 0, 0},
+        {SOFTASSIGN__OUTLIER, "softassign: outliers", softassign__glsl_outlier, 0, 0},
+        {SOFTASSIGN__ROWS_FIRST, "softassign: entropic rows", softassign__glsl_rows, 0, 1},
+        {SOFTASSIGN__ROWS_NEXT, "softassign: entropic rows", softassign__glsl_rows, 0, 0},
+        {SOFTASSIGN__COLUMNS, "softassign: entropic columns", softassign__glsl_columns, 0, 0},
+        {SOFTASSIGN__UPDATE_PRICES, "softassign: prices", softassign__glsl_prices, 0, 0},
+        {SOFTASSIGN__COPY, "softassign: copy", softassign__glsl_copy, 0, 0}};
+    int i;
+    for (i = 0; i < SOFTASSIGN__PROGRAMS; i++) {
+        sat_result result = softassign__gl_make_program(g, all[i].which, all[i].name, all[i].body, all[i].vertical, all[i].first);
+        if (result != SAT_OK) return result;
+    }
+    return SAT_OK;
+}
+
+SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc, const softassign_options *options)
+{
+    softassign_options o = options ? *options : softassign_method_defaults(SOFTASSIGN_PUBLISHED);
+    sat_allocator allocator;
+    sat__gl_state state;
+    softassign_gl *g;
+    sat_result result;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (!get_proc || !softassign__options_are_valid(&o) || !sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
+    g = (softassign_gl *)sat__alloc(&allocator, sizeof *g);
+    if (!g) return SAT_ERR_MEMORY;
+    memset(g, 0, sizeof *g);
+    g->options = o;
+    g->allocator = allocator;
+    *out = g;
+    result = sat__gl_open(&g->gl, get_proc);
+    if (result != SAT_OK) return result;
+    sat__gl_begin(&g->gl, &state, 3);
+    result = softassign__gl_make_programs(g);
+    sat__gl_end(&g->gl, &state);
+    return result;
+}
+
+SOFTASSIGN_DEF void softassign_gl_destroy(softassign_gl *gl)
+{
+    sat_allocator allocator;
+    int i;
+    if (!gl) return;
+    for (i = 0; i < SOFTASSIGN__PROGRAMS; i++)
+        if (gl->programs[i].program) gl->gl.DeleteProgram(gl->programs[i].program);
+    if (gl->texture[0] || gl->framebuffer[0] || gl->rows) softassign__gl_delete_textures(gl);
+    sat__gl_close(&gl->gl);
+    allocator = gl->allocator;
+    sat__release(&allocator, gl, sizeof *gl);
+}
+
+SOFTASSIGN_DEF const char *softassign_gl_message(const softassign_gl *gl) { return gl ? gl->gl.message : ""; }
+
+/* ---- costs */
+
+static sat_result softassign__gl_make_textures(softassign_gl *g, int rows, int columns)
+{
+    int i, k = g->options.gather;
+    softassign__gl_delete_textures(g);
+    for (i = 0; i < SOFTASSIGN__TEXTURES; i++) {
+        int width = columns, height = rows;
+        unsigned internal = SAT__GL_R32F;
+        sat_result result;
+        if (i == SOFTASSIGN__DOWN || i == SOFTASSIGN__DOWN_2) height = (rows + k - 1) / k;
+        if (i == SOFTASSIGN__ACROSS || i == SOFTASSIGN__ACROSS_2) {
+            width = (columns + k - 1) / k;
+            internal = SAT__GL_RG32F;
+        }
+        if (i >= SOFTASSIGN__OUTLIERS) height = 1;
+        result = sat__gl_texture(&g->gl, &g->texture[i], internal, width, height, NULL);
+        if (result == SAT_OK) result = sat__gl_framebuffer(&g->gl, &g->framebuffer[i], &g->texture[i], 1, 0);
+        if (result != SAT_OK) {
+            softassign__gl_delete_textures(g);
+            return result;
+        }
+    }
+    g->rows = rows;
+    g->columns = columns;
+    return SAT_OK;
+}
+
+/* One pass into texture `to`; 0 stands for no texture. Textures may be read as bound names. */
+static void softassign__gl_run(softassign_gl *g, int program, int to, int width, int height, unsigned source, unsigned first,
+                               unsigned second, int size_x, int size_y)
+{
+    const softassign__gl_program *p = &g->programs[program];
+    sat__gl *gl = &g->gl;
+    unsigned bound[3];
+    int i;
+    bound[0] = source;
+    bound[1] = first;
+    bound[2] = second;
+    sat__gl_pass(gl, p->program, g->framebuffer[to], width, height);
+    for (i = 0; i < 3; i++) {
+        gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)i);
+        gl->BindTexture(SAT__GL_TEXTURE_2D, bound[i]);
+        gl->BindSampler((unsigned)i, 0);
+    }
+    gl->Uniform2i(p->size, size_x, size_y);
+    sat__gl_draw(gl);
+}
+
+static void softassign__gl_values(softassign_gl *g, int program, float alpha, float inverse_t, float factor, float scale)
+{
+    const softassign__gl_program *p = &g->programs[program];
+    g->gl.UseProgram(p->program);
+    g->gl.Uniform1f(p->alpha, alpha);
+    g->gl.Uniform1f(p->inverse_t, inverse_t);
+    g->gl.Uniform1f(p->factor, factor);
+    g->gl.Uniform1f(p->scale, scale);
+}
+
+/* Packs features four to a texel, zeros behind. */
+static sat_result softassign__gl_feature_texture(softassign_gl *g, unsigned *texture, const float *features, int count, int n)
+{
+    int texels = (n + 3) / 4, i;
+    size_t size, width = (size_t)texels * 4 * sizeof(float);
+    float *packed;
+    sat_result result;
+    *texture = 0;
+    if (!sat__multiply_size(&size, width, (size_t)count)) return SAT_ERR_SIZE;
+    packed = (float *)sat__alloc(&g->allocator, size);
+    if (!packed) return SAT_ERR_MEMORY;
+    memset(packed, 0, size);
+    for (i = 0; i < count; i++) memcpy(packed + (size_t)i * (size_t)texels * 4, features + (size_t)i * (size_t)n, (size_t)n * sizeof(float));
+    result = sat__gl_texture(&g->gl, texture, SAT__GL_RGBA32F, texels, count, packed);
+    sat__release(&g->allocator, packed, size);
+    return result;
+}
+
+static sat_result softassign__gl_distances(softassign_gl *g, const softassign_problem *p)
+{
+    unsigned rows = 0, columns = 0;
+    sat_result result = softassign__gl_feature_texture(g, &rows, p->row_features, p->rows, p->feature_count);
+    if (result == SAT_OK) result = softassign__gl_feature_texture(g, &columns, p->column_features, p->columns, p->feature_count);
+    if (result == SAT_OK)
+        softassign__gl_run(g, SOFTASSIGN__DISTANCE, SOFTASSIGN__D, g->columns, g->rows, 0, rows, columns, (p->feature_count + 3) / 4, 1);
+    if (rows) g->gl.DeleteTextures(1, &rows);
+    if (columns) g->gl.DeleteTextures(1, &columns);
+    return result;
+}
+
+static sat_result softassign__gl_upload_costs(softassign_gl *g, const softassign_problem *p, float *row)
+{
+    int i, j;
+    for (i = 0; i < p->rows; i++) {
+        for (j = 0; j < p->columns; j++) row[j] = softassign__pair(p, i, j);
+        g->gl.ActiveTexture(SAT__GL_TEXTURE0);
+        g->gl.BindTexture(SAT__GL_TEXTURE_2D, g->texture[SOFTASSIGN__D]);
+        g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, 0, i, p->columns, 1, SAT__GL_RED, SAT__GL_FLOAT, row);
+    }
+    return SAT_OK;
+}
+
+/* The largest |cost| that is finite; -1 after a NaN or minus infinity. */
+static float softassign__gl_largest(const softassign_problem *p)
+{
+    float largest = 0;
+    int i, j;
+    for (i = 0; i < p->rows; i++)
+        for (j = 0; j < p->columns; j++) {
+            float cost = softassign__pair(p, i, j);
+            if (sat__is_nan(cost) || cost < -1e30f || (cost > 1e30f && sat__is_finite(cost))) return -1;
+            if (sat__is_finite(cost) && fabsf(cost) > largest) largest = fabsf(cost);
+        }
+    return largest > 1e-30f ? largest : 1;
+}
+
+SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softassign_problem *problem)
+{
+    sat__gl_state state;
+    sat_result result = SAT_OK;
+    float *row;
+    if (!gl || !softassign__problem_is_valid(problem)) return SAT_ERR_ARGUMENT;
+    gl->largest = softassign__gl_largest(problem);
+    if (gl->largest < 0) return SAT_ERR_NON_FINITE;
+    sat__gl_begin(&gl->gl, &state, 3);
+    if (gl->rows != problem->rows || gl->columns != problem->columns) result = softassign__gl_make_textures(gl, problem->rows, problem->columns);
+    if (result == SAT_OK && !problem->cost && !problem->cost_fn) result = softassign__gl_distances(gl, problem);
+    else if (result == SAT_OK) {
+        size_t size = (size_t)problem->columns * sizeof(float);
+        row = (float *)sat__alloc(&gl->allocator, size);
+        result = row ? softassign__gl_upload_costs(gl, problem, row) : SAT_ERR_MEMORY;
+        sat__release(&gl->allocator, row, size);
+    }
+    if (result == SAT_OK) result = sat__gl_check(&gl->gl, "OpenGL refused the costs");
+    sat__gl_end(&gl->gl, &state);
+    return result;
+}
+
+/* ---- sums */
+
+/* Sums a texture of width x height down to one row (vertical) or column; returns the texture that holds it. `ready`
+   levels were done before: `from` is then one of the two that take turns. */
+static int softassign__gl_reduce(softassign_gl *g, int from, int width, int height, int vertical)
+{
+    int k = g->options.gather, a = vertical ? SOFTASSIGN__DOWN : SOFTASSIGN__ACROSS;
+    while ((vertical ? height : width) > 1) {
+        int to = from == a ? a + 1 : a, w = vertical ? width : (width + k - 1) / k, h = vertical ? (height + k - 1) / k : height;
+        softassign__gl_run(g, vertical ? SOFTASSIGN__SUM_DOWN : SOFTASSIGN__SUM_ACROSS, to, w, h, g->texture[from], 0, 0, width, height);
+        from = to;
+        width = w;
+        height = h;
+    }
+    return from;
+}
+
+/* One texel of a texture. */
+static sat_result softassign__gl_texel(softassign_gl *g, int from, float *value)
+{
+    unsigned internal = from == SOFTASSIGN__ACROSS || from == SOFTASSIGN__ACROSS_2 ? SAT__GL_RG32F : SAT__GL_R32F;
+    float texel[2] = {0, 0};
+    sat_result result = sat__gl_read(&g->gl, texel, g->texture[from], internal, 1, 1);
+    *value = texel[0];
+    return result;
+}
+
+/* ---- the published method */
+
+/* M starts as on the CPU. */
+static sat_result softassign__gl_start_matrix(softassign_gl *g)
+{
+    size_t size = (size_t)g->columns * sizeof(float);
+    float *row = (float *)sat__alloc(&g->allocator, size);
+    uint64_t seed = g->options.seed;
+    int i, j;
+    if (!row) return SAT_ERR_MEMORY;
+    for (i = 0; i < g->rows; i++) {
+        for (j = 0; j < g->columns; j++) row[j] = (float)(1e-6 + 1e-3 * softassign__uniform(&seed));
+        g->gl.ActiveTexture(SAT__GL_TEXTURE0);
+        g->gl.BindTexture(SAT__GL_TEXTURE_2D, g->texture[SOFTASSIGN__M]);
+        g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, 0, i, g->columns, 1, SAT__GL_RED, SAT__GL_FLOAT, row);
+    }
+    for (j = 0; j < g->columns; j++) row[j] = (float)g->options.outlier;
+    sat__gl_upload(&g->gl, g->texture[SOFTASSIGN__OUTLIERS], SAT__GL_R32F, g->columns, 1, row);
+    sat__release(&g->allocator, row, size);
+    return SAT_OK;
+}
+
+/* One Sinkhorn iteration, A to A by way of M. */
+static void softassign__gl_sinkhorn(softassign_gl *g, int *outlier)
+{
+    int w = g->columns, h = g->rows, sums = softassign__gl_reduce(g, SOFTASSIGN__A, w, h, 1);
+    softassign__gl_run(g, SOFTASSIGN__DIVIDE_COLUMNS, SOFTASSIGN__M, w, h, g->texture[SOFTASSIGN__A], g->texture[sums], g->texture[*outlier], w, h);
+    if (g->options.outlier_evolves) {
+        int to = *outlier == SOFTASSIGN__V ? SOFTASSIGN__OUTLIERS_2 : SOFTASSIGN__V;
+        softassign__gl_run(g, SOFTASSIGN__OUTLIER, to, w, 1, g->texture[*outlier], g->texture[sums], 0, w, 1);
+        *outlier = to;
+    }
+    sums = softassign__gl_reduce(g, SOFTASSIGN__M, w, h, 0);
+    softassign__gl_run(g, SOFTASSIGN__DIVIDE_ROWS, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M], g->texture[sums], 0, w, h);
+}
+
+/* One temperature; afterwards M holds the matrix and *cost the sum of the last Q. */
+static sat_result softassign__gl_cool(softassign_gl *g, double t, float *cost)
+{
+    const softassign_options *o = &g->options;
+    int w = g->columns, h = g->rows, steady, turn, q;
+    float alpha = (float)o->alpha, inverse = (float)(1 / t), factor = (float)(1 / sqrt(t)), scale = 1 / g->largest;
+    sat_result result = SAT_OK;
+    *cost = 0;
+    softassign__gl_values(g, SOFTASSIGN__UPDATE_M, alpha, inverse, factor, scale);
+    softassign__gl_values(g, SOFTASSIGN__UPDATE_Q, alpha, inverse, factor, scale);
+    for (steady = 0; steady < o->iterations[1]; steady++) {
+        int outlier = SOFTASSIGN__OUTLIERS;
+        if (steady == o->iterations[1] - 1) {
+            softassign__gl_run(g, SOFTASSIGN__UPDATE_Q, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M], g->texture[SOFTASSIGN__D], 0, w, h);
+            q = softassign__gl_reduce(g, SOFTASSIGN__A, w, h, 1);
+            q = softassign__gl_reduce(g, q, w, 1, 0);
+            result = softassign__gl_texel(g, q, cost);
+            if (result != SAT_OK) return result;
+        }
+        softassign__gl_run(g, SOFTASSIGN__UPDATE_M, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M], g->texture[SOFTASSIGN__D], 0, w, h);
+        for (turn = 0; turn < o->iterations[2]; turn++) softassign__gl_sinkhorn(g, &outlier);
+        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__M, w, h, g->texture[SOFTASSIGN__A], 0, 0, w, h);
+    }
+    return result;
+}
+
+SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft, ptrdiff_t soft_stride, double *soft_cost)
+{
+    softassign_gl *g = gl;
+    sat__gl_state state;
+    sat_result result;
+    double t, lowest = (double)SOFTASSIGN__INFINITY;
+    int i;
+    if (!g || !g->rows || (soft && soft_stride < g->columns && soft_stride > -(ptrdiff_t)g->columns)) return SAT_ERR_ARGUMENT;
+    sat__gl_begin(&g->gl, &state, 3);
+    result = softassign__gl_start_matrix(g);
+    softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows, g->texture[SOFTASSIGN__M], 0, 0, g->columns, g->rows);
+    for (t = g->options.temperature, i = 0; result == SAT_OK && i < g->options.iterations[0]; i++, t *= g->options.cooling) {
+        float cost;
+        if (!(t > 1e-30)) t = 1e-30;
+        result = softassign__gl_cool(g, t, &cost);
+        if (result != SAT_OK || !((double)cost < lowest)) continue;
+        lowest = (double)cost;
+        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows, g->texture[SOFTASSIGN__M], 0, 0, g->columns, g->rows);
+    }
+    if (result == SAT_OK && soft) {
+        result = sat__gl_attach(&g->gl, g->gl.framebuffer, &g->texture[SOFTASSIGN__S], 1, 0);
+        for (i = 0; result == SAT_OK && i < g->rows; i++)
+            g->gl.ReadPixels(0, i, g->columns, 1, SAT__GL_RED, SAT__GL_FLOAT, soft + (ptrdiff_t)i * soft_stride);
+    }
+    if (result == SAT_OK) result = sat__gl_check(&g->gl, "OpenGL refused a pass");
+    sat__gl_end(&g->gl, &state);
+    if (soft_cost) *soft_cost = lowest;
+    return result;
+}
+
+/* ---- entropic sweeps */
+
+/* (minimum, sum of weights) of every row; the first pass reads D and the prices, so a row is read once. */
+static int softassign__gl_rows(softassign_gl *g, int price)
+{
+    int k = g->options.gather, width = g->columns, to = SOFTASSIGN__ACROSS, from = SOFTASSIGN__D;
+    do {
+        int w = (width + k - 1) / k, program = from == SOFTASSIGN__D ? SOFTASSIGN__ROWS_FIRST : SOFTASSIGN__ROWS_NEXT;
+        softassign__gl_run(g, program, to, w, g->rows, g->texture[from], 0, g->texture[price], width, g->rows);
+        from = to;
+        to = to == SOFTASSIGN__ACROSS ? SOFTASSIGN__ACROSS_2 : SOFTASSIGN__ACROSS;
+        width = w;
+    } while (width > 1);
+    return from;
+}
+
+/* The bound at the prices of the sweep, lowered by what float sums may have lost. */
+static sat_result softassign__gl_bound(softassign_gl *g, int rows, const float *price, double *bound)
+{
+    size_t size = (size_t)g->rows * 2 * sizeof(float);
+    float *least = (float *)sat__alloc(&g->allocator, size);
+    softassign__sum sum = {0, 0, 0};
+    sat_result result;
+    int i;
+    if (!least) return SAT_ERR_MEMORY;
+    result = sat__gl_read(&g->gl, least, g->texture[rows], SAT__GL_RG32F, 1, g->rows);
+    for (i = 0; i < g->rows; i++) softassign__add(&sum, (double)least[2 * i]);
+    for (i = 0; i < g->columns; i++) softassign__add(&sum, (double)price[i]);
+    *bound = softassign__total_below(&sum) - sum.magnitude * 1e-6;
+    sat__release(&g->allocator, least, size);
+    return result;
+}
+
+SOFTASSIGN_DEF sat_result softassign_gl_sweep(softassign_gl *gl, float *price, double *lower_bound, double temperature, int sweeps)
+{
+    softassign_gl *g = gl;
+    sat__gl_state state;
+    sat_result result = SAT_OK;
+    int i, v = SOFTASSIGN__V, programs[4] = {SOFTASSIGN__ROWS_FIRST, SOFTASSIGN__ROWS_NEXT, SOFTASSIGN__COLUMNS, SOFTASSIGN__UPDATE_PRICES};
+    if (!g || !g->rows || !price || sweeps < 1 || !(temperature > 1e-30 && temperature < 1e30)) return SAT_ERR_ARGUMENT;
+    for (i = 0; i < g->columns; i++)
+        if (!(price[i] <= 0 && price[i] > -1e36f)) return SAT_ERR_ARGUMENT;
+    sat__gl_begin(&g->gl, &state, 3);
+    sat__gl_upload(&g->gl, g->texture[v], SAT__GL_R32F, g->columns, 1, price);
+    for (i = 0; i < 4; i++) softassign__gl_values(g, programs[i], 0, (float)(1 / temperature), (float)temperature, 0);
+    for (i = 0; i < sweeps && result == SAT_OK; i++) {
+        int k = g->options.gather, height = (g->rows + k - 1) / k, next = v == SOFTASSIGN__V ? SOFTASSIGN__V_2 : SOFTASSIGN__V;
+        int rows = softassign__gl_rows(g, v), sums;
+        if (i == sweeps - 1 && lower_bound) {
+            result = sat__gl_read(&g->gl, price, g->texture[v], SAT__GL_R32F, g->columns, 1);
+            if (result == SAT_OK) result = softassign__gl_bound(g, rows, price, lower_bound);
+        }
+        softassign__gl_run(g, SOFTASSIGN__COLUMNS, SOFTASSIGN__DOWN, g->columns, height, g->texture[SOFTASSIGN__D], g->texture[rows],
+                           g->texture[v], g->columns, g->rows);
+        sums = softassign__gl_reduce(g, SOFTASSIGN__DOWN, g->columns, height, 1);
+        softassign__gl_run(g, SOFTASSIGN__UPDATE_PRICES, next, g->columns, 1, g->texture[v], g->texture[sums], 0, g->columns, 1);
+        v = next;
+    }
+    if (result == SAT_OK) result = sat__gl_read(&g->gl, price, g->texture[v], SAT__GL_R32F, g->columns, 1);
+    if (result == SAT_OK) result = sat__gl_check(&g->gl, "OpenGL refused a pass");
+    sat__gl_end(&g->gl, &state);
+    return result;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SOFTASSIGN_GL */

@@ -3,12 +3,14 @@
 #include "sat.h"
 #define SOFTASSIGN_IMPLEMENTATION
 #include "softassign.h"
+#include <string.h>
 
 int main(void)
 {
     static const float cost[6] = {1, 2, 3, 1, 3, 9};
-    softassign_problem problem = {0};
+    softassign_problem problem;
     int column_of_row[2];
+    memset(&problem, 0, sizeof problem);
     problem.rows = 2;
     problem.columns = 3;
     problem.cost = cost;

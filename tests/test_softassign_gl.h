@@ -1,0 +1,317 @@
+/* softassign.h on the GPU against the same methods on the CPU. Needs OSMesa (or a GPU, see gl_context.h); skips without. */
+
+#include "gl_context.h"
+#include "support.h"
+
+static gl_context test_context;
+static sat__gl test_gl; /* the test's own table */
+
+static int open_gl(void)
+{
+    memset(&test_gl, 0, sizeof test_gl);
+    if (!gl_context_open(&test_context, 3, 3)) {
+        expect_skip(test_context.message);
+        return 0;
+    }
+    return EXPECT_EQ(sat__gl_open(&test_gl, test_context.get_proc), SAT_OK);
+}
+
+static void close_gl(void)
+{
+    EXPECT_EQ(test_gl.GetError(), 0);
+    sat__gl_close(&test_gl);
+    gl_context_close(&test_context);
+}
+
+static float *make_costs(int rows, int columns, uint64_t seed)
+{
+    float *cost = (float *)malloc((size_t)rows * (size_t)columns * sizeof *cost);
+    support_fill(cost, (size_t)rows * (size_t)columns, 0, 10, seed);
+    return cost;
+}
+
+static softassign_problem problem_of(const float *cost, int rows, int columns)
+{
+    softassign_problem p;
+    memset(&p, 0, sizeof p);
+    p.rows = rows;
+    p.columns = columns;
+    p.cost = cost;
+    p.stride = columns;
+    return p;
+}
+
+static double largest_difference(const float *a, const float *b, size_t n)
+{
+    double worst = 0;
+    size_t i;
+    for (i = 0; i < n; i++) {
+        double d = fabs((double)a[i] - (double)b[i]);
+        if (expect_is_nan(d)) return d;
+        if (d > worst) worst = d;
+    }
+    return worst;
+}
+
+/* ---- the published method ---- */
+
+TEST(softassign_gl_published_equals_the_cpu)
+{
+    static const int sizes[][3] = {{30, 70, 4}, {1, 9, 4}, {64, 64, 2}, {17, 130, 7}, {90, 33 * 3, 16}};
+    size_t k;
+    int evolves, i, decided = 0;
+    if (!open_gl()) return;
+    for (k = 0; k < 5; k++)
+        for (evolves = 0; evolves < 2; evolves++) {
+            int rows = sizes[k][0], columns = sizes[k][1], *x = (int *)malloc((size_t)rows * sizeof *x);
+            size_t n = (size_t)rows * (size_t)columns;
+            float *cost = make_costs(rows, columns, k + 1), *cpu = (float *)malloc(n * sizeof *cpu), *gpu = (float *)malloc(n * sizeof *gpu);
+            softassign_problem p = problem_of(cost, rows, columns);
+            softassign_options o = softassign_method_defaults(SOFTASSIGN_PUBLISHED);
+            softassign_report r;
+            softassign_gl *gl;
+            double soft_cost = 0, sharpest = 0, worst;
+            if (n > 100) cost[n / 2] = INFINITY;
+            o.iterations[0] = 10;
+            o.iterations[1] = 3;
+            o.iterations[2] = 4;
+            o.temperature = 0.02;
+            o.cooling = 0.7;
+            o.outlier = evolves ? 0.5 : 100;
+            o.outlier_evolves = evolves;
+            o.gather = sizes[k][2];
+            o.certify = 0;
+            o.soft = cpu;
+            o.soft_stride = columns;
+            EXPECT_EQ(softassign_solve(x, &p, &o, &r), SAT_OK);
+            if (!EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, &o), SAT_OK)) puts(softassign_gl_message(gl));
+            EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_OK);
+            EXPECT_EQ(softassign_gl_published(gl, gpu, columns, &soft_cost), SAT_OK);
+            worst = largest_difference(cpu, gpu, n);
+            EXPECT(worst < 1e-3);
+            EXPECT_REL(soft_cost, r.soft_cost, 1e-4);
+            for (i = 0; i < (int)n; i++)
+                if ((double)cpu[i] > sharpest) sharpest = (double)cpu[i];
+            decided += sharpest > 0.3 && rows > 1;
+            if (k == 0) REPORT("GPU softassign (3.7) against the CPU", worst, "largest difference of S");
+            softassign_gl_destroy(gl);
+            free(x);
+            free(cost);
+            free(cpu);
+            free(gpu);
+        }
+    EXPECT(decided >= 5); /* not blurred: the comparison means something */
+    close_gl();
+}
+
+TEST(softassign_gl_distances_equal_the_cpu)
+{
+    int rows = 20, columns = 50, n = 11, x[20];
+    float *a = make_costs(rows, n, 3), *b = make_costs(columns, n, 4), cpu[1000], gpu[1000];
+    softassign_problem p;
+    softassign_options o = softassign_method_defaults(SOFTASSIGN_PUBLISHED);
+    softassign_gl *gl;
+    sat__gl_state state;
+    if (!open_gl()) return;
+    memset(&p, 0, sizeof p);
+    p.rows = rows;
+    p.columns = columns;
+    p.row_features = a;
+    p.column_features = b;
+    p.feature_count = n;
+    o.iterations[0] = 2;
+    o.soft = cpu;
+    o.soft_stride = columns;
+    EXPECT_EQ(softassign_solve(x, &p, &o, NULL), SAT_OK);
+    EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, &o), SAT_OK);
+    EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_OK);
+    sat__gl_begin(&test_gl, &state, 1);
+    EXPECT_EQ(sat__gl_read(&test_gl, gpu, gl->texture[SOFTASSIGN__D], SAT__GL_R32F, columns, rows), SAT_OK);
+    sat__gl_end(&test_gl, &state);
+    {
+        int i, j;
+        for (i = 0; i < rows; i++)
+            for (j = 0; j < columns; j++)
+                EXPECT_REL(gpu[i * columns + j], softassign__distance(a + i * n, b + j * n, n), 2e-6);
+    }
+    EXPECT_EQ(softassign_gl_published(gl, gpu, columns, NULL), SAT_OK);
+    EXPECT(largest_difference(cpu, gpu, 1000) < 1e-4);
+    softassign_gl_destroy(gl);
+    free(a);
+    free(b);
+    close_gl();
+}
+
+/* ---- entropic sweeps ---- */
+
+TEST(softassign_gl_sweep_equals_the_cpu)
+{
+    static const int sizes[][3] = {{40, 90, 4}, {1, 5, 4}, {65, 65, 16}};
+    static const double temperatures[] = {3, 0.1, 1e-3};
+    size_t k, t;
+    if (!open_gl()) return;
+    for (k = 0; k < 3; k++)
+        for (t = 0; t < 3; t++) {
+            int rows = sizes[k][0], columns = sizes[k][1], i, j, turn, sweeps = 5;
+            float *cost = make_costs(rows, columns, k + 5), *price = (float *)calloc((size_t)columns, sizeof *price);
+            double *v = (double *)calloc((size_t)columns, sizeof *v), *sum = (double *)malloc((size_t)columns * sizeof *sum);
+            double bound = 0, gpu_bound = 0, eps = temperatures[t], worst = 0;
+            softassign_problem p = problem_of(cost, rows, columns);
+            softassign_options o = softassign_defaults();
+            softassign_gl *gl;
+            int *x = (int *)malloc((size_t)rows * sizeof *x);
+            softassign_report r;
+            o.gather = sizes[k][2];
+            for (turn = 0; turn < sweeps; turn++) { /* the plain double sweep */
+                for (bound = 0, j = 0; j < columns; j++) {
+                    sum[j] = 0;
+                    bound += v[j];
+                }
+                for (i = 0; i < rows; i++) {
+                    const float *c = cost + i * columns;
+                    double least = HUGE_VAL, all = 0;
+                    for (j = 0; j < columns; j++) least = fmin(least, (double)c[j] - v[j]);
+                    for (j = 0; j < columns; j++) all += exp((least - ((double)c[j] - v[j])) / eps);
+                    for (j = 0; j < columns; j++) sum[j] += exp((least - ((double)c[j] - v[j])) / eps) / all;
+                    bound += least;
+                }
+                for (j = 0; j < columns; j++) v[j] = fmin(0, sum[j] < 1e-36 ? v[j] + 82 * eps : v[j] - eps * log(sum[j]));
+            }
+            EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, &o), SAT_OK);
+            EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_OK);
+            EXPECT_EQ(softassign_gl_sweep(gl, price, &gpu_bound, eps, sweeps), SAT_OK);
+            for (j = 0; j < columns; j++) worst = fmax(worst, fabs((double)price[j] - v[j]));
+            EXPECT(worst < 2e-3 * eps + 2e-5);
+            EXPECT(gpu_bound <= bound + 1e-9 && gpu_bound > bound - 1e-4 * fabs(bound) - 1e-4);
+            EXPECT_EQ(softassign_solve(x, &p, NULL, &r), SAT_OK);
+            EXPECT(gpu_bound <= r.cost);
+            softassign_gl_destroy(gl);
+            free(cost);
+            free(price);
+            free(v);
+            free(sum);
+            free(x);
+        }
+    close_gl();
+}
+
+/* ---- state, refusals, other contexts ---- */
+
+typedef struct gl_state { int values[64]; int count; } gl_state;
+
+static void snapshot(gl_state *s)
+{
+    static const unsigned names[] = {SAT__GL_CURRENT_PROGRAM, SAT__GL_VERTEX_ARRAY_BINDING, SAT__GL_DRAW_FRAMEBUFFER_BINDING,
+                                     SAT__GL_READ_FRAMEBUFFER_BINDING, SAT__GL_ACTIVE_TEXTURE, SAT__GL_TEXTURE_BINDING_2D,
+                                     SAT__GL_SAMPLER_BINDING, SAT__GL_UNPACK_ALIGNMENT, SAT__GL_PACK_ALIGNMENT, SAT__GL_UNPACK_ROW_LENGTH,
+                                     SAT__GL_DEPTH_FUNC, SAT__GL_BLEND_SRC_RGB, SAT__GL_PIXEL_PACK_BUFFER_BINDING,
+                                     SAT__GL_PIXEL_UNPACK_BUFFER_BINDING};
+    static const unsigned capabilities[] = {SAT__GL_BLEND, SAT__GL_DEPTH_TEST, SAT__GL_SCISSOR_TEST, SAT__GL_CULL_FACE, SAT__GL_STENCIL_TEST};
+    size_t i;
+    memset(s, 0, sizeof *s);
+    for (i = 0; i < sizeof names / sizeof *names; i++) test_gl.GetIntegerv(names[i], &s->values[s->count++]);
+    test_gl.GetIntegerv(SAT__GL_VIEWPORT, &s->values[s->count]);
+    s->count += 4;
+    for (i = 0; i < sizeof capabilities / sizeof *capabilities; i++) s->values[s->count++] = test_gl.IsEnabled(capabilities[i]);
+    for (i = 0; i < 4; i++) {
+        int active;
+        test_gl.GetIntegerv(SAT__GL_ACTIVE_TEXTURE, &active);
+        test_gl.ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)i);
+        test_gl.GetIntegerv(SAT__GL_TEXTURE_BINDING_2D, &s->values[s->count++]);
+        test_gl.ActiveTexture((unsigned)active);
+    }
+}
+
+TEST(softassign_gl_state_is_restored)
+{
+    gl_state before, after;
+    unsigned texture = 0;
+    float *cost = make_costs(20, 40, 9), soft[800], price[40] = {0};
+    softassign_problem p = problem_of(cost, 20, 40);
+    softassign_options o = softassign_method_defaults(SOFTASSIGN_PUBLISHED);
+    softassign_gl *gl;
+    if (!open_gl()) return;
+    o.iterations[0] = 2;
+    test_gl.GenTextures(1, &texture);
+    test_gl.ActiveTexture(SAT__GL_TEXTURE0 + 1);
+    test_gl.BindTexture(SAT__GL_TEXTURE_2D, texture);
+    test_gl.Enable(SAT__GL_BLEND);
+    test_gl.Enable(SAT__GL_SCISSOR_TEST);
+    test_gl.Enable(SAT__GL_DEPTH_TEST);
+    test_gl.Scissor(0, 0, 1, 1);
+    test_gl.Viewport(1, 2, 3, 4);
+    test_gl.PixelStorei(SAT__GL_UNPACK_ALIGNMENT, 8);
+    test_gl.PixelStorei(SAT__GL_PACK_ALIGNMENT, 2);
+    snapshot(&before);
+    EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, &o), SAT_OK);
+    EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_OK);
+    EXPECT_EQ(softassign_gl_published(gl, soft, 40, NULL), SAT_OK);
+    EXPECT_EQ(softassign_gl_sweep(gl, price, NULL, 1, 3), SAT_OK);
+    softassign_gl_destroy(gl);
+    snapshot(&after);
+    EXPECT(memcmp(&before, &after, sizeof before) == 0);
+    test_gl.DeleteTextures(1, &texture);
+    free(cost);
+    close_gl();
+}
+
+static sat_gl_proc without_draw(const char *name) { return strcmp(name, "glDrawArrays") == 0 ? NULL : test_context.get_proc(name); }
+
+TEST(softassign_gl_refuses_and_names)
+{
+    float *cost = make_costs(4, 6, 2), price[6] = {0}, soft[24];
+    softassign_problem p = problem_of(cost, 4, 6);
+    softassign_options o = softassign_defaults();
+    softassign_gl *gl = NULL;
+    support_memory memory;
+    EXPECT_EQ(softassign_gl_create(NULL, NULL, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(softassign_gl_create(&gl, NULL, NULL), SAT_ERR_ARGUMENT);
+    EXPECT(gl == NULL && softassign_gl_message(NULL) != NULL);
+    softassign_gl_destroy(NULL);
+    if (!open_gl()) return;
+    EXPECT_EQ(softassign_gl_create(&gl, without_draw, NULL), SAT_ERR_GL_FUNCTION);
+    EXPECT(strstr(softassign_gl_message(gl), "glDrawArrays") != NULL);
+    softassign_gl_destroy(gl);
+    o.allocator = support_allocator(&memory);
+    memory.fail_at = 1;
+    EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, &o), SAT_ERR_MEMORY);
+    memory.fail_at = 0;
+    EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, &o), SAT_OK);
+    EXPECT_EQ(softassign_gl_sweep(gl, price, NULL, 1, 1), SAT_ERR_ARGUMENT); /* no costs yet */
+    EXPECT_EQ(softassign_gl_published(gl, soft, 6, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(softassign_gl_set_costs(gl, NULL), SAT_ERR_ARGUMENT);
+    cost[5] = NAN;
+    EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_ERR_NON_FINITE);
+    cost[5] = 1;
+    EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_OK);
+    EXPECT_EQ(softassign_gl_sweep(gl, price, NULL, 0, 1), SAT_ERR_ARGUMENT);
+    price[3] = 1;
+    EXPECT_EQ(softassign_gl_sweep(gl, price, NULL, 1, 1), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(softassign_gl_published(gl, soft, 5, NULL), SAT_ERR_ARGUMENT);
+    softassign_gl_destroy(gl);
+    EXPECT(support_memory_clean(&memory));
+    free(cost);
+    close_gl();
+}
+
+/* Every shader also as GLSL ES 3.00: the function table believes to be in an ES context. */
+static const unsigned char *SAT__GL_CALL es_string(unsigned name)
+{
+    return name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)" : test_gl.GetString(name);
+}
+static sat_gl_proc as_es(const char *name)
+{
+    return strcmp(name, "glGetString") == 0 ? (sat_gl_proc)es_string : test_context.get_proc(name);
+}
+
+TEST(softassign_gl_shaders_are_valid_in_es)
+{
+    softassign_gl *gl = NULL;
+    sat_result result;
+    if (!open_gl()) return;
+    result = softassign_gl_create(&gl, as_es, NULL);
+    if (!EXPECT_EQ(result, SAT_OK)) puts(softassign_gl_message(gl));
+    softassign_gl_destroy(gl);
+    EXPECT(strstr(softassign_gl_glsl(), "softassign_join") != NULL && strlen(softassign_gl_glsl()) < 4096);
+    close_gl();
+}
