@@ -1,0 +1,2972 @@
+/* raindrop.h - 0.1.0 - spherical raindrops that reflect and refract - SPDX-License-Identifier: MIT-0 OR Unlicense */
+
+#if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(RAINDROP_IMPLEMENTATION)
+#define RAINDROP_IMPLEMENTATION
+#endif
+
+#ifndef RAINDROP_H
+#define RAINDROP_H
+
+#define RAINDROP_VERSION_MAJOR 0
+#define RAINDROP_VERSION_MINOR 1
+#define RAINDROP_VERSION_PATCH 0
+#define RAINDROP_VERSION (RAINDROP_VERSION_MAJOR * 10000 + RAINDROP_VERSION_MINOR * 100 + RAINDROP_VERSION_PATCH)
+
+#if defined(RAINDROP_IMPLEMENT) || defined(RAINDROP_IMPL)
+#error "raindrop.h: the macro is called RAINDROP_IMPLEMENTATION"
+#endif
+
+#if defined(RAINDROP_GL) && !defined(SAT_GL)
+#define SAT_GL
+#endif
+#include "sat.h"
+#if SAT_VERSION < 100
+#error "raindrop.h: needs sat.h 0.1.0 or newer"
+#endif
+
+/* RAINDROP_STATIC makes every function private to the file; RAINDROP_DEF replaces the linkage altogether. */
+#ifndef RAINDROP_DEF
+#ifdef RAINDROP_STATIC
+#define RAINDROP_DEF static inline
+#else
+#define RAINDROP_DEF extern
+#endif
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The version the implementation was compiled with: compare with RAINDROP_VERSION. */
+RAINDROP_DEF int raindrop_version(void);
+
+/* ------------------------------------------------------------------------------------------------
+   One ray and one drop, free of units: the drop has radius 1
+   ------------------------------------------------------------------------------------------------ */
+
+#define RAINDROP_WATER 1.33f /* water in air, as Slomp 2012; 1 / 1.33f is an air bubble in water */
+
+/* What leaves a drop. Directions are unit vectors. A pencil of rays `w` radii
+   wide leaves as a cone of about footprint * w radians. */
+typedef struct raindrop_ray {
+    float reflect[3], refract[3]; /* mirrored at the front; through the drop with two refractions */
+    float fresnel;                /* F, the reflected share of the power, unpolarised */
+    float transmit;               /* share that passes both surfaces: the mean of (1-F)^2 over both polarisations */
+    float footprint_reflect, footprint_refract;
+} raindrop_ray;
+
+/* direction d: unit vector. centre_offset p: from the centre to the point of the ray nearest to it, |p| = b <= 1.
+   one_minus_b2: 1 - b^2, asked for because the caller often knows it better than 1 - |p|^2 does (raindrop_sprite_ray
+   makes all three). n > 0: index of the drop over that of its surroundings; where the ray is totally reflected (a
+   bubble's rim) F is 1 and `refract` repeats `reflect`. */
+RAINDROP_DEF void raindrop_trace(raindrop_ray *out, const float direction[3], const float centre_offset[3],
+                                 float one_minus_b2, float n);
+
+/* The same for `count` rays, as arrays; any output may be NULL. */
+typedef struct raindrop_ray_inputs { const float *direction[3], *centre_offset[3], *one_minus_b2; } raindrop_ray_inputs;
+typedef struct raindrop_ray_outputs {
+    float *reflect[3], *refract[3], *fresnel, *transmit, *footprint_reflect, *footprint_refract;
+} raindrop_ray_outputs;
+RAINDROP_DEF void raindrop_trace_n(const raindrop_ray_outputs *out, const raindrop_ray_inputs *in, int count, float n);
+
+/* Order k >= 0: k internal reflections between the two refractions; k = 0 is `refract`, 1 the rainbow, 2 the second.
+   *weight is the order's share of the power, *rest its share with all later ones: rest(0) + F = 1. */
+typedef struct raindrop_order { float direction[3], weight, rest, footprint; } raindrop_order;
+RAINDROP_DEF void raindrop_trace_order(raindrop_order *out, const float direction[3], const float centre_offset[3],
+                                       float one_minus_b2, float n, int k);
+
+/* A ray for the point (s, t) of a unit disc that shows a drop at `distance` > 1 radii from the eye, which looks along
+   -z at its centre: the published map's geometry, without the loss of digits of far drops. Outside the disc the point
+   moves to the rim. */
+RAINDROP_DEF void raindrop_sprite_ray(float direction[3], float centre_offset[3], float *one_minus_b2, float s, float t,
+                                      float distance);
+
+/* A flattened drop: half axes 1 across and `axis_ratio` along y. Returns 0 (and writes nothing) when the ray misses. */
+RAINDROP_DEF int raindrop_trace_spheroid(raindrop_ray *out, const float direction[3], const float centre_offset[3],
+                                         float axis_ratio, float n);
+
+/* ------------------------------------------------------------------------------------------------
+   The published hierarchical maps (Slomp 2012, section 2.4.2)
+   ------------------------------------------------------------------------------------------------ */
+
+#ifndef RAINDROP_NO_MAP
+/* Level i is base >> i texels wide and shows the drop from sqrt(1 + 4^i) radii (table 2.1). 32 bytes a texel:
+   44.7 MB for a base of 1024. A texel is reflect xyz, F, refract xyz, alpha; all 0 outside the drop. */
+typedef struct raindrop_map raindrop_map;
+/* base_resolution: a power of two, 1..4096. alpha_samples: 1..4096, 32 as published; random, from a fixed seed. */
+RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, int base_resolution, int alpha_samples, float n,
+                                            const sat_allocator *allocator);
+RAINDROP_DEF int raindrop_map_levels(const raindrop_map *map);
+/* Rows from the bottom (t = -1) up, 8 floats a texel; NULL outside 0..levels-1. */
+RAINDROP_DEF const float *raindrop_map_level(const raindrop_map *map, int level, int *resolution);
+/* The same as half floats, 8 a texel, written to the caller's memory. */
+RAINDROP_DEF sat_result raindrop_map_level_half(uint16_t *out, const raindrop_map *map, int level);
+RAINDROP_DEF double raindrop_map_distance(int level); /* radii from the eye to the centre, table 2.1 */
+/* Trilinear lookup at (s, t) in [-1, 1]^2 for a drop at `distance` radii: 8 floats. */
+RAINDROP_DEF void raindrop_map_sample(float out[8], const raindrop_map *map, float s, float t, float distance);
+RAINDROP_DEF void raindrop_map_destroy(raindrop_map *map);
+#else
+typedef struct raindrop_map raindrop_map;
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Environment
+   ------------------------------------------------------------------------------------------------ */
+
+typedef enum raindrop_layout {
+    RAINDROP_LAYOUT_EQUIRECT, /* u = atan2(x, -z) / 2pi + 1/2, v = acos(y) / pi, row 0 at the top */
+    RAINDROP_LAYOUT_CUBE      /* six squares, one below the other: +x -x +y -y +z -z as OpenGL has them */
+} raindrop_layout;
+
+typedef enum raindrop_filter {
+    RAINDROP_FILTER_MIPS, /* octahedral picture with mips, trilinear */
+    RAINDROP_FILTER_SAT   /* box of the footprint's size in a summed-area table that wraps around; equirect only */
+} raindrop_filter;
+
+typedef struct raindrop_environment_options {
+    raindrop_layout layout;       /* RAINDROP_LAYOUT_EQUIRECT */
+    raindrop_filter filter;       /* RAINDROP_FILTER_MIPS: 5 to 20 times faster, and closer; see COST */
+    int resolution;               /* 0: from the picture; a power of two, 16..4096: side of the octahedral picture */
+    int far_resolution, far_samples; /* 64, 256: the far drops' prefilter; 8..256 (power of two) and 16..65536 */
+    int far_orders;               /* 1; 0..3: internal reflections that the prefilter knows */
+    float n;                      /* 1.33; index of the drops */
+    float scale;                  /* 1; 1/255.f for 8-bit input */
+    int decode_srgb;              /* 0; 1: scaled values are sRGB, for LDR pictures */
+    float clamp;                  /* 0: none; otherwise brighter values become this one, and are counted */
+    float sun_direction[3];       /* 0, 1, 0; towards the sun, which lights the bows */
+    float sun_irradiance[3];      /* 1, 1, 1 */
+    float bow_optical_depth;      /* 0: no bows; 0..10: share of the sun's light that the rain in view scatters */
+    sat_allocator allocator;      /* malloc */
+    sat_threads threads;          /* serial; used by create; same bits for any worker count */
+} raindrop_environment_options;
+RAINDROP_DEF raindrop_environment_options raindrop_environment_defaults(void);
+
+typedef struct raindrop_environment_stats {
+    size_t nan, infinite, negative, clamped; /* channel values replaced: by 0, by the largest finite one, by 0, by `clamp` */
+    float largest;                           /* after that */
+    size_t bytes;
+} raindrop_environment_stats;
+
+/* image: 1 (grey), 3 or 4 channels, any format. The picture is read once and not kept. */
+typedef struct raindrop_environment raindrop_environment;
+RAINDROP_DEF sat_result raindrop_environment_create(raindrop_environment **out, const sat_image *image,
+                                                    const raindrop_environment_options *options,
+                                                    raindrop_environment_stats *stats);
+RAINDROP_DEF void raindrop_environment_destroy(raindrop_environment *environment);
+/* Radiance from a direction (any length but 0), averaged over a cone of `footprint` radians. */
+RAINDROP_DEF void raindrop_environment_sample(float rgb[3], const raindrop_environment *environment,
+                                              const float direction[3], float footprint);
+/* Mean colour of a far drop seen in that direction: the environment filtered by the drop's own phase function. */
+RAINDROP_DEF void raindrop_environment_far(float rgb[3], const raindrop_environment *environment, const float direction[3]);
+
+/* ------------------------------------------------------------------------------------------------
+   Rainbows
+   ------------------------------------------------------------------------------------------------ */
+
+/* Scattering angle of the bow of order k = 1, 2, ... in radians from the forward direction, by geometrical optics:
+   cos i = sqrt((n^2-1) / (k(k+2))). The bow stands at pi minus this (k = 1) or this minus pi (k = 2) from the
+   antisolar point. */
+RAINDROP_DEF double raindrop_bow_angle(int order, double n);
+/* Index of water at 20 degrees by wavelength, 380..780 nm. */
+RAINDROP_DEF double raindrop_water_index(double wavelength_nm);
+#ifndef RAINDROP_NO_BOW
+/* Share of the light scattered per steradian by orders 1 and 2, white light from a sun 0.53 degrees wide, linear
+   Rec. 709; bin i of `count` >= 16 covers scattering angles pi i/count .. pi (i+1)/count. */
+RAINDROP_DEF sat_result raindrop_bow_profile(float *rgb, int count);
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Rain. Lengths in metres (drop diameters in millimetres where the name says so), times in seconds, y up.
+   ------------------------------------------------------------------------------------------------ */
+
+/* Speed of fall at sea level, 1e-4..6 mm; rms 4 % from the table of Gunn and Kinzer 1949. */
+RAINDROP_DEF double raindrop_terminal_velocity(double diameter_mm);
+/* Height over width of a falling drop, Beard and Chuang 1987; 1 up to 0.4 mm. */
+RAINDROP_DEF double raindrop_oblateness(double diameter_mm);
+/* Drops per cubic metre and millimetre of diameter, Marshall and Palmer 1948. */
+RAINDROP_DEF double raindrop_marshall_palmer(double diameter_mm, double rate_mm_h);
+
+/* position, velocity: metres, m/s. radius: of the sphere of equal volume. axis_ratio: height over width, 1 = sphere. */
+typedef struct raindrop_drop { float position[3], radius, velocity[3], axis_ratio; } raindrop_drop;
+
+#ifndef RAINDROP_NO_RAIN
+/* One step of any length dt >= 0 under gravity and drag towards the terminal velocity in a steady wind (see NUMERICS);
+   dt = 0 changes nothing. SAT_ERR_ARGUMENT for what is not finite, radius <= 0 or dt < 0. */
+RAINDROP_DEF sat_result raindrop_fall(raindrop_drop *drop, const float wind[3], double dt);
+#endif
+
+typedef struct raindrop_rain_options {
+    double rate_mm_h;            /* 10; 0.01..500: sizes and number of the drops */
+    int count;                   /* 0: from rate_mm_h and the box; otherwise this many, 1..33554432 */
+    double diameter_mm;          /* 0: Marshall-Palmer; otherwise of all drops, 0.001..6 */
+    double diameter_min_mm, diameter_max_mm; /* 0.1, 6 */
+    float box_size[3];           /* 8, 8, 8: edges of the rain box. The published scene: 2.05 each, 1e6 drops of 2 mm */
+    float centre[3];             /* 0, 0, 0: of the box */
+    float wind[3];               /* 0, 0, 0 */
+    float speed;                 /* 0: terminal; otherwise all drops fall with it, as published */
+    int oblate;                  /* 0; 1: Beard-Chuang shapes */
+    uint32_t seed;               /* 1 */
+    const raindrop_drop *drops;  /* NULL; otherwise `count` drops of your own, copied; they never wrap */
+    sat_allocator allocator;     /* malloc; used by create and destroy only */
+    sat_threads threads;         /* serial; advance and render use it; same bits for any worker count */
+} raindrop_rain_options;
+RAINDROP_DEF raindrop_rain_options raindrop_rain_defaults(void);
+
+/* 88 bytes a drop, one allocation. Holds the scratch memory of raindrop_render too: one render at a time a rain. */
+typedef struct raindrop_rain raindrop_rain;
+RAINDROP_DEF sat_result raindrop_rain_create(raindrop_rain **out, const raindrop_rain_options *options);
+RAINDROP_DEF void raindrop_rain_destroy(raindrop_rain *rain);
+RAINDROP_DEF const raindrop_drop *raindrop_rain_drops(const raindrop_rain *rain, int *count);
+/* Replaces the drops by at most as many of your own, which never wrap: particles of another simulation. */
+RAINDROP_DEF sat_result raindrop_rain_set_drops(raindrop_rain *rain, const raindrop_drop *drops, int count);
+#ifndef RAINDROP_NO_RAIN
+/* Any dt >= 0; 0 pauses. Drops that leave the box below come back on top with the size of another drop (Marshall-Palmer
+   weighted by speed, as rain arrives at a plane); those that leave sideways come back on the other side. Needs no
+   time for drag while all drops have reached their terminal velocity. */
+RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt_seconds);
+RAINDROP_DEF sat_result raindrop_rain_set_wind(raindrop_rain *rain, const float wind[3]);
+RAINDROP_DEF sat_result raindrop_rain_set_centre(raindrop_rain *rain, const float centre[3]); /* at the next advance */
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Picture
+   ------------------------------------------------------------------------------------------------ */
+
+typedef struct raindrop_camera {
+    float position[3];               /* 0, 0, 0 */
+    float right[3], up[3], back[3];  /* x, y, z: orthonormal, looks along -back */
+    float velocity[3];               /* 0, 0, 0: streaks are relative to it */
+    float fov_y;                     /* pi/2; full vertical angle in radians, 0.001..3 */
+    float near_distance;             /* 0.01: drops that reach nearer are left out */
+    float exposure;                  /* 0 s: still drops; otherwise streaks around the drops' positions */
+    float aperture;                  /* 0 m: all in focus; otherwise diameter of a thin lens */
+    float focus_distance;            /* 3 m; along the viewing axis */
+} raindrop_camera;
+RAINDROP_DEF raindrop_camera raindrop_camera_defaults(void);
+/* The defaults, placed and turned: `up` only fixes the roll and may be parallel to the view. */
+RAINDROP_DEF raindrop_camera raindrop_camera_look(const float position[3], const float target[3], const float up[3],
+                                                  float fov_y);
+
+typedef enum raindrop_look {
+    RAINDROP_LOOK_MAP,    /* as published: square sprites of at least a pixel from the hierarchical map */
+    RAINDROP_LOOK_SPRITE, /* the same sprites from the closed form; no map */
+    RAINDROP_LOOK_RAY,    /* a ray a pixel: true perspective, antialiased rim */
+    RAINDROP_LOOK_AUTO    /* far drops as one lookup in the prefiltered environment, near ones as rays */
+} raindrop_look;
+
+typedef struct raindrop_render_options {
+    raindrop_look look;        /* RAINDROP_LOOK_AUTO */
+    const raindrop_map *map;   /* NULL; needed by RAINDROP_LOOK_MAP */
+    float far_radius;          /* 1.5 px; 0..64: AUTO takes smaller drops for far; more is faster and coarser */
+    float coverage_threshold;  /* 0.0001; 0..1: drops that cover less of a pixel are left out and counted */
+    int orders;                /* 1; 0..3: internal reflections, RAY and AUTO */
+    int exit_fresnel;          /* 0: the last order carries what later ones would (0 orders: eq 2.5); 1: only its own */
+    float orders_radius;       /* 8 px; smaller drops do with order 0 */
+    int sort;                  /* 1: far to near; 0: in the order of the array, as published */
+} raindrop_render_options;
+RAINDROP_DEF raindrop_render_options raindrop_render_defaults(void);
+
+/* How many drops were drawn, and why the others were not: the counts from `drawn_near` to `below_threshold` sum to `drops`. */
+typedef struct raindrop_render_stats {
+    size_t drops;
+    size_t drawn_near, drawn_far; /* by rays (or sprites); by one lookup */
+    size_t invalid;               /* radius not above 0, or something not finite */
+    size_t inside;                /* the eye is in the drop */
+    size_t behind, near_plane;    /* behind the camera; in front but nearer than near_distance */
+    size_t outside;               /* of the picture */
+    size_t hidden;                /* wholly behind the scene's depth */
+    size_t below_threshold;
+    double coverage_left_out;     /* pixels that those would have covered */
+    size_t fragments, order_fragments; /* pixels blended; those of them with orders >= 1 */
+} raindrop_render_stats;
+
+/* Blends the drops over the picture in rgb: 3 floats a pixel, rows `stride` bytes apart, linear radiance in the
+   environment's unit. depth: NULL, or width x height packed distances along the viewing axis in metres; what is not
+   above 0 or not finite is empty. Width and height 1..32768. No allocation. stats may be NULL. */
+RAINDROP_DEF sat_result raindrop_render(float *rgb, ptrdiff_t stride, int width, int height, const float *depth,
+                                        const raindrop_camera *camera, const raindrop_rain *rain,
+                                        const raindrop_environment *environment, const raindrop_render_options *options,
+                                        raindrop_render_stats *stats);
+
+/* The environment as a background picture for that camera. */
+RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride, int width, int height,
+                                                    const raindrop_camera *camera, const raindrop_environment *environment,
+                                                    const sat_threads *threads);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* RAINDROP_H */
+
+/* ------------------------------------------------------------------------------------------------
+   Stop here if you only want to use the library.
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(RAINDROP_IMPLEMENTATION) && !defined(RAINDROP_IMPLEMENTED)
+#define RAINDROP_IMPLEMENTED
+#ifndef SAT_SIBLING
+#define SAT_SIBLING
+#endif
+#if defined(RAINDROP_GL) && !defined(SAT_SIBLING_GL)
+#define SAT_SIBLING_GL
+#endif
+#include "sat.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define RAINDROP__PI 3.14159265358979323846
+
+RAINDROP_DEF int raindrop_version(void) { return RAINDROP_VERSION; }
+
+/* ---- small things */
+
+static inline float raindrop__dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static inline void raindrop__set(float out[3], float x, float y, float z)
+{
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
+}
+
+/* out = a x + b y */
+static inline void raindrop__combine(float out[3], float a, const float x[3], float b, const float y[3])
+{
+    raindrop__set(out, a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2]);
+}
+
+static inline void raindrop__normalise(float v[3])
+{
+    float length = sqrtf(raindrop__dot(v, v)), scale = length > 0 ? 1 / length : 0;
+    raindrop__set(v, v[0] * scale, v[1] * scale, v[2] * scale);
+}
+
+static inline float raindrop__clamp(float v, float low, float high) { return v > low ? v < high ? v : high : low; } /* NaN: low */
+
+static inline int raindrop__finite3(const float v[3])
+{
+    return sat__is_finite(v[0]) && sat__is_finite(v[1]) && sat__is_finite(v[2]);
+}
+
+/* Random bits for the i-th number of a stream: the same on CPU and GPU, in any order (a mixing of 32-bit words by
+   multiplication and shifts, after Wellons' lowbias32). */
+static inline uint32_t raindrop__mix(uint32_t v)
+{
+    v = (v ^ (v >> 16)) * 0x7feb352du;
+    v = (v ^ (v >> 15)) * 0x846ca68bu;
+    return v ^ (v >> 16);
+}
+static inline uint32_t raindrop__hash(uint32_t seed, uint32_t stream, uint32_t i)
+{
+    return raindrop__mix(i ^ raindrop__mix(stream ^ raindrop__mix(seed ^ 0x9e3779b9u)));
+}
+static inline float raindrop__uniform(uint32_t bits) { return ((float)(bits >> 9) + 0.5f) * (1.0f / 8388608.0f); } /* (0, 1) */
+
+/* ---- as many floats at a time as the compiler was told to use; one function a sum, the same text for all widths */
+
+#if defined(SAT__AVX2)
+enum { RAINDROP__LANES = 8 };
+typedef __m256 raindrop__v;
+static inline raindrop__v raindrop__load(const float *p) { return _mm256_loadu_ps(p); }
+static inline void raindrop__store(float *p, raindrop__v v) { _mm256_storeu_ps(p, v); }
+static inline raindrop__v raindrop__splat(float v) { return _mm256_set1_ps(v); }
+static inline raindrop__v raindrop__add(raindrop__v a, raindrop__v b) { return _mm256_add_ps(a, b); }
+static inline raindrop__v raindrop__sub(raindrop__v a, raindrop__v b) { return _mm256_sub_ps(a, b); }
+static inline raindrop__v raindrop__mul(raindrop__v a, raindrop__v b) { return _mm256_mul_ps(a, b); }
+static inline raindrop__v raindrop__div(raindrop__v a, raindrop__v b) { return _mm256_div_ps(a, b); }
+static inline raindrop__v raindrop__min(raindrop__v a, raindrop__v b) { return _mm256_min_ps(a, b); }
+static inline raindrop__v raindrop__max(raindrop__v a, raindrop__v b) { return _mm256_max_ps(a, b); }
+static inline raindrop__v raindrop__sqrt(raindrop__v a) { return _mm256_sqrt_ps(a); }
+static inline raindrop__v raindrop__abs(raindrop__v a) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), a); }
+static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindrop__v yes, raindrop__v no)
+{
+    return _mm256_blendv_ps(no, yes, _mm256_cmp_ps(a, b, _CMP_LT_OQ));
+}
+#elif defined(SAT__VECTOR)
+enum { RAINDROP__LANES = 4 };
+typedef sat__f32x4 raindrop__v;
+static inline raindrop__v raindrop__load(const float *p) { return sat__f32x4_load(p); }
+static inline void raindrop__store(float *p, raindrop__v v) { sat__f32x4_store(p, v); }
+static inline raindrop__v raindrop__splat(float v) { return sat__f32x4_set1(v); }
+static inline raindrop__v raindrop__add(raindrop__v a, raindrop__v b) { return sat__f32x4_add(a, b); }
+static inline raindrop__v raindrop__sub(raindrop__v a, raindrop__v b) { return sat__f32x4_sub(a, b); }
+static inline raindrop__v raindrop__mul(raindrop__v a, raindrop__v b) { return sat__f32x4_mul(a, b); }
+static inline raindrop__v raindrop__div(raindrop__v a, raindrop__v b) { return sat__f32x4_div(a, b); }
+static inline raindrop__v raindrop__min(raindrop__v a, raindrop__v b) { return sat__f32x4_min(a, b); }
+static inline raindrop__v raindrop__max(raindrop__v a, raindrop__v b) { return sat__f32x4_max(a, b); }
+static inline raindrop__v raindrop__sqrt(raindrop__v a) { return sat__f32x4_sqrt(a); }
+static inline raindrop__v raindrop__abs(raindrop__v a) { return sat__f32x4_abs(a); }
+static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindrop__v yes, raindrop__v no)
+{
+    return sat__f32x4_select(sat__f32x4_less(a, b), yes, no);
+}
+#else
+enum { RAINDROP__LANES = 1 };
+typedef float raindrop__v;
+static inline raindrop__v raindrop__load(const float *p) { return *p; }
+static inline void raindrop__store(float *p, raindrop__v v) { *p = v; }
+static inline raindrop__v raindrop__splat(float v) { return v; }
+static inline raindrop__v raindrop__add(raindrop__v a, raindrop__v b) { return a + b; }
+static inline raindrop__v raindrop__sub(raindrop__v a, raindrop__v b) { return a - b; }
+static inline raindrop__v raindrop__mul(raindrop__v a, raindrop__v b) { return a * b; }
+static inline raindrop__v raindrop__div(raindrop__v a, raindrop__v b) { return a / b; }
+static inline raindrop__v raindrop__min(raindrop__v a, raindrop__v b) { return a < b ? a : b; } /* NaN: b, as SSE2 */
+static inline raindrop__v raindrop__max(raindrop__v a, raindrop__v b) { return a > b ? a : b; }
+static inline raindrop__v raindrop__sqrt(raindrop__v a) { return sqrtf(a); }
+static inline raindrop__v raindrop__abs(raindrop__v a) { return fabsf(a); }
+static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindrop__v yes, raindrop__v no) { return a < b ? yes : no; }
+#endif
+
+static inline raindrop__v raindrop__dot_v(const raindrop__v a[3], const raindrop__v b[3])
+{
+    return raindrop__add(raindrop__add(raindrop__mul(a[0], b[0]), raindrop__mul(a[1], b[1])), raindrop__mul(a[2], b[2]));
+}
+
+/* ------------------------------------------------------------------------------------------------
+   One ray and one drop
+
+   In the plane of incidence sin i = b and sin r = b/n. Each refraction turns the ray by i - r towards the axis and each
+   internal reflection by pi - 2r; the mirrored ray turns by pi - 2i. None of it depends on the distance of the eye, and
+   with ci = cos i = sqrt(1 - b^2) and cr = cos r it needs no angle:
+
+       sin(i-r) = b (cr - ci/n) = b sd,      cos(i-r) = ci cr + b^2/n = cd
+       refract  = (1 - 2 b^2 sd^2) d - 2 sd cd p,      reflect = (2b^2 - 1) d + 2 ci p
+
+   where 1 - 2 b^2 sd^2 is cos 2(i-r), written so that n = 1 gives d itself. The exit has the entry's Fresnel factors.
+
+   A pencil of rays widens by the derivative of the angle turned along the radius and by sin(angle)/b across it. The
+   footprint is their geometric mean, which keeps the pencil's solid angle: 2 for the mirrored ray, everywhere (a ball
+   scatters evenly), and finite enough at the rim that a lookup there does not gather the whole sky.
+   ------------------------------------------------------------------------------------------------ */
+
+/* The angles of one ray as above; what both the single ray and the orders need. */
+typedef struct raindrop__optics {
+    float b2, ci, cr, sd, cd;
+    float fs, fp;           /* Fresnel reflectances of the two polarisations */
+    float per_ci, per_n_cr; /* 1/ci and 1/(n cr): d(i)/db and d(r)/db */
+    int total;              /* totally reflected */
+} raindrop__optics;
+
+#define RAINDROP__TINY 1e-12f /* keeps 0/0 away at the rim when n = 1 */
+#define RAINDROP__RIM 1e-6f   /* bounds 1/cos at the rim */
+
+static inline raindrop__optics raindrop__refract(float one_minus_b2, float n)
+{
+    raindrop__optics o;
+    float per_n = 1 / n, inside, a, c;
+    one_minus_b2 = raindrop__clamp(one_minus_b2, 0, 1);
+    o.b2 = 1 - one_minus_b2;
+    inside = (one_minus_b2 + (n - 1) * (n + 1)) * per_n * per_n; /* 1 - b^2/n^2; below 0: totally reflected */
+    o.ci = sqrtf(one_minus_b2);
+    o.total = inside <= 0 && n < 1;
+    o.cr = inside > 0 ? sqrtf(inside) : 0;
+    o.cd = o.ci * o.cr + o.b2 * per_n;
+    o.sd = o.cr - o.ci * per_n;
+    a = (o.ci - n * o.cr) / (o.ci + n * o.cr + RAINDROP__TINY);
+    c = (n * o.ci - o.cr) / (n * o.ci + o.cr + RAINDROP__TINY);
+    o.fs = o.total ? 1 : a * a;
+    o.fp = o.total ? 1 : c * c;
+    o.per_ci = 1 / (o.ci + RAINDROP__RIM);
+    o.per_n_cr = 1 / (n * o.cr + RAINDROP__RIM);
+    return o;
+}
+
+RAINDROP_DEF void raindrop_trace(raindrop_ray *out, const float direction[3], const float centre_offset[3],
+                                 float one_minus_b2, float n)
+{
+    raindrop__optics o = raindrop__refract(one_minus_b2, n);
+    raindrop__combine(out->reflect, 2 * o.b2 - 1, direction, 2 * o.ci, centre_offset);
+    if (o.total) raindrop__set(out->refract, out->reflect[0], out->reflect[1], out->reflect[2]);
+    else raindrop__combine(out->refract, 1 - 2 * o.b2 * o.sd * o.sd, direction, -2 * o.sd * o.cd, centre_offset);
+    out->fresnel = 0.5f * (o.fs + o.fp);
+    out->transmit = 0.5f * ((1 - o.fs) * (1 - o.fs) + (1 - o.fp) * (1 - o.fp));
+    out->footprint_reflect = 2;
+    out->footprint_refract = o.total ? 2 : 2 * sqrtf(fabsf((o.per_ci - o.per_n_cr) * o.sd * o.cd));
+}
+
+/* The same for RAINDROP__LANES rays, without branches: a totally reflected lane takes its values by selection. */
+typedef struct raindrop__rays { raindrop__v reflect[3], refract[3], fresnel, transmit, footprint_reflect, footprint_refract; } raindrop__rays;
+
+static inline void raindrop__trace_v(raindrop__rays *out, const raindrop__v d[3], const raindrop__v p[3], raindrop__v one_minus_b2, float n)
+{
+    const raindrop__v zero = raindrop__splat(0), one = raindrop__splat(1), two = raindrop__splat(2), per_n = raindrop__splat(1 / n);
+    const raindrop__v index = raindrop__splat(n), tiny = raindrop__splat(RAINDROP__TINY), rim = raindrop__splat(RAINDROP__RIM);
+    const raindrop__v total_below = raindrop__splat(n < 1 ? 0 : -1.0f);
+    raindrop__v m = raindrop__min(raindrop__max(one_minus_b2, zero), one), b2 = raindrop__sub(one, m);
+    raindrop__v inside = raindrop__mul(raindrop__add(m, raindrop__splat((n - 1) * (n + 1))), raindrop__mul(per_n, per_n));
+    raindrop__v ci = raindrop__sqrt(m), cr = raindrop__sqrt(raindrop__max(inside, zero));
+    raindrop__v cd = raindrop__add(raindrop__mul(ci, cr), raindrop__mul(b2, per_n)), sd = raindrop__sub(cr, raindrop__mul(ci, per_n));
+    raindrop__v n_cr = raindrop__mul(index, cr), n_ci = raindrop__mul(index, ci);
+    raindrop__v a = raindrop__div(raindrop__sub(ci, n_cr), raindrop__add(raindrop__add(ci, n_cr), tiny));
+    raindrop__v c = raindrop__div(raindrop__sub(n_ci, cr), raindrop__add(raindrop__add(n_ci, cr), tiny));
+    raindrop__v below = raindrop__sub(inside, tiny); /* so that 0 itself counts as totally reflected when n < 1 */
+    raindrop__v fs = raindrop__if_less(below, total_below, one, raindrop__mul(a, a));
+    raindrop__v fp = raindrop__if_less(below, total_below, one, raindrop__mul(c, c));
+    raindrop__v along = raindrop__sub(one, raindrop__mul(raindrop__mul(two, b2), raindrop__mul(sd, sd)));
+    raindrop__v across = raindrop__mul(raindrop__mul(two, sd), cd);
+    raindrop__v mirror = raindrop__sub(raindrop__mul(two, b2), one), outward = raindrop__mul(two, ci);
+    raindrop__v per_ci = raindrop__div(one, raindrop__add(ci, rim)), per_n_cr = raindrop__div(one, raindrop__add(n_cr, rim));
+    raindrop__v ts = raindrop__sub(one, fs), tp = raindrop__sub(one, fp);
+    int i;
+    for (i = 0; i < 3; i++) {
+        out->reflect[i] = raindrop__add(raindrop__mul(mirror, d[i]), raindrop__mul(outward, p[i]));
+        out->refract[i] = raindrop__sub(raindrop__mul(along, d[i]), raindrop__mul(across, p[i]));
+        out->refract[i] = raindrop__if_less(below, total_below, out->reflect[i], out->refract[i]);
+    }
+    out->fresnel = raindrop__mul(raindrop__splat(0.5f), raindrop__add(fs, fp));
+    out->transmit = raindrop__mul(raindrop__splat(0.5f), raindrop__add(raindrop__mul(ts, ts), raindrop__mul(tp, tp)));
+    out->footprint_reflect = two;
+    out->footprint_refract = raindrop__mul(two, raindrop__sqrt(raindrop__abs(raindrop__mul(raindrop__sub(per_ci, per_n_cr), raindrop__mul(sd, cd)))));
+    out->footprint_refract = raindrop__if_less(below, total_below, two, out->footprint_refract);
+}
+
+static inline void raindrop__keep(float *out, int at, raindrop__v v)
+{
+    if (out) raindrop__store(out + at, v);
+}
+
+static inline void raindrop__trace_block(const raindrop_ray_outputs *out, const raindrop_ray_inputs *in, int at, float n)
+{
+    raindrop__v d[3], p[3];
+    raindrop__rays rays;
+    int i;
+    for (i = 0; i < 3; i++) {
+        d[i] = raindrop__load(in->direction[i] + at);
+        p[i] = raindrop__load(in->centre_offset[i] + at);
+    }
+    raindrop__trace_v(&rays, d, p, raindrop__load(in->one_minus_b2 + at), n);
+    for (i = 0; i < 3; i++) {
+        raindrop__keep(out->reflect[i], at, rays.reflect[i]);
+        raindrop__keep(out->refract[i], at, rays.refract[i]);
+    }
+    raindrop__keep(out->fresnel, at, rays.fresnel);
+    raindrop__keep(out->transmit, at, rays.transmit);
+    raindrop__keep(out->footprint_reflect, at, rays.footprint_reflect);
+    raindrop__keep(out->footprint_refract, at, rays.footprint_refract);
+}
+
+/* One ray of the arrays by itself: what is left after the last whole block. */
+static inline void raindrop__trace_one(const raindrop_ray_outputs *out, const raindrop_ray_inputs *in, int at, float n)
+{
+    raindrop_ray ray;
+    float d[3], p[3];
+    int i;
+    for (i = 0; i < 3; i++) {
+        d[i] = in->direction[i][at];
+        p[i] = in->centre_offset[i][at];
+    }
+    raindrop_trace(&ray, d, p, in->one_minus_b2[at], n);
+    for (i = 0; i < 3; i++) {
+        if (out->reflect[i]) out->reflect[i][at] = ray.reflect[i];
+        if (out->refract[i]) out->refract[i][at] = ray.refract[i];
+    }
+    if (out->fresnel) out->fresnel[at] = ray.fresnel;
+    if (out->transmit) out->transmit[at] = ray.transmit;
+    if (out->footprint_reflect) out->footprint_reflect[at] = ray.footprint_reflect;
+    if (out->footprint_refract) out->footprint_refract[at] = ray.footprint_refract;
+}
+
+RAINDROP_DEF void raindrop_trace_n(const raindrop_ray_outputs *out, const raindrop_ray_inputs *in, int count, float n)
+{
+    int at = 0;
+    for (; at + RAINDROP__LANES <= count; at += RAINDROP__LANES) raindrop__trace_block(out, in, at, n);
+    for (; at < count; at++) raindrop__trace_one(out, in, at, n);
+}
+
+/* Order k turns the ray by 2(i-r) + k(pi-2r) towards the axis: a product of complex numbers of modulus 1. Of each
+   polarisation it carries (1-F)^2 F^k, and (1-F) F^k together with all later orders. */
+RAINDROP_DEF void raindrop_trace_order(raindrop_order *out, const float direction[3], const float centre_offset[3],
+                                       float one_minus_b2, float n, int k)
+{
+    raindrop__optics o = raindrop__refract(one_minus_b2, n);
+    /* re + i b im: the sine is kept divided by b, which is 0 at the centre */
+    float re = 1 - 2 * o.b2 * o.sd * o.sd, im = 2 * o.sd * o.cd;
+    float turn_re = 2 * o.b2 / (n * n) - 1, turn_im = 2 * o.cr / n, power_s = 1, power_p = 1;
+    int i;
+    if (k < 0) k = 0;
+    for (i = 0; i < k; i++) {
+        float next = re * turn_re - o.b2 * im * turn_im;
+        im = im * turn_re + re * turn_im;
+        re = next;
+        power_s *= o.fs;
+        power_p *= o.fp;
+    }
+    raindrop__combine(out->direction, re, direction, -im, centre_offset);
+    out->rest = o.total ? 0 : 0.5f * ((1 - o.fs) * power_s + (1 - o.fp) * power_p);
+    out->weight = o.total ? 0 : 0.5f * ((1 - o.fs) * (1 - o.fs) * power_s + (1 - o.fp) * (1 - o.fp) * power_p);
+    out->footprint = sqrtf(fabsf(2 * (o.per_ci - (float)(k + 1) * o.per_n_cr) * im));
+}
+
+/* The point (s, t) of the silhouette disc lies at the tangent of its angle, tan(alpha) = |(s,t)| / sqrt(D^2-1), and
+   1 - b^2 = (1 - s^2 - t^2) cos^2(alpha): no difference of large numbers (p = t d - c loses three digits at D = 1000). */
+RAINDROP_DEF void raindrop_sprite_ray(float direction[3], float centre_offset[3], float *one_minus_b2, float s, float t,
+                                      float distance)
+{
+    double away = (double)distance, scale = 1 / sqrt((away - 1) * (away + 1)), x = (double)s, y = (double)t, rho2 = x * x + y * y, cos2;
+    if (rho2 > 1) {
+        scale /= sqrt(rho2);
+        rho2 = 1;
+    }
+    x *= scale;
+    y *= scale;
+    cos2 = 1 / (1 + x * x + y * y);
+    raindrop__set(direction, (float)(x * sqrt(cos2)), (float)(y * sqrt(cos2)), (float)-sqrt(cos2));
+    /* p = q - (q.d) d for the point q = D (x, y, 0) of the ray beside the centre */
+    raindrop__set(centre_offset, (float)(away * x * cos2), (float)(away * y * cos2), (float)(away * (1 - cos2)));
+    *one_minus_b2 = (float)((1 - rho2) * cos2);
+}
+
+/* ---- flattened drops: two quadric hits in the space where the drop is a sphere */
+
+/* Snell's law: direction d meets the surface of unit normal `normal` (against d) from index 1 to index n; 0: totally reflected. */
+static inline int raindrop__snell(float out[3], const float d[3], const float normal[3], float n)
+{
+    float ci = -raindrop__dot(d, normal), per_n = 1 / n, inside = 1 - (1 - ci * ci) * per_n * per_n;
+    if (inside < 0) return 0;
+    raindrop__combine(out, per_n, d, ci * per_n - sqrtf(inside), normal);
+    return 1;
+}
+
+/* Fresnel's factors and the footprint of a ray through a drop whose entry has these cosines. */
+static inline void raindrop__surface(raindrop_ray *out, float ci, float cr, float n)
+{
+    float a = (ci - n * cr) / (ci + n * cr + RAINDROP__TINY), c = (n * ci - cr) / (n * ci + cr + RAINDROP__TINY);
+    float turn = (cr - ci / n) * (ci * cr + (1 - ci * ci) / n);
+    out->fresnel = 0.5f * (a * a + c * c);
+    out->transmit = 0.5f * ((1 - a * a) * (1 - a * a) + (1 - c * c) * (1 - c * c));
+    out->footprint_refract = 2 * sqrtf(fabsf((1 / (ci + RAINDROP__RIM) - 1 / (n * cr + RAINDROP__RIM)) * turn));
+}
+
+RAINDROP_DEF int raindrop_trace_spheroid(raindrop_ray *out, const float direction[3], const float centre_offset[3],
+                                         float axis_ratio, float n)
+{
+    float stretch = 1 / axis_ratio, d2, along, half, ci, q[3], hit[3], normal[3], inner[3], leave[3], unit[3];
+    /* in the stretched space: ray q + t unit, sphere of radius 1 */
+    raindrop__set(unit, direction[0], direction[1] * stretch, direction[2]);
+    d2 = raindrop__dot(unit, unit);
+    raindrop__set(q, centre_offset[0], centre_offset[1] * stretch, centre_offset[2]);
+    along = raindrop__dot(q, unit) / d2;
+    raindrop__combine(q, 1, q, -along, unit);
+    half = 1 - raindrop__dot(q, q);
+    if (!(half >= 0) || !(axis_ratio > 0)) return 0;
+    raindrop__combine(hit, 1, q, -sqrtf(half / d2), unit);
+    raindrop__set(normal, hit[0], hit[1] * stretch, hit[2]);
+    raindrop__normalise(normal);
+    ci = -raindrop__dot(direction, normal);
+    raindrop__combine(out->reflect, 1, direction, 2 * ci, normal);
+    out->footprint_reflect = 2;
+    if (!raindrop__snell(inner, direction, normal, n)) {
+        raindrop__set(out->refract, out->reflect[0], out->reflect[1], out->reflect[2]);
+        out->fresnel = 1;
+        out->transmit = 0;
+        out->footprint_refract = 2;
+        return 1;
+    }
+    raindrop__surface(out, ci, -raindrop__dot(inner, normal), n);
+    /* the far hit, then out: the normal now points inwards */
+    raindrop__set(unit, inner[0], inner[1] * stretch, inner[2]);
+    along = -2 * raindrop__dot(hit, unit) / raindrop__dot(unit, unit);
+    raindrop__combine(hit, 1, hit, along, unit);
+    raindrop__set(normal, -hit[0], -hit[1] * stretch, -hit[2]);
+    raindrop__normalise(normal);
+    if (!raindrop__snell(leave, inner, normal, 1 / n)) { /* the rim of a flat drop: mirrored inside, rare; straight on */
+        out->transmit = 0;
+        raindrop__set(leave, inner[0], inner[1], inner[2]);
+    }
+    raindrop__set(out->refract, leave[0], leave[1], leave[2]);
+    return 1;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   The published maps
+   ------------------------------------------------------------------------------------------------ */
+
+#ifndef RAINDROP_NO_MAP
+struct raindrop_map {
+    int base, levels;
+    float n;
+    const float *level[13];
+    float *texels;
+    sat_allocator allocator;
+    size_t bytes;
+};
+
+/* tan(theta_i) = 2^-i, so that the drop fills the picture: D_i = 1/sin(theta_i) */
+RAINDROP_DEF double raindrop_map_distance(int level) { return sqrt(1 + ldexp(1.0, 2 * level)); }
+
+/* Share of a texel of half width h around (s, t) that the unit disc covers: 1 or 0, or counted where the rim passes. */
+static inline float raindrop__map_alpha(float s, float t, float h, int samples, uint32_t stream)
+{
+    float near_s = fabsf(s) > h ? fabsf(s) - h : 0, near_t = fabsf(t) > h ? fabsf(t) - h : 0, far_s = fabsf(s) + h, far_t = fabsf(t) + h;
+    int i, covered = 0;
+    if (near_s * near_s + near_t * near_t >= 1) return 0;
+    if (far_s * far_s + far_t * far_t <= 1) return 1;
+    for (i = 0; i < samples; i++) {
+        float a = s + h * (2 * raindrop__uniform(raindrop__hash(1, stream, 2 * (uint32_t)i)) - 1);
+        float b = t + h * (2 * raindrop__uniform(raindrop__hash(1, stream, 2 * (uint32_t)i + 1)) - 1);
+        covered += a * a + b * b < 1;
+    }
+    return (float)covered / (float)samples;
+}
+
+/* A texel holds the vectors of its centre (moved to the rim where the centre misses the drop) and its alpha. */
+static inline void raindrop__map_fill(float *texels, int resolution, int level, float n, int alpha_samples)
+{
+    float distance = (float)raindrop_map_distance(level), h = 1 / (float)resolution;
+    int x, y;
+    for (y = 0; y < resolution; y++) {
+        for (x = 0; x < resolution; x++, texels += 8) {
+            float s = (float)(2 * x + 1) * h - 1, t = (float)(2 * y + 1) * h - 1, d[3], p[3], m, rho = sqrtf(s * s + t * t);
+            float alpha = raindrop__map_alpha(s, t, h, alpha_samples, raindrop__hash((uint32_t)level, (uint32_t)x, (uint32_t)y));
+            raindrop_ray ray;
+            memset(texels, 0, 8 * sizeof *texels);
+            if (!(alpha > 0)) continue;
+            if (rho > 0.9999f) {
+                s *= 0.9999f / rho;
+                t *= 0.9999f / rho;
+            }
+            raindrop_sprite_ray(d, p, &m, s, t, distance);
+            raindrop_trace(&ray, d, p, m, n);
+            raindrop__set(texels, ray.reflect[0], ray.reflect[1], ray.reflect[2]);
+            texels[3] = ray.fresnel;
+            raindrop__set(texels + 4, ray.refract[0], ray.refract[1], ray.refract[2]);
+            texels[7] = alpha;
+        }
+    }
+}
+
+RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, int base_resolution, int alpha_samples, float n,
+                                            const sat_allocator *allocator)
+{
+    static const sat_allocator none = {0, 0, 0};
+    sat_allocator memory;
+    sat__arena arena = {0, 0, 0};
+    raindrop_map *map;
+    float *texels;
+    void *block;
+    size_t count = 0;
+    int level, r;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (base_resolution < 1 || base_resolution > 4096 || (base_resolution & (base_resolution - 1))) return SAT_ERR_ARGUMENT;
+    if (alpha_samples < 1 || alpha_samples > 4096 || !sat__is_finite(n) || !(n > 0)) return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(&memory, allocator ? allocator : &none)) return SAT_ERR_ARGUMENT;
+    for (r = base_resolution; r; r >>= 1) count += (size_t)r * (size_t)r;
+    sat__carve(&arena, 1, sizeof *map);
+    sat__carve(&arena, count, 8 * sizeof(float));
+    if (arena.overflow) return SAT_ERR_SIZE;
+    block = sat__alloc(&memory, arena.used);
+    if (!block) return SAT_ERR_MEMORY;
+    map = (raindrop_map *)block;
+    map->allocator = memory;
+    map->bytes = arena.used;
+    arena.base = (unsigned char *)block;
+    arena.used = 0;
+    sat__carve(&arena, 1, sizeof *map);
+    map->texels = texels = (float *)(void *)sat__carve(&arena, count, 8 * sizeof(float));
+    map->base = base_resolution;
+    map->n = n;
+    for (level = 0, r = base_resolution; r; r >>= 1, level++) {
+        map->level[level] = texels;
+        raindrop__map_fill(texels, r, level, n, alpha_samples);
+        texels += (size_t)r * (size_t)r * 8;
+    }
+    map->levels = level;
+    *out = map;
+    return SAT_OK;
+}
+
+RAINDROP_DEF void raindrop_map_destroy(raindrop_map *map)
+{
+    if (map) {
+        sat_allocator memory = map->allocator;
+        sat__release(&memory, map, map->bytes);
+    }
+}
+
+RAINDROP_DEF int raindrop_map_levels(const raindrop_map *map) { return map ? map->levels : 0; }
+
+RAINDROP_DEF const float *raindrop_map_level(const raindrop_map *map, int level, int *resolution)
+{
+    if (!map || level < 0 || level >= map->levels) return NULL;
+    if (resolution) *resolution = map->base >> level;
+    return map->level[level];
+}
+
+RAINDROP_DEF sat_result raindrop_map_level_half(uint16_t *out, const raindrop_map *map, int level)
+{
+    int resolution = 0;
+    const float *texels = raindrop_map_level(map, level, &resolution);
+    size_t i, count = 8 * (size_t)resolution * (size_t)resolution;
+    if (!out || !texels) return SAT_ERR_ARGUMENT;
+    for (i = 0; i < count; i++) out[i] = sat__half_from_float(texels[i]);
+    return SAT_OK;
+}
+
+static inline void raindrop__map_bilinear(float out[8], const raindrop_map *map, int level, float s, float t)
+{
+    int r = map->base >> level, i;
+    float x = (s * 0.5f + 0.5f) * (float)r - 0.5f, y = (t * 0.5f + 0.5f) * (float)r - 0.5f, fx = floorf(x), fy = floorf(y);
+    float a = x - fx, b = y - fy, w00 = (1 - a) * (1 - b), w10 = a * (1 - b), w01 = (1 - a) * b, w11 = a * b;
+    size_t x0 = (size_t)sat__clamp_int((int)fx, 0, r - 1), x1 = (size_t)sat__clamp_int((int)fx + 1, 0, r - 1);
+    size_t y0 = (size_t)sat__clamp_int((int)fy, 0, r - 1) * (size_t)r, y1 = (size_t)sat__clamp_int((int)fy + 1, 0, r - 1) * (size_t)r;
+    const float *p00 = map->level[level] + 8 * (y0 + x0), *p10 = map->level[level] + 8 * (y0 + x1);
+    const float *p01 = map->level[level] + 8 * (y1 + x0), *p11 = map->level[level] + 8 * (y1 + x1);
+    for (i = 0; i < 8; i++) out[i] = w00 * p00[i] + w10 * p10[i] + w01 * p01[i] + w11 * p11[i];
+}
+
+/* Levels stand for distances, so the level is log2 sqrt(D^2-1) whatever the size of the picture: what a GPU finds from
+   the sprite's size holds only for a base as high as the picture with a field of 90 degrees (bias log2(2 f/base)). */
+static inline float raindrop__map_lod(float distance2) { return distance2 > 2 ? 0.5f * log2f(distance2 - 1) : 0; }
+
+static inline void raindrop__map_trilinear(float out[8], const raindrop_map *map, float s, float t, float lod)
+{
+    int level, i;
+    float f, coarse[8];
+    lod = raindrop__clamp(lod, 0, (float)(map->levels - 1));
+    level = (int)lod;
+    f = lod - (float)level;
+    raindrop__map_bilinear(out, map, level, s, t);
+    if (!(f > 0)) return;
+    raindrop__map_bilinear(coarse, map, level + 1, s, t);
+    for (i = 0; i < 8; i++) out[i] += (coarse[i] - out[i]) * f;
+}
+
+RAINDROP_DEF void raindrop_map_sample(float out[8], const raindrop_map *map, float s, float t, float distance)
+{
+    raindrop__map_trilinear(out, map, raindrop__clamp(s, -1, 1), raindrop__clamp(t, -1, 1), raindrop__map_lod(distance * distance));
+}
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Environment
+
+   A direction is folded onto an octahedron and that onto a square (y is the folded axis): no angles, one picture, and
+   texels whose solid angle is 1/|p|^3 of their area, |p| being the length of the point on the octahedron. Each level
+   has a border of one texel, copied from where the square's edge continues, so that bilinear lookups need no case.
+   ------------------------------------------------------------------------------------------------ */
+
+typedef struct raindrop__sphere {
+    float *texels; /* 4 floats each: RGB and 0 */
+    int resolution, levels;
+    size_t offset[13]; /* of each level, in floats */
+} raindrop__sphere;
+
+struct raindrop_environment {
+    raindrop__sphere near_sphere, far_sphere;
+    raindrop_filter filter;
+    sat_table *table;
+    int table_width, table_height;
+    float n;
+    sat_allocator allocator;
+    size_t bytes;
+};
+
+static inline size_t raindrop__sphere_size(raindrop__sphere *sphere, int resolution, int levels)
+{
+    size_t size = 0;
+    int level;
+    sphere->resolution = resolution;
+    sphere->levels = levels;
+    for (level = 0; level < levels; level++) {
+        size_t side = (size_t)(resolution >> level) + 2;
+        sphere->offset[level] = size;
+        size += 4 * side * side;
+    }
+    return size;
+}
+
+static inline float *raindrop__texel(const raindrop__sphere *sphere, int level, int x, int y)
+{
+    size_t side = (size_t)(sphere->resolution >> level) + 2;
+    return sphere->texels + sphere->offset[level] + 4 * (((size_t)(y + 1)) * side + (size_t)(x + 1));
+}
+
+/* Direction to the unit square; returns the direction's |x|+|y|+|z| over its length, 1 .. sqrt(3). */
+static inline float raindrop__fold(float uv[2], const float d[3])
+{
+    float sum = fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]), scale = sum > 0 ? 1 / sum : 0, a = d[0] * scale, b = d[2] * scale;
+    if (d[1] < 0) {
+        float c = a;
+        a = copysignf(1 - fabsf(b), a);
+        b = copysignf(1 - fabsf(c), b);
+    }
+    uv[0] = raindrop__clamp(a * 0.5f + 0.5f, 0, 1);
+    uv[1] = raindrop__clamp(b * 0.5f + 0.5f, 0, 1);
+    return sum / sqrtf(raindrop__dot(d, d));
+}
+
+/* Square to a point of the octahedron (not normalised). */
+static inline void raindrop__unfold(float d[3], float u, float v)
+{
+    float a = 2 * u - 1, b = 2 * v - 1, y = 1 - fabsf(a) - fabsf(b);
+    if (y < 0) {
+        float c = a;
+        a = copysignf(1 - fabsf(b), a);
+        b = copysignf(1 - fabsf(c), b);
+    }
+    raindrop__set(d, a, y, b);
+}
+
+static inline void raindrop__fill_border(const raindrop__sphere *sphere, int level)
+{
+    int r = sphere->resolution >> level, i;
+    for (i = 0; i < r; i++) {
+        memcpy(raindrop__texel(sphere, level, i, -1), raindrop__texel(sphere, level, r - 1 - i, 0), 4 * sizeof(float));
+        memcpy(raindrop__texel(sphere, level, i, r), raindrop__texel(sphere, level, r - 1 - i, r - 1), 4 * sizeof(float));
+        memcpy(raindrop__texel(sphere, level, -1, i), raindrop__texel(sphere, level, 0, r - 1 - i), 4 * sizeof(float));
+        memcpy(raindrop__texel(sphere, level, r, i), raindrop__texel(sphere, level, r - 1, r - 1 - i), 4 * sizeof(float));
+    }
+    for (i = 0; i < 4; i++)
+        memcpy(raindrop__texel(sphere, level, i & 1 ? r : -1, i & 2 ? r : -1),
+               raindrop__texel(sphere, level, i & 1 ? 0 : r - 1, i & 2 ? 0 : r - 1), 4 * sizeof(float));
+}
+
+/* Area to solid angle, up to a constant. */
+static inline float raindrop__texel_weight(int x, int y, int r)
+{
+    float d[3], p2;
+    raindrop__unfold(d, ((float)x + 0.5f) / (float)r, ((float)y + 0.5f) / (float)r);
+    p2 = raindrop__dot(d, d);
+    return 1 / (p2 * sqrtf(p2));
+}
+
+/* Every level holds solid-angle means of the one below: the top is the mean of the whole sphere. The weights of a
+   coarse texel are the sums of those of its four, so that the means of means stay exact. */
+static inline void raindrop__build_level(const raindrop__sphere *sphere, int level)
+{
+    int r = sphere->resolution >> level, x, y, c, k;
+    for (y = 0; y < r; y++) {
+        for (x = 0; x < r; x++) {
+            float *out = raindrop__texel(sphere, level, x, y);
+            double sum[3] = {0, 0, 0}, total = 0;
+            for (k = 0; k < 4; k++) {
+                int fine_x = 2 * x + (k & 1), fine_y = 2 * y + (k >> 1);
+                const float *in = raindrop__texel(sphere, level - 1, fine_x, fine_y);
+                double w = level == 1 ? (double)raindrop__texel_weight(fine_x, fine_y, 2 * r) : (double)in[3];
+                for (c = 0; c < 3; c++) sum[c] += w * (double)in[c];
+                total += w;
+            }
+            for (c = 0; c < 3; c++) out[c] = (float)(sum[c] / total);
+            out[3] = (float)total;
+        }
+    }
+}
+
+static inline void raindrop__build_levels(const raindrop__sphere *sphere)
+{
+    int level;
+    raindrop__fill_border(sphere, 0);
+    for (level = 1; level < sphere->levels; level++) {
+        raindrop__build_level(sphere, level);
+        raindrop__fill_border(sphere, level);
+    }
+}
+
+/* ---- lookups: four texels of four floats, one vector each */
+
+static inline void raindrop__bilinear(float out[4], const raindrop__sphere *sphere, int level, const float uv[2])
+{
+    int r = sphere->resolution >> level, x, y;
+    float a = uv[0] * (float)r + 0.5f, b = uv[1] * (float)r + 0.5f; /* + 1 for the border, - 1/2 for the texel's centre */
+    const float *p, *q;
+    x = (int)a;
+    y = (int)b;
+    a -= (float)x;
+    b -= (float)y;
+    p = sphere->texels + sphere->offset[level] + 4 * ((size_t)y * (size_t)(r + 2) + (size_t)x);
+    q = p + 4 * (size_t)(r + 2);
+    {
+#if defined(SAT__VECTOR)
+        sat__f32x4 va = sat__f32x4_set1(a), vb = sat__f32x4_set1(b), p0 = sat__f32x4_load(p), q0 = sat__f32x4_load(q);
+        p0 = sat__f32x4_add(p0, sat__f32x4_mul(va, sat__f32x4_sub(sat__f32x4_load(p + 4), p0)));
+        q0 = sat__f32x4_add(q0, sat__f32x4_mul(va, sat__f32x4_sub(sat__f32x4_load(q + 4), q0)));
+        sat__f32x4_store(out, sat__f32x4_add(p0, sat__f32x4_mul(vb, sat__f32x4_sub(q0, p0))));
+#else
+        int c;
+        for (c = 0; c < 4; c++) {
+            float p0 = p[c] + a * (p[c + 4] - p[c]), q0 = q[c] + a * (q[c + 4] - q[c]);
+            out[c] = p0 + b * (q0 - p0);
+        }
+#endif
+    }
+}
+
+/* log2 to 0.05, enough to choose between mips; v > 0 */
+static inline float raindrop__rough_log2(float v)
+{
+    uint32_t bits = sat__float_bits(v);
+    return (float)bits * 1.1920929e-7f - 126.957f;
+}
+
+/* texels: width of the cone in texels of level 0 there. A bilinear lookup is wider than one texel of its level, so a
+   finer one is read: of 0.35, 0.5, 0.6, 0.7 and 1 this factor is nearest to 8 x 8 rays for drops of 16..256 pixels. */
+static inline void raindrop__trilinear(float out[4], const raindrop__sphere *sphere, const float uv[2], float texels)
+{
+    float lod, f, coarse[4];
+    int level, c;
+    texels *= 0.6f;
+    if (!(texels > 1)) {
+        raindrop__bilinear(out, sphere, 0, uv);
+        return;
+    }
+    lod = raindrop__clamp(raindrop__rough_log2(texels), 0, (float)(sphere->levels - 1));
+    level = (int)lod;
+    f = lod - (float)level;
+    raindrop__bilinear(out, sphere, level, uv);
+    if (level + 1 >= sphere->levels) return;
+    raindrop__bilinear(coarse, sphere, level + 1, uv);
+    for (c = 0; c < 4; c++) out[c] += f * (coarse[c] - out[c]);
+}
+
+/* A box of the footprint's size on the equirectangular picture, wider towards the poles. */
+static inline void raindrop__sample_table(float out[4], const raindrop_environment *environment, const float d[3], float footprint)
+{
+    double length = sqrt((double)raindrop__dot(d, d)), y = (double)d[1] / length, sine = sqrt(y < 1 && y > -1 ? 1 - y * y : 0);
+    double u = (atan2((double)d[0], -(double)d[2]) / (2 * RAINDROP__PI) + 0.5) * environment->table_width;
+    double v = acos(y > 1 ? 1 : y < -1 ? -1 : y) / RAINDROP__PI * environment->table_height;
+    double half = 0.5 * (double)footprint / RAINDROP__PI * environment->table_height, wide;
+    int c;
+    if (!(half > 0.5)) half = 0.5;
+    wide = sine * environment->table_width > 2 * half ? half / sine : 0.5 * environment->table_width;
+    for (c = 0; c < 3; c++)
+        out[c] = (float)sat_mean_border(environment->table, c, u - wide, v - half, u + wide, v + half, SAT_BORDER_WRAP, SAT_BORDER_CLIP);
+    out[3] = 0;
+}
+
+static inline void raindrop__sample(float out[4], const raindrop_environment *environment, const float d[3], float footprint)
+{
+    float uv[2], s;
+    if (environment->table) {
+        raindrop__sample_table(out, environment, d, footprint);
+        return;
+    }
+    s = raindrop__fold(uv, d);
+    raindrop__trilinear(out, &environment->near_sphere, uv,
+                        footprint * 0.5f * (float)environment->near_sphere.resolution / (s * sqrtf(s)));
+}
+
+RAINDROP_DEF void raindrop_environment_sample(float rgb[3], const raindrop_environment *environment,
+                                              const float direction[3], float footprint)
+{
+    float v[4];
+    raindrop__sample(v, environment, direction, footprint);
+    raindrop__set(rgb, v[0], v[1], v[2]);
+}
+
+static inline void raindrop__far(float out[4], const raindrop_environment *environment, const float d[3])
+{
+    float uv[2];
+    raindrop__fold(uv, d);
+    raindrop__bilinear(out, &environment->far_sphere, 0, uv);
+}
+
+RAINDROP_DEF void raindrop_environment_far(float rgb[3], const raindrop_environment *environment, const float direction[3])
+{
+    float v[4];
+    raindrop__far(v, environment, direction);
+    raindrop__set(rgb, v[0], v[1], v[2]);
+}
+
+/* ---- making it */
+
+/* The caller's picture as packed RGB floats without NaN, infinity and negative light. */
+typedef struct raindrop__picture {
+    float *rgb;
+    int width, height;
+    raindrop_layout layout;
+} raindrop__picture;
+
+static inline float raindrop__repair(float v, float largest, float limit, raindrop_environment_stats *stats)
+{
+    if (sat__is_nan(v)) { stats->nan++; v = 0; }
+    else if (!sat__is_finite(v)) { stats->infinite++; v = v > 0 ? largest : 0; }
+    else if (v < 0) { stats->negative++; v = 0; }
+    if (limit > 0 && v > limit) { stats->clamped++; v = limit; }
+    if (v > stats->largest) stats->largest = v;
+    return v;
+}
+
+static inline void raindrop__read_picture(raindrop__picture *picture, const sat_image *image,
+                                          const raindrop_environment_options *o, raindrop_environment_stats *stats)
+{
+    size_t i, count = (size_t)image->width * (size_t)image->height * 3;
+    float largest = 0;
+    int x, y, c;
+    for (y = 0; y < image->height; y++) {
+        float *row = picture->rgb + (size_t)y * (size_t)image->width * 3;
+        const unsigned char *bytes = (const unsigned char *)sat__image_row(image, y);
+        size_t size = sat__format_size(image->format);
+        for (x = 0; x < image->width; x++) {
+            for (c = 0; c < 3; c++) {
+                size_t at = (size_t)x * (size_t)image->channels + (size_t)(image->channels < 3 ? 0 : c);
+                float v;
+                switch (image->format) {
+                case SAT_U8: v = (float)bytes[at]; break;
+                case SAT_U16: { uint16_t u; memcpy(&u, bytes + at * size, size); v = (float)u; break; }
+                case SAT_F16: { uint16_t u; memcpy(&u, bytes + at * size, size); v = sat__half_to_float(u); break; }
+                default: memcpy(&v, bytes + at * size, sizeof v);
+                }
+                v *= o->scale;
+                if (o->decode_srgb && sat__is_finite(v)) v = sat__srgb_decode(v);
+                if (sat__is_finite(v) && v > largest) largest = v;
+                row[3 * x + c] = v;
+            }
+        }
+    }
+    for (i = 0; i < count; i++) picture->rgb[i] = raindrop__repair(picture->rgb[i], largest, o->clamp, stats);
+}
+
+static inline void raindrop__picture_bilinear(float rgb[3], const raindrop__picture *p, int top, int height, int wrap, float x, float y)
+{
+    float fx = floorf(x), fy = floorf(y), a = x - fx, b = y - fy;
+    int x0 = (int)fx, x1 = x0 + 1, y0 = sat__clamp_int((int)fy, 0, height - 1), y1 = sat__clamp_int((int)fy + 1, 0, height - 1), c;
+    const float *row0 = p->rgb + 3 * (size_t)(top + y0) * (size_t)p->width, *row1 = p->rgb + 3 * (size_t)(top + y1) * (size_t)p->width;
+    x0 = wrap ? (x0 + p->width) % p->width : sat__clamp_int(x0, 0, p->width - 1);
+    x1 = wrap ? (x1 + p->width) % p->width : sat__clamp_int(x1, 0, p->width - 1);
+    for (c = 0; c < 3; c++) {
+        float v0 = row0[3 * x0 + c] * (1 - a) + row0[3 * x1 + c] * a, v1 = row1[3 * x0 + c] * (1 - a) + row1[3 * x1 + c] * a;
+        rgb[c] = v0 * (1 - b) + v1 * b;
+    }
+}
+
+static inline void raindrop__picture_sample(float rgb[3], const raindrop__picture *p, const float d[3])
+{
+    if (p->layout == RAINDROP_LAYOUT_EQUIRECT) {
+        float length = sqrtf(raindrop__dot(d, d)), y = raindrop__clamp(d[1] / length, -1, 1);
+        float u = atan2f(d[0], -d[2]) * (float)(0.5 / RAINDROP__PI) + 0.5f, v = acosf(y) * (float)(1 / RAINDROP__PI);
+        raindrop__picture_bilinear(rgb, p, 0, p->height, 1, u * (float)p->width - 0.5f, v * (float)p->height - 0.5f);
+    } else {
+        float ax = fabsf(d[0]), ay = fabsf(d[1]), az = fabsf(d[2]), s, t, m, side = (float)p->width;
+        int face;
+        if (ax >= ay && ax >= az) { face = d[0] < 0; m = ax; s = d[0] < 0 ? d[2] : -d[2]; t = -d[1]; }
+        else if (ay >= az) { face = 2 + (d[1] < 0); m = ay; s = d[0]; t = d[1] < 0 ? -d[2] : d[2]; }
+        else { face = 4 + (d[2] < 0); m = az; s = d[2] < 0 ? -d[0] : d[0]; t = -d[1]; }
+        raindrop__picture_bilinear(rgb, p, face * p->width, p->width, 0, (s / m * 0.5f + 0.5f) * side - 0.5f,
+                                   (t / m * 0.5f + 0.5f) * side - 0.5f);
+    }
+}
+
+typedef struct raindrop__environment_job {
+    raindrop_environment *environment;
+    const raindrop__picture *picture;
+    const raindrop_environment_options *options;
+    const float *bow; /* RGB by scattering angle, RAINDROP__BOW_BINS of them; NULL: no bows */
+} raindrop__environment_job;
+
+#define RAINDROP__BOW_BINS 3600
+
+static inline void raindrop__add_bow(float rgb[3], const raindrop__environment_job *job, const float d[3])
+{
+    /* light that travels along -sun is scattered towards the eye, which looks along d and so receives along -d */
+    float c = raindrop__dot(d, job->options->sun_direction) / sqrtf(raindrop__dot(d, d)), x;
+    int bin, i;
+    x = acosf(raindrop__clamp(c, -1, 1)) * (float)(RAINDROP__BOW_BINS / RAINDROP__PI) - 0.5f;
+    bin = x > 0 ? sat__min_int((int)x, RAINDROP__BOW_BINS - 2) : 0;
+    x = raindrop__clamp(x - (float)bin, 0, 1);
+    for (i = 0; i < 3; i++) {
+        float v = job->bow[3 * bin + i] * (1 - x) + job->bow[3 * bin + 3 + i] * x;
+        rgb[i] += v * job->options->sun_irradiance[i] * job->options->bow_optical_depth;
+    }
+}
+
+/* Rows of the octahedral picture, four samples a texel. */
+static void raindrop__resample_rows(int begin, int end, int worker, void *context)
+{
+    const raindrop__environment_job *job = (const raindrop__environment_job *)context;
+    const raindrop__sphere *sphere = &job->environment->near_sphere;
+    float step = 1 / (float)sphere->resolution;
+    int x, y, k, c;
+    (void)worker;
+    for (y = begin; y < end; y++) {
+        for (x = 0; x < sphere->resolution; x++) {
+            float *out = raindrop__texel(sphere, 0, x, y), d[3], rgb[3], sum[3] = {0, 0, 0};
+            for (k = 0; k < 4; k++) {
+                raindrop__unfold(d, ((float)x + ((k & 1) ? 0.75f : 0.25f)) * step, ((float)y + ((k & 2) ? 0.75f : 0.25f)) * step);
+                raindrop__picture_sample(rgb, job->picture, d);
+                for (c = 0; c < 3; c++) sum[c] += 0.25f * rgb[c];
+            }
+            if (job->bow) {
+                raindrop__unfold(d, ((float)x + 0.5f) * step, ((float)y + 0.5f) * step);
+                raindrop__add_bow(sum, job, d);
+            }
+            raindrop__set(out, sum[0], sum[1], sum[2]);
+            out[3] = 0;
+        }
+    }
+}
+
+/* Two unit vectors perpendicular to the unit vector n (Duff et al. 2017). */
+static inline void raindrop__perpendicular(float u[3], float v[3], const float n[3])
+{
+    float sign = copysignf(1, n[2]), a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
+    raindrop__set(u, 1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]);
+    raindrop__set(v, b, sign + n[1] * n[1] * a, -n[1]);
+}
+
+/* Colour of one ray from all its orders up to `orders`; pixel: radius of the drop over the width of the ray. */
+static inline void raindrop__ray_colour(float rgb[3], const raindrop_environment *environment, const float d[3],
+                                        const float p[3], float one_minus_b2, int orders, float width)
+{
+    raindrop_ray ray;
+    raindrop_order order;
+    float v[4];
+    int k, c;
+    raindrop_trace(&ray, d, p, one_minus_b2, environment->n);
+    raindrop__sample(v, environment, ray.reflect, ray.footprint_reflect * width);
+    for (c = 0; c < 3; c++) rgb[c] = ray.fresnel * v[c];
+    for (k = 0; k <= orders; k++) {
+        float share;
+        raindrop_trace_order(&order, d, p, one_minus_b2, environment->n, k);
+        share = k == orders ? order.rest : order.weight;
+        raindrop__sample(v, environment, order.direction, order.footprint * width);
+        for (c = 0; c < 3; c++) rgb[c] += share * v[c];
+    }
+}
+
+/* Rows of the far drops' picture: the mean over the drop's disc, samples on a spiral of equal areas. */
+static void raindrop__prefilter_rows(int begin, int end, int worker, void *context)
+{
+    const raindrop__environment_job *job = (const raindrop__environment_job *)context;
+    const raindrop_environment *environment = job->environment;
+    const raindrop__sphere *sphere = &environment->far_sphere;
+    int samples = job->options->far_samples, x, y, i, c;
+    float width = 1.77f / sqrtf((float)samples);
+    (void)worker;
+    for (y = begin; y < end; y++) {
+        for (x = 0; x < sphere->resolution; x++) {
+            float *out = raindrop__texel(sphere, 0, x, y), d[3], u[3], v[3], p[3], rgb[3];
+            double sum[3] = {0, 0, 0};
+            raindrop__unfold(d, ((float)x + 0.5f) / (float)sphere->resolution, ((float)y + 0.5f) / (float)sphere->resolution);
+            raindrop__normalise(d);
+            raindrop__perpendicular(u, v, d);
+            for (i = 0; i < samples; i++) {
+                float b2 = ((float)i + 0.5f) / (float)samples, b = sqrtf(b2), angle = 2.39996323f * (float)i;
+                raindrop__combine(p, b * cosf(angle), u, b * sinf(angle), v);
+                raindrop__ray_colour(rgb, environment, d, p, 1 - b2, job->options->far_orders, width);
+                for (c = 0; c < 3; c++) sum[c] += (double)rgb[c];
+            }
+            for (c = 0; c < 3; c++) out[c] = (float)(sum[c] / samples);
+            out[3] = 0;
+        }
+    }
+}
+
+RAINDROP_DEF raindrop_environment_options raindrop_environment_defaults(void)
+{
+    raindrop_environment_options o;
+    memset(&o, 0, sizeof o);
+    o.layout = RAINDROP_LAYOUT_EQUIRECT;
+    o.filter = RAINDROP_FILTER_MIPS;
+    o.far_resolution = 64;
+    o.far_samples = 256;
+    o.far_orders = 1;
+    o.n = RAINDROP_WATER;
+    o.scale = 1;
+    o.sun_direction[1] = 1;
+    o.sun_irradiance[0] = o.sun_irradiance[1] = o.sun_irradiance[2] = 1;
+    return o;
+}
+
+static inline int raindrop__is_power_of_two(int v, int low, int high) { return v >= low && v <= high && !(v & (v - 1)); }
+
+static inline int raindrop__environment_is_valid(const sat_image *image, const raindrop_environment_options *o)
+{
+    float sun2 = raindrop__dot(o->sun_direction, o->sun_direction);
+    if (!sat__image_is_valid(image) || image->channels == 2 || image->width > 32768 || image->height > 65536) return 0;
+    if ((unsigned)o->layout > RAINDROP_LAYOUT_CUBE || (unsigned)o->filter > RAINDROP_FILTER_SAT) return 0;
+    if (o->layout == RAINDROP_LAYOUT_CUBE && (image->height != 6 * image->width || o->filter == RAINDROP_FILTER_SAT)) return 0;
+    if (o->resolution && !raindrop__is_power_of_two(o->resolution, 16, 4096)) return 0;
+    if (!raindrop__is_power_of_two(o->far_resolution, 8, 256) || o->far_samples < 16 || o->far_samples > 65536) return 0;
+    if (o->far_orders < 0 || o->far_orders > 3 || !sat__is_finite(o->n) || !(o->n > 0.1f) || !(o->n < 10)) return 0;
+    if (!sat__is_finite(o->scale) || !(o->scale > 0) || !sat__is_finite(o->clamp) || o->clamp < 0) return 0;
+    if (!raindrop__finite3(o->sun_direction) || !raindrop__finite3(o->sun_irradiance)) return 0;
+    if (!(o->bow_optical_depth >= 0 && o->bow_optical_depth <= 10)) return 0;
+    if (o->bow_optical_depth > 0 && !(sun2 > 0.99f && sun2 < 1.01f)) return 0;
+#ifdef RAINDROP_NO_BOW
+    if (o->bow_optical_depth > 0) return 0;
+#endif
+    return sat__threads_are_valid(&o->threads);
+}
+
+/* A texel a quarter of the picture's at the equator: lookups of level 0 then add no blur of their own. */
+static inline int raindrop__default_resolution(const sat_image *image, raindrop_layout layout)
+{
+    int texels = layout == RAINDROP_LAYOUT_CUBE ? 3 * image->width : image->width, r = 16;
+    while (r < texels && r < 4096) r *= 2;
+    return r;
+}
+
+static inline sat_result raindrop__make_table(raindrop_environment *e, const raindrop__picture *picture,
+                                              const raindrop_environment_options *o, const sat_allocator *memory)
+{
+    sat_options options = sat_defaults();
+    sat_image image = sat_image_f32(picture->rgb, picture->width, picture->height, 3);
+    sat_result result;
+    options.allocator = *memory;
+    options.threads = o->threads;
+    e->table_width = picture->width;
+    e->table_height = picture->height;
+    result = sat_create(&e->table, picture->width, picture->height, 3, &options);
+    return result == SAT_OK ? sat_build(e->table, &image) : result;
+}
+
+RAINDROP_DEF void raindrop_environment_destroy(raindrop_environment *environment)
+{
+    if (environment) {
+        sat_allocator memory = environment->allocator;
+        if (environment->table) sat_destroy(environment->table);
+        sat__release(&memory, environment, environment->bytes);
+    }
+}
+
+/* The object and its two octahedral pictures, in one block. */
+static inline sat_result raindrop__allocate_environment(raindrop_environment **out, int resolution, int far_resolution, const sat_allocator *memory)
+{
+    raindrop_environment layout, *e;
+    sat__arena arena = {0, 0, 0};
+    size_t near_size, far_size;
+    int levels = 1;
+    memset(&layout, 0, sizeof layout);
+    while (resolution >> levels) levels++;
+    near_size = raindrop__sphere_size(&layout.near_sphere, resolution, levels);
+    far_size = raindrop__sphere_size(&layout.far_sphere, far_resolution, 1);
+    sat__carve(&arena, 1, sizeof layout);
+    sat__carve(&arena, near_size, sizeof(float));
+    sat__carve(&arena, far_size, sizeof(float));
+    if (arena.overflow) return SAT_ERR_SIZE;
+    layout.bytes = arena.used;
+    layout.allocator = *memory;
+    e = (raindrop_environment *)sat__alloc(memory, arena.used);
+    if (!e) return SAT_ERR_MEMORY;
+    arena.base = (unsigned char *)e;
+    arena.used = 0;
+    sat__carve(&arena, 1, sizeof layout);
+    layout.near_sphere.texels = (float *)(void *)sat__carve(&arena, near_size, sizeof(float));
+    layout.far_sphere.texels = (float *)(void *)sat__carve(&arena, far_size, sizeof(float));
+    *e = layout;
+    *out = e;
+    return SAT_OK;
+}
+
+static inline sat_result raindrop__fill_environment(raindrop_environment *e, const raindrop__picture *picture,
+                                                    float *bow, const raindrop_environment_options *o, const sat_allocator *memory)
+{
+    raindrop__environment_job job;
+    sat_result result = SAT_OK;
+    e->n = o->n;
+    e->filter = o->filter;
+    job.environment = e;
+    job.picture = picture;
+    job.options = o;
+    job.bow = bow;
+    sat__parallel_for(&o->threads, e->near_sphere.resolution, raindrop__resample_rows, &job);
+    raindrop__build_levels(&e->near_sphere);
+    sat__parallel_for(&o->threads, e->far_sphere.resolution, raindrop__prefilter_rows, &job);
+    raindrop__fill_border(&e->far_sphere, 0);
+    if (o->filter == RAINDROP_FILTER_SAT) result = raindrop__make_table(e, picture, o, memory);
+    return result;
+}
+
+RAINDROP_DEF sat_result raindrop_environment_create(raindrop_environment **out, const sat_image *image,
+                                                    const raindrop_environment_options *options,
+                                                    raindrop_environment_stats *stats)
+{
+    raindrop_environment_options o = options ? *options : raindrop_environment_defaults();
+    raindrop_environment_stats local;
+    raindrop_environment *e = NULL;
+    raindrop__picture picture;
+    sat_allocator memory;
+    sat_result result;
+    size_t bytes;
+    float *bow = NULL;
+    const size_t bow_bytes = 3 * RAINDROP__BOW_BINS * sizeof(float);
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (!raindrop__environment_is_valid(image, &o) || !sat__resolve_allocator(&memory, &o.allocator)) return SAT_ERR_ARGUMENT;
+    if (!sat__multiply_size(&bytes, (size_t)image->width * 3 * sizeof(float), (size_t)image->height)) return SAT_ERR_SIZE;
+    memset(&local, 0, sizeof local);
+    picture.width = image->width;
+    picture.height = image->height;
+    picture.layout = o.layout;
+    result = raindrop__allocate_environment(&e, o.resolution ? o.resolution : raindrop__default_resolution(image, o.layout), o.far_resolution, &memory);
+    if (result != SAT_OK) return result;
+    picture.rgb = (float *)sat__alloc(&memory, bytes);
+    if (o.bow_optical_depth > 0) bow = (float *)sat__alloc(&memory, bow_bytes);
+    if (!picture.rgb || (o.bow_optical_depth > 0 && !bow)) result = SAT_ERR_MEMORY;
+    else {
+        raindrop__read_picture(&picture, image, &o, &local);
+#ifndef RAINDROP_NO_BOW
+        if (bow) raindrop_bow_profile(bow, RAINDROP__BOW_BINS);
+#endif
+        result = raindrop__fill_environment(e, &picture, bow, &o, &memory);
+    }
+    sat__release(&memory, picture.rgb, bytes);
+    sat__release(&memory, bow, bow_bytes);
+    local.bytes = e->bytes + (e->table ? sat_get_statistics(e->table).bytes : 0);
+    if (result != SAT_OK) raindrop_environment_destroy(e);
+    else *out = e;
+    if (stats && result == SAT_OK) *stats = local;
+    return result;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Rainbows: geometrical optics of orders 1 and 2, gathered by wavelength
+   ------------------------------------------------------------------------------------------------ */
+
+RAINDROP_DEF double raindrop_bow_angle(int order, double n)
+{
+    double k = order < 1 ? 1 : order, cosine2 = (n * n - 1) / (k * (k + 2)), i, r;
+    if (!(cosine2 > 0)) return 0;
+    i = acos(sqrt(cosine2 < 1 ? cosine2 : 1));
+    r = asin(sin(i) / n);
+    return 2 * (i - r) + k * (RAINDROP__PI - 2 * r);
+}
+
+/* A + B/wavelength^2 through the Fraunhofer lines C (656.3 nm, 1.3311) and F (486.1 nm, 1.3371); 1.3329 at D (1.3330). */
+RAINDROP_DEF double raindrop_water_index(double wavelength_nm) { return 1.3239 + 3125 / (wavelength_nm * wavelength_nm); }
+
+#ifndef RAINDROP_NO_BOW
+/* CIE 1931 colour matching by the lobes of Wyman, Sloan and Shirley 2013, to linear Rec. 709. */
+static inline double raindrop__lobe(double x, double centre, double left, double right)
+{
+    double t = (x - centre) / (x < centre ? left : right);
+    return exp(-0.5 * t * t);
+}
+
+static inline void raindrop__wavelength_rgb(double rgb[3], double w)
+{
+    double x = 1.056 * raindrop__lobe(w, 599.8, 37.9, 31.0) + 0.362 * raindrop__lobe(w, 442.0, 16.0, 26.7) - 0.065 * raindrop__lobe(w, 501.1, 20.4, 26.2);
+    double y = 0.821 * raindrop__lobe(w, 568.8, 46.9, 40.5) + 0.286 * raindrop__lobe(w, 530.9, 16.3, 31.1);
+    double z = 1.217 * raindrop__lobe(w, 437.0, 11.8, 36.0) + 0.681 * raindrop__lobe(w, 459.0, 26.0, 13.8);
+    rgb[0] = 3.2404542 * x - 1.5371385 * y - 0.4985314 * z;
+    rgb[1] = -0.9692660 * x + 1.8760108 * y + 0.0415560 * z;
+    rgb[2] = 0.0556434 * x - 0.2040259 * y + 1.0572252 * z;
+}
+
+/* Adds the light of one wavelength, orders 1 and 2. That of a strip of b^2 is spread evenly over the angles between
+   those of its ends, widened by the sun's disc (radius 0.27 degrees; a box of its variance): no holes, no poles. */
+static inline void raindrop__bow_spread(float *rgb, int count, double n, const double share[3])
+{
+    const int strips = 4096;
+    const double per_bin = count / RAINDROP__PI, sun = 0.2665 * 0.8660254 * RAINDROP__PI / 180 * per_bin;
+    int k, i, c, at;
+    for (k = 1; k <= 2; k++) {
+        double last = (k & 1) ? RAINDROP__PI : 0;
+        for (i = 0; i < strips; i++) {
+            double b = sqrt((i + 1.0) / strips), r = asin(b / n), from, to;
+            double turn = fabs(remainder(2 * (asin(b < 1 ? b : 1) - r) + k * (RAINDROP__PI - 2 * r), 2 * RAINDROP__PI));
+            raindrop__optics o = raindrop__refract((float)(1 - (i + 0.5) / strips), (float)n);
+            double fs = (double)o.fs, fp = (double)o.fp;
+            double power = 0.5 * ((1 - fs) * (1 - fs) * pow(fs, k) + (1 - fp) * (1 - fp) * pow(fp, k)) / strips;
+            from = (last < turn ? last : turn) * per_bin - sun;
+            to = (last < turn ? turn : last) * per_bin + sun;
+            if (from < 0) from = 0;
+            if (to > count) to = count;
+            for (at = (int)from; at < to; at++) {
+                double overlap = (to < at + 1 ? to : at + 1) - (from > at ? from : at);
+                for (c = 0; c < 3; c++) rgb[3 * at + c] += (float)(power * share[c] * overlap / (to - from));
+            }
+            last = turn;
+        }
+    }
+}
+
+RAINDROP_DEF sat_result raindrop_bow_profile(float *rgb, int count)
+{
+    double white[3] = {0, 0, 0}, colour[3], wavelength;
+    int i, c;
+    if (!rgb || count < 16 || count > (1 << 20)) return SAT_ERR_ARGUMENT;
+    for (wavelength = 380; wavelength <= 780; wavelength += 10) {
+        raindrop__wavelength_rgb(colour, wavelength);
+        for (c = 0; c < 3; c++) white[c] += colour[c];
+    }
+    memset(rgb, 0, (size_t)count * 3 * sizeof *rgb);
+    for (wavelength = 380; wavelength <= 780; wavelength += 10) {
+        raindrop__wavelength_rgb(colour, wavelength);
+        for (c = 0; c < 3; c++) colour[c] /= white[c];
+        raindrop__bow_spread(rgb, count, raindrop_water_index(wavelength), colour);
+    }
+    for (i = 0; i < count; i++) {
+        double solid_angle = 2 * RAINDROP__PI * (cos(RAINDROP__PI * i / count) - cos(RAINDROP__PI * (i + 1) / count));
+        for (c = 0; c < 3; c++) rgb[3 * i + c] = rgb[3 * i + c] > 0 ? (float)((double)rgb[3 * i + c] / solid_angle) : 0;
+    }
+    return SAT_OK;
+}
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Rain
+   ------------------------------------------------------------------------------------------------ */
+
+enum { RAINDROP__CHUNK = 4096 }; /* drops that are culled together; fixes the order of everything, whatever the workers */
+
+/* A drop in the picture. `rows`: first row and row behind the last, packed, of those it may touch. */
+typedef struct raindrop__visible {
+    float x, y, radius, depth; /* pixels; radius of the circle of the projected area; depth along the axis in metres */
+    float colour[3];           /* far drops */
+    float streak[2], blur;     /* pixels: path during the exposure, circle of confusion */
+    uint32_t drop;             /* index; the top bit marks a far drop */
+    uint32_t rows;
+} raindrop__visible;
+
+typedef struct raindrop__pair { uint32_t key, at; } raindrop__pair;
+
+/* Why a drop is drawn or not, as in raindrop_render_stats. */
+typedef enum raindrop__fate {
+    RAINDROP__NEAR, RAINDROP__FAR, RAINDROP__INVALID, RAINDROP__INSIDE, RAINDROP__BEHIND, RAINDROP__NEAR_PLANE,
+    RAINDROP__OUTSIDE, RAINDROP__HIDDEN, RAINDROP__BELOW, RAINDROP__FATES
+} raindrop__fate;
+
+typedef struct raindrop__chunk {
+    int visible, fates[RAINDROP__FATES];
+    double coverage_left_out;
+} raindrop__chunk;
+
+typedef struct raindrop__tally { size_t fragments, order_fragments; char apart[64 - 2 * sizeof(size_t)]; } raindrop__tally;
+
+struct raindrop_rain {
+    raindrop_drop *drops;
+    int count, capacity, own; /* own: the caller's drops, which do not wrap */
+    int settled;              /* all fall with their terminal velocity */
+    uint32_t step;            /* advances with dt > 0 so far: the random stream */
+    raindrop_rain_options options;
+    raindrop__visible *visible;
+    raindrop__pair *pairs[2];
+    uint32_t *rows;           /* visible[].rows in drawing order: what a band scans */
+    raindrop__chunk *chunks;
+    int *unsettled;           /* a flag a chunk */
+    raindrop__tally *tally;   /* one a worker */
+    sat_allocator allocator;
+    size_t bytes;
+};
+
+static const double raindrop__gravity = 9.80665 * (1 - 1.204 / 998.2); /* less the air's buoyancy */
+static const double raindrop__viscosity = 1.81e-5, raindrop__density = 998.2;
+
+/* Stokes' law for the smallest and Best 1950 for the others, blended; rms 4 % of Gunn and Kinzer's table. */
+RAINDROP_DEF double raindrop_terminal_velocity(double diameter_mm)
+{
+    double d = diameter_mm * 1e-3, stokes, best, slow;
+    if (!(diameter_mm > 0)) return 0;
+    stokes = raindrop__gravity * raindrop__density * d * d / (18 * raindrop__viscosity);
+    best = 9.32 * -expm1(-pow(diameter_mm / 1.77, 1.147));
+    slow = stokes < best ? stokes : best; /* factored out: no power of a small number underflows */
+    return slow * pow(pow(slow / stokes, 4) + pow(slow / best, 4), -0.25);
+}
+
+RAINDROP_DEF double raindrop_oblateness(double diameter_mm)
+{
+    double d = diameter_mm < 6 ? diameter_mm : 6, ratio;
+    if (!(diameter_mm > 0)) return 1;
+    ratio = 1.0048 + d * (5.7e-4 + d * (-2.628e-2 + d * (3.682e-3 - d * 1.677e-4)));
+    return ratio < 1 ? ratio : 1;
+}
+
+/* N(D) = N0 exp(-lambda D), N0 = 8000 /(m^3 mm), lambda = 4.1 R^-0.21 /mm */
+static inline double raindrop__lambda(double rate_mm_h) { return 4.1 * pow(rate_mm_h, -0.21); }
+
+RAINDROP_DEF double raindrop_marshall_palmer(double diameter_mm, double rate_mm_h)
+{
+    if (!(diameter_mm >= 0) || !(rate_mm_h > 0)) return 0;
+    return 8000 * exp(-raindrop__lambda(rate_mm_h) * diameter_mm);
+}
+
+#ifndef RAINDROP_NO_RAIN
+/* ---- the exact drag step
+
+   v' = g - a v - b v|v| downwards, relative to the wind, with Stokes' a = 18 mu / (rho D^2) and b such that the
+   terminal velocity vt is the fixed point. With u = v - vt and k = a + 2 b vt this is Riccati's equation,
+
+       u(h) = u0 e / (1 + q),   q = (b u0/k) (1 - e),   e = exp(-k h),   fallen = vt h + log(1 + q) / b,
+
+   for any h and any stiffness (a step of 1/60 s is 5400 time constants of a 1 um drop). A drop that rises obeys the
+   same with -b, up to its apex. Sideways the drag is that of the vertical speed, so that the damping is the integral of
+   a + b|v|, which is known; two half steps equal a whole one. */
+typedef struct raindrop__drag { double vt, a, b; } raindrop__drag;
+
+static inline raindrop__drag raindrop__drag_of(double radius)
+{
+    raindrop__drag drag;
+    double d = 2 * radius;
+    drag.vt = raindrop_terminal_velocity(d * 1e3);
+    drag.a = 18 * raindrop__viscosity / (raindrop__density * d * d);
+    drag.b = (raindrop__gravity - drag.a * drag.vt) / (drag.vt * drag.vt);
+    if (!(drag.b > 0)) {
+        drag.b = 0;
+        drag.a = raindrop__gravity / drag.vt;
+    }
+    return drag;
+}
+
+/* One phase of a step: speed downwards, way downwards, and the integral of a + b|v|. */
+typedef struct raindrop__phase { double speed, way, damping; } raindrop__phase;
+
+static inline raindrop__phase raindrop__sink(double v, const raindrop__drag *drag, double h)
+{
+    raindrop__phase out;
+    double u = v - drag->vt, k = drag->a + 2 * drag->b * drag->vt, lost = -expm1(-k * h), q = drag->b * u / k * lost;
+    out.speed = drag->vt + u * exp(-k * h) / (1 + q);
+    out.way = drag->vt * h + u * lost / k * (fabs(q) > 1e-8 ? log1p(q) / q : 1 - q / 2);
+    out.damping = (drag->a + drag->b * drag->vt) * h + log1p(q);
+    return out;
+}
+
+/* s' = -(g + a s + b s^2) for a speed s upwards, at most until s = 0; *h becomes the time that is left. */
+static inline raindrop__phase raindrop__rise(double s, const raindrop__drag *drag, double *h)
+{
+    const double g = raindrop__gravity, a = drag->a, b = drag->b, discriminant = a * a - 4 * b * g;
+    raindrop__phase out;
+    double apex, t, end, way;
+    if (discriminant > 0) { /* roots -r1, -r2 of b s^2 + a s + g: (s + r1)/(s + r2) decays like exp(-root t) */
+        double root = sqrt(discriminant), sum = a + root, r1 = 2 * g / sum, start = (s + r1) / (2 * b * s + sum);
+        apex = log(start * sum / r1) / root;
+        t = *h < apex ? *h : apex;
+        start *= exp(-root * t);
+        end = *h < apex ? (start * sum - r1) / (1 - 2 * b * start) : 0;
+        way = r1 * log((end + r1) / (s + r1));
+        way -= b > 0 ? sum / (2 * b) * log1p(2 * b * (end - s) / (2 * b * s + sum)) : end - s;
+        way /= root;
+    } else {
+        double root = sqrt(-discriminant) + 1e-300, phase = atan((2 * b * s + a) / root), last = atan(a / root);
+        apex = 2 * (phase - last) / root;
+        t = *h < apex ? *h : apex;
+        last = phase - 0.5 * root * t;
+        end = *h < apex ? (root * tan(last) - a) / (2 * b) : 0;
+        way = log(cos(last) / cos(phase)) / b - a * t / (2 * b);
+    }
+    *h = *h < apex ? 0 : *h - apex;
+    out.speed = end > 0 ? -end : 0;
+    out.way = -way;
+    out.damping = a * t + b * way;
+    return out;
+}
+
+/* Sideways: speed relative to the wind decays by the damping; the way is that of a steady decay of the same size. */
+static inline void raindrop__drift(double *speed, double *way, double damping, double h)
+{
+    double left = exp(-damping);
+    *way += *speed * h * (damping > 1e-8 ? -expm1(-damping) / damping : 1);
+    *speed *= left;
+}
+
+static inline void raindrop__step(double velocity[3], double way[3], double radius, const float wind[3], double h)
+{
+    raindrop__drag drag = raindrop__drag_of(radius);
+    double fall = (double)wind[1] - velocity[1], sideways[2], left = h;
+    raindrop__phase phase;
+    sideways[0] = velocity[0] - (double)wind[0];
+    sideways[1] = velocity[2] - (double)wind[2];
+    way[0] = (double)wind[0] * h;
+    way[1] = (double)wind[1] * h;
+    way[2] = (double)wind[2] * h;
+    if (fall < 0) {
+        phase = raindrop__rise(-fall, &drag, &left);
+        raindrop__drift(&sideways[0], &way[0], phase.damping, h - left);
+        raindrop__drift(&sideways[1], &way[2], phase.damping, h - left);
+        way[1] -= phase.way;
+        fall = phase.speed;
+    }
+    if (left > 0) {
+        phase = raindrop__sink(fall, &drag, left);
+        raindrop__drift(&sideways[0], &way[0], phase.damping, left);
+        raindrop__drift(&sideways[1], &way[2], phase.damping, left);
+        way[1] -= phase.way;
+        fall = phase.speed;
+    }
+    velocity[0] = sideways[0] + (double)wind[0];
+    velocity[1] = (double)wind[1] - fall;
+    velocity[2] = sideways[1] + (double)wind[2];
+}
+
+RAINDROP_DEF sat_result raindrop_fall(raindrop_drop *drop, const float wind[3], double dt)
+{
+    double velocity[3], way[3];
+    int i;
+    if (!drop || !wind || !raindrop__finite3(wind) || !raindrop__finite3(drop->position) || !raindrop__finite3(drop->velocity)) return SAT_ERR_ARGUMENT;
+    if (!sat__is_finite(drop->radius) || !(drop->radius > 0) || !sat__is_finite_double(dt) || dt < 0) return SAT_ERR_ARGUMENT;
+    if (dt == 0) return SAT_OK;
+    for (i = 0; i < 3; i++) velocity[i] = (double)drop->velocity[i];
+    raindrop__step(velocity, way, (double)drop->radius, wind, dt);
+    for (i = 0; i < 3; i++) {
+        drop->velocity[i] = (float)velocity[i];
+        drop->position[i] = (float)((double)drop->position[i] + way[i]);
+    }
+    return SAT_OK;
+}
+
+/* ---- sizes */
+
+/* A diameter in mm. In a volume sizes are Marshall-Palmer's, by the inverse of its integral; at a plane they arrive
+   weighted with their speed: a diameter is taken with the probability v/v_max, else the next one is tried. */
+static inline double raindrop__diameter(const raindrop_rain_options *o, uint32_t stream, uint32_t i, int at_plane)
+{
+    double lambda = raindrop__lambda(o->rate_mm_h), span = o->diameter_max_mm - o->diameter_min_mm, all = -expm1(-lambda * span), d;
+    double fastest = raindrop_terminal_velocity(o->diameter_max_mm);
+    uint32_t attempt;
+    if (o->diameter_mm > 0) return o->diameter_mm;
+    for (attempt = 0;; attempt++) {
+        uint32_t bits = raindrop__hash(o->seed, stream + 16 + attempt, i);
+        d = o->diameter_min_mm - log1p(-(double)raindrop__uniform(bits) * all) / lambda;
+        if (!at_plane || o->speed > 0 || attempt == 255) return d;
+        if ((double)raindrop__uniform(raindrop__mix(bits)) * fastest < raindrop_terminal_velocity(d)) return d;
+    }
+}
+
+static inline void raindrop__give_size(raindrop_drop *drop, const raindrop_rain_options *o, double diameter_mm)
+{
+    double speed = o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(diameter_mm);
+    drop->radius = (float)(diameter_mm * 0.5e-3);
+    drop->axis_ratio = o->oblate ? (float)raindrop_oblateness(diameter_mm) : 1;
+    raindrop__set(drop->velocity, o->wind[0], o->wind[1] - (float)speed, o->wind[2]);
+}
+
+static inline float raindrop__place(const raindrop_rain_options *o, int axis, uint32_t bits)
+{
+    return o->centre[axis] + (raindrop__uniform(bits) - 0.5f) * o->box_size[axis];
+}
+
+static void raindrop__create_range(int begin, int end, int worker, void *context)
+{
+    raindrop_rain *rain = (raindrop_rain *)context;
+    const raindrop_rain_options *o = &rain->options;
+    int i, axis, last = sat__min_int(end * RAINDROP__CHUNK, rain->count);
+    (void)worker;
+    for (i = begin * RAINDROP__CHUNK; i < last; i++) {
+        raindrop_drop *drop = &rain->drops[i];
+        for (axis = 0; axis < 3; axis++) drop->position[axis] = raindrop__place(o, axis, raindrop__hash(o->seed, (uint32_t)axis, (uint32_t)i));
+        raindrop__give_size(drop, o, raindrop__diameter(o, 0, (uint32_t)i, 0));
+    }
+}
+
+/* ---- one step of all drops */
+
+typedef struct raindrop__advance_job { raindrop_rain *rain; double dt; } raindrop__advance_job;
+
+static inline float raindrop__wrap(double position, double low, double size)
+{
+    double inside = position - floor((position - low) / size) * size;
+    return (float)(inside < low + size ? inside : low);
+}
+
+/* Out below: another drop comes in on top, after what is left of the time. */
+static inline void raindrop__reenter(raindrop_drop *drop, const raindrop_rain *rain, double below, uint32_t i)
+{
+    const raindrop_rain_options *o = &rain->options;
+    double size = (double)o->box_size[1], top = (double)o->centre[1] + size / 2, old = -(double)drop->velocity[1];
+    if (!(o->diameter_mm > 0)) {
+        uint32_t stream = rain->step * 512u;
+        raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 1));
+        drop->position[0] = raindrop__place(o, 0, raindrop__hash(o->seed, stream, i));
+        drop->position[2] = raindrop__place(o, 2, raindrop__hash(o->seed, stream + 2, i));
+        if (old > 0) below *= (double)raindrop_terminal_velocity((double)drop->radius * 2e3) / old;
+    }
+    drop->position[1] = raindrop__wrap(top - fmod(below, size), top - size, size);
+}
+
+static void raindrop__advance_range(int begin, int end, int worker, void *context)
+{
+    const raindrop__advance_job *job = (const raindrop__advance_job *)context;
+    raindrop_rain *rain = job->rain;
+    const raindrop_rain_options *o = &rain->options;
+    double velocity[3], way[3], low[3], position;
+    int chunk, i, axis;
+    (void)worker;
+    for (axis = 0; axis < 3; axis++) low[axis] = (double)o->centre[axis] - (double)o->box_size[axis] / 2;
+    for (chunk = begin; chunk < end; chunk++) {
+        int last = sat__min_int((chunk + 1) * RAINDROP__CHUNK, rain->count), moving = 0;
+        for (i = chunk * RAINDROP__CHUNK; i < last; i++) {
+            raindrop_drop *drop = &rain->drops[i];
+            for (axis = 0; axis < 3; axis++) velocity[axis] = (double)drop->velocity[axis];
+            if (rain->settled || !(drop->radius > 0)) {
+                for (axis = 0; axis < 3; axis++) way[axis] = velocity[axis] * job->dt;
+            } else {
+                raindrop__step(velocity, way, (double)drop->radius, o->wind, job->dt);
+                for (axis = 0; axis < 3; axis++) {
+                    float v = (float)velocity[axis];
+                    moving |= fabsf(v - drop->velocity[axis]) > 1e-6f * fabsf(v);
+                    drop->velocity[axis] = v;
+                }
+            }
+            for (axis = 0; axis < 3; axis++) {
+                position = (double)drop->position[axis] + way[axis];
+                if (!rain->own && (position < low[axis] || position >= low[axis] + (double)o->box_size[axis])) {
+                    if (axis == 1 && way[1] < 0 && position < low[1]) {
+                        raindrop__reenter(drop, rain, low[1] - position, (uint32_t)i);
+                        continue;
+                    }
+                    drop->position[axis] = raindrop__wrap(position, low[axis], (double)o->box_size[axis]);
+                } else drop->position[axis] = (float)position;
+            }
+        }
+        rain->unsettled[chunk] = moving;
+    }
+}
+
+static inline int raindrop__chunk_count(int drops) { return drops / RAINDROP__CHUNK + (drops % RAINDROP__CHUNK != 0); }
+
+RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt_seconds)
+{
+    raindrop__advance_job job;
+    int chunk, chunks, moving = 0;
+    if (!rain || !sat__is_finite_double(dt_seconds) || dt_seconds < 0) return SAT_ERR_ARGUMENT;
+    chunks = raindrop__chunk_count(rain->count);
+    job.rain = rain;
+    job.dt = dt_seconds;
+    if (dt_seconds > 0) rain->step++;
+    sat__parallel_for(&rain->options.threads, chunks, raindrop__advance_range, &job);
+    for (chunk = 0; chunk < chunks; chunk++) moving |= rain->unsettled[chunk];
+    if (dt_seconds > 0 && !moving) rain->settled = 1;
+    return SAT_OK;
+}
+
+RAINDROP_DEF sat_result raindrop_rain_set_wind(raindrop_rain *rain, const float wind[3])
+{
+    if (!rain || !wind || !raindrop__finite3(wind)) return SAT_ERR_ARGUMENT;
+    raindrop__set(rain->options.wind, wind[0], wind[1], wind[2]);
+    rain->settled = rain->options.speed > 0; /* drops of one published speed know no drag */
+    return SAT_OK;
+}
+
+RAINDROP_DEF sat_result raindrop_rain_set_centre(raindrop_rain *rain, const float centre[3])
+{
+    if (!rain || !centre || !raindrop__finite3(centre)) return SAT_ERR_ARGUMENT;
+    raindrop__set(rain->options.centre, centre[0], centre[1], centre[2]);
+    return SAT_OK;
+}
+#endif
+
+RAINDROP_DEF raindrop_rain_options raindrop_rain_defaults(void)
+{
+    raindrop_rain_options o;
+    memset(&o, 0, sizeof o);
+    o.rate_mm_h = 10;
+    o.diameter_min_mm = 0.1;
+    o.diameter_max_mm = 6;
+    raindrop__set(o.box_size, 8, 8, 8);
+    o.seed = 1;
+    return o;
+}
+
+#define RAINDROP__MAX_DROPS 33554432
+
+static inline int raindrop__rain_is_valid(const raindrop_rain_options *o)
+{
+    int axis;
+    if (o->drops) return o->count >= 0 && o->count <= RAINDROP__MAX_DROPS && sat__threads_are_valid(&o->threads);
+#ifdef RAINDROP_NO_RAIN
+    return 0;
+#endif
+    if (!(o->rate_mm_h >= 0.01 && o->rate_mm_h <= 500) || o->count < 0 || o->count > RAINDROP__MAX_DROPS) return 0;
+    if (!(o->diameter_mm == 0 || (o->diameter_mm >= 0.001 && o->diameter_mm <= 6))) return 0;
+    if (!(o->diameter_min_mm >= 0.001 && o->diameter_min_mm < o->diameter_max_mm && o->diameter_max_mm <= 6)) return 0;
+    for (axis = 0; axis < 3; axis++)
+        if (!sat__is_finite(o->box_size[axis]) || !(o->box_size[axis] > 0)) return 0;
+    if (!raindrop__finite3(o->centre) || !raindrop__finite3(o->wind) || !sat__is_finite(o->speed) || o->speed < 0) return 0;
+    return sat__threads_are_valid(&o->threads);
+}
+
+/* The rate's number of drops in the box: the integral of N(D). */
+static inline double raindrop__expected_count(const raindrop_rain_options *o)
+{
+    double lambda = raindrop__lambda(o->rate_mm_h);
+    double density = 8000 / lambda * (exp(-lambda * o->diameter_min_mm) - exp(-lambda * o->diameter_max_mm));
+    return density * (double)o->box_size[0] * (double)o->box_size[1] * (double)o->box_size[2];
+}
+
+/* Lays the object and its arrays out; called once to measure and once on the block. */
+static inline void raindrop__rain_layout(raindrop_rain *rain, sat__arena *arena, int capacity, int workers)
+{
+    size_t n = (size_t)sat__max_int(capacity, 1);
+    sat__carve(arena, 1, sizeof *rain);
+    rain->drops = (raindrop_drop *)sat__carve(arena, n, sizeof(raindrop_drop));
+    rain->visible = (raindrop__visible *)sat__carve(arena, n, sizeof(raindrop__visible));
+    rain->pairs[0] = (raindrop__pair *)sat__carve(arena, n, sizeof(raindrop__pair));
+    rain->pairs[1] = (raindrop__pair *)sat__carve(arena, n, sizeof(raindrop__pair));
+    rain->rows = (uint32_t *)sat__carve(arena, n, sizeof(uint32_t));
+    rain->chunks = (raindrop__chunk *)sat__carve(arena, n / RAINDROP__CHUNK + 1, sizeof(raindrop__chunk));
+    rain->unsettled = (int *)sat__carve(arena, n / RAINDROP__CHUNK + 1, sizeof(int));
+    rain->tally = (raindrop__tally *)sat__carve(arena, (size_t)workers, sizeof(raindrop__tally));
+}
+
+RAINDROP_DEF sat_result raindrop_rain_create(raindrop_rain **out, const raindrop_rain_options *options)
+{
+    raindrop_rain_options o = options ? *options : raindrop_rain_defaults();
+    raindrop_rain layout, *rain;
+    sat__arena arena = {0, 0, 0};
+    sat_allocator memory;
+    double expected;
+    int count, workers;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (!raindrop__rain_is_valid(&o) || !sat__resolve_allocator(&memory, &o.allocator)) return SAT_ERR_ARGUMENT;
+    expected = o.drops || o.count ? (double)o.count : raindrop__expected_count(&o);
+    if (expected > RAINDROP__MAX_DROPS) return SAT_ERR_LIMIT;
+    count = (int)(expected + 0.5);
+    workers = sat__worker_count(&o.threads);
+    memset(&layout, 0, sizeof layout);
+    raindrop__rain_layout(&layout, &arena, count, workers);
+    if (arena.overflow) return SAT_ERR_SIZE;
+    layout.bytes = arena.used;
+    rain = (raindrop_rain *)sat__alloc(&memory, arena.used);
+    if (!rain) return SAT_ERR_MEMORY;
+    arena.base = (unsigned char *)rain;
+    arena.used = 0;
+    raindrop__rain_layout(&layout, &arena, count, workers);
+    layout.allocator = memory;
+    layout.options = o;
+    layout.options.drops = NULL;
+    layout.count = layout.capacity = count;
+    layout.own = o.drops != NULL;
+    layout.settled = !layout.own;
+    *rain = layout;
+    if (o.drops && count) memcpy(rain->drops, o.drops, (size_t)count * sizeof *rain->drops);
+#ifndef RAINDROP_NO_RAIN
+    if (!o.drops) sat__parallel_for(&o.threads, raindrop__chunk_count(count), raindrop__create_range, rain);
+#endif
+    *out = rain;
+    return SAT_OK;
+}
+
+RAINDROP_DEF void raindrop_rain_destroy(raindrop_rain *rain)
+{
+    if (rain) {
+        sat_allocator memory = rain->allocator;
+        sat__release(&memory, rain, rain->bytes);
+    }
+}
+
+RAINDROP_DEF const raindrop_drop *raindrop_rain_drops(const raindrop_rain *rain, int *count)
+{
+    if (count) *count = rain ? rain->count : 0;
+    return rain ? rain->drops : NULL;
+}
+
+RAINDROP_DEF sat_result raindrop_rain_set_drops(raindrop_rain *rain, const raindrop_drop *drops, int count)
+{
+    if (!rain || (!drops && count) || count < 0 || count > rain->capacity) return SAT_ERR_ARGUMENT;
+    if (count) memcpy(rain->drops, drops, (size_t)count * sizeof *drops);
+    rain->count = count;
+    rain->own = 1;
+    rain->settled = 0;
+    return SAT_OK;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Picture
+
+   1 cull: each drop to a fate and, if it may be seen, a record; 2 sort the records from far to near; 3 draw bands of
+   rows, each by one worker, all drops in order. In a band the fragments of near drops are gathered in a batch, traced
+   as vectors, looked up and blended.
+   ------------------------------------------------------------------------------------------------ */
+
+RAINDROP_DEF raindrop_camera raindrop_camera_defaults(void)
+{
+    raindrop_camera camera;
+    memset(&camera, 0, sizeof camera);
+    camera.right[0] = camera.up[1] = camera.back[2] = 1;
+    camera.fov_y = (float)(RAINDROP__PI / 2);
+    camera.near_distance = 0.01f;
+    camera.focus_distance = 3;
+    return camera;
+}
+
+RAINDROP_DEF raindrop_camera raindrop_camera_look(const float position[3], const float target[3], const float up[3], float fov_y)
+{
+    raindrop_camera camera = raindrop_camera_defaults();
+    float side[3], along;
+    raindrop__set(camera.position, position[0], position[1], position[2]);
+    raindrop__combine(camera.back, 1, position, -1, target);
+    raindrop__normalise(camera.back);
+    if (!(raindrop__dot(camera.back, camera.back) > 0)) camera.back[2] = 1;
+    along = raindrop__dot(up, camera.back);
+    raindrop__combine(camera.up, 1, up, -along, camera.back);
+    if (raindrop__dot(camera.up, camera.up) <= 1e-8f * raindrop__dot(up, up)) raindrop__perpendicular(side, camera.up, camera.back);
+    raindrop__normalise(camera.up);
+    raindrop__set(camera.right, camera.up[1] * camera.back[2] - camera.up[2] * camera.back[1],
+                  camera.up[2] * camera.back[0] - camera.up[0] * camera.back[2],
+                  camera.up[0] * camera.back[1] - camera.up[1] * camera.back[0]);
+    camera.fov_y = fov_y;
+    return camera;
+}
+
+RAINDROP_DEF raindrop_render_options raindrop_render_defaults(void)
+{
+    raindrop_render_options o;
+    memset(&o, 0, sizeof o);
+    o.look = RAINDROP_LOOK_AUTO;
+    o.far_radius = 1.5f;
+    o.coverage_threshold = 0.0001f;
+    o.orders = 1;
+    o.orders_radius = 8;
+    o.sort = 1;
+    return o;
+}
+
+enum { RAINDROP__BAND = 16, RAINDROP__BATCH = 128 };
+#define RAINDROP__FAR_BIT 0x80000000u
+
+typedef struct raindrop__frame {
+    raindrop_camera camera;
+    raindrop_render_options options;
+    const raindrop_rain *rain;
+    const raindrop_environment *environment;
+    const float *depth;
+    unsigned char *rgb;
+    ptrdiff_t stride;
+    int width, height, visible;
+    float focal, half_width, half_height; /* pixels */
+    float side_x, side_y;                 /* lengths of the normals of the frustum's sides */
+    const raindrop__pair *order;
+} raindrop__frame;
+
+/* A drop in view space: x right, y up, z forward; the quantities drawing starts from. */
+typedef struct raindrop__placed { float x, y, z, radius, distance2, flatness; } raindrop__placed;
+
+static inline void raindrop__place_drop(raindrop__placed *placed, const raindrop__frame *frame, const raindrop_drop *drop)
+{
+    float rel[3];
+    raindrop__combine(rel, 1, drop->position, -1, frame->camera.position);
+    placed->x = raindrop__dot(rel, frame->camera.right);
+    placed->y = raindrop__dot(rel, frame->camera.up);
+    placed->z = -raindrop__dot(rel, frame->camera.back);
+    placed->flatness = drop->axis_ratio;
+    /* half axis across: the sphere of equal volume has radius a ratio^(1/3) */
+    placed->radius = drop->axis_ratio < 1 ? drop->radius / cbrtf(drop->axis_ratio) : drop->radius;
+    placed->distance2 = placed->x * placed->x + placed->y * placed->y + placed->z * placed->z;
+}
+
+/* Where the drop's silhouette begins and ends in a direction of the picture, by the tangents from the eye; exact for
+   z > radius, which the near plane guarantees. In units of the focal length. */
+static inline void raindrop__tangents(float range[2], float u, float z, float radius)
+{
+    float q = sqrtf(u * u + z * z - radius * radius);
+    range[0] = (u * q - radius * z) / (z * q + radius * u);
+    range[1] = (u * q + radius * z) / (z * q - radius * u);
+}
+
+typedef struct raindrop__box { int x0, y0, x1, y1; } raindrop__box;
+
+static inline int raindrop__pixel(float v, int limit)
+{
+    float inside = raindrop__clamp(v, 0, (float)limit);
+    return (int)inside;
+}
+
+static inline raindrop__box raindrop__make_box(const raindrop__frame *frame, float x0, float y0, float x1, float y1)
+{
+    raindrop__box box;
+    box.x0 = raindrop__pixel(floorf(x0), frame->width);
+    box.y0 = raindrop__pixel(floorf(y0), frame->height);
+    box.x1 = raindrop__pixel(ceilf(x1), frame->width);
+    box.y1 = raindrop__pixel(ceilf(y1), frame->height);
+    return box;
+}
+
+static inline int raindrop__is_sprite(const raindrop__frame *frame) { return frame->options.look <= RAINDROP_LOOK_SPRITE; }
+static inline int raindrop__is_still(const raindrop__visible *v)
+{
+    return v->streak[0] * v->streak[0] + v->streak[1] * v->streak[1] + v->blur * v->blur < 0.0625f;
+}
+
+/* Half side in pixels of the published sprite: from the depth, not the Euclidean distance, which is the better of the
+   two readings off axis; at least a pixel wide. */
+static inline float raindrop__sprite_half(const raindrop__frame *frame, const raindrop__placed *placed)
+{
+    float half = frame->focal * placed->radius / sqrtf(placed->distance2 - placed->radius * placed->radius);
+    half *= sqrtf(placed->distance2) / placed->z;
+    return half > 0.5f ? half : 0.5f;
+}
+
+/* Radius of the round, soft disc that stands for a drop that is moving or out of focus: the second moments of the
+   drop, the circle of confusion and the pixel add up. */
+static inline float raindrop__soft_radius(const raindrop__visible *v) { return sqrtf(v->radius * v->radius + v->blur * v->blur + 1.0f / 3); }
+
+/* The pixels a drop may touch. */
+static inline raindrop__box raindrop__bounds(const raindrop__frame *frame, const raindrop__visible *v, const raindrop__placed *placed)
+{
+    float across[2], up[2], wide = 0.5f, ax = 0.5f * fabsf(v->streak[0]) + 0.5f + v->blur, ay = 0.5f * fabsf(v->streak[1]) + 0.5f + v->blur;
+    if (raindrop__is_sprite(frame)) {
+        float half = raindrop__sprite_half(frame, placed);
+        return raindrop__make_box(frame, ceilf(v->x - half - 0.5f), ceilf(v->y - half - 0.5f), floorf(v->x + half - 0.5f) + 1, floorf(v->y + half - 0.5f) + 1);
+    }
+    if (v->drop & RAINDROP__FAR_BIT) {
+        wide = raindrop__is_still(v) ? 0.886227f * v->radius : raindrop__soft_radius(v) + 0.5f * fabsf(v->streak[0]);
+        ay = raindrop__is_still(v) ? wide : raindrop__soft_radius(v) + 0.5f * fabsf(v->streak[1]);
+        return raindrop__make_box(frame, v->x - wide, v->y - ay, v->x + wide, v->y + ay);
+    }
+    raindrop__tangents(across, placed->x, placed->z, placed->radius);
+    raindrop__tangents(up, placed->y, placed->z, placed->radius);
+    return raindrop__make_box(frame, frame->half_width + frame->focal * across[0] - ax, frame->half_height - frame->focal * up[1] - ay,
+                              frame->half_width + frame->focal * across[1] + ax, frame->half_height - frame->focal * up[0] + ay);
+}
+
+/* A scene depth that lies in front. */
+static inline int raindrop__occluded(const raindrop__frame *frame, size_t pixel, float depth)
+{
+    float scene;
+    if (!frame->depth) return 0;
+    scene = frame->depth[pixel];
+    return scene > 0 && scene < depth && sat__is_finite(scene);
+}
+
+static inline int raindrop__all_occluded(const raindrop__frame *frame, const raindrop__box *box, float depth)
+{
+    int x, y;
+    if (!frame->depth) return 0;
+    for (y = box->y0; y < box->y1; y++)
+        for (x = box->x0; x < box->x1; x++)
+            if (!raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, depth)) return 0;
+    return 1;
+}
+
+/* ---- 1 cull */
+
+#ifndef RAINDROP_NO_STREAK
+static inline void raindrop__add_motion(raindrop__visible *v, const raindrop__frame *frame, const raindrop__placed *placed, const raindrop_drop *drop)
+{
+    const raindrop_camera *camera = &frame->camera;
+    float relative[3], vx, vy, vz, scale = frame->focal * camera->exposure / placed->z;
+    if (camera->exposure > 0) {
+        raindrop__combine(relative, 1, drop->velocity, -1, camera->velocity);
+        vx = raindrop__dot(relative, camera->right);
+        vy = raindrop__dot(relative, camera->up);
+        vz = -raindrop__dot(relative, camera->back);
+        v->streak[0] = raindrop__clamp(scale * (vx - placed->x / placed->z * vz), -1e5f, 1e5f);
+        v->streak[1] = raindrop__clamp(-scale * (vy - placed->y / placed->z * vz), -1e5f, 1e5f);
+    }
+    if (camera->aperture > 0)
+        v->blur = raindrop__clamp(0.5f * camera->aperture * frame->focal * fabsf(1 / placed->z - 1 / camera->focus_distance), 0, 1e5f);
+}
+#endif
+
+static inline raindrop__fate raindrop__reject(const raindrop__frame *frame, const raindrop_drop *drop, const raindrop__placed *placed, float reach)
+{
+    float r = placed->radius;
+    if (!raindrop__finite3(drop->position) || !sat__is_finite(drop->radius) || !(drop->radius > 0) || !(drop->axis_ratio > 0) ||
+        !(drop->axis_ratio <= 1) || !raindrop__finite3(drop->velocity) || !sat__is_finite(placed->distance2))
+        return RAINDROP__INVALID;
+    if (placed->distance2 <= 1.0001f * r * r) return RAINDROP__INSIDE;
+    if (placed->z <= 0) return RAINDROP__BEHIND;
+    if (!(placed->z - r > frame->camera.near_distance) || !(placed->z > 1.0001f * r)) return RAINDROP__NEAR_PLANE;
+    reach = r + reach * placed->z / frame->focal;
+    if (fabsf(placed->x) * frame->focal - placed->z * frame->half_width > reach * frame->side_x) return RAINDROP__OUTSIDE;
+    if (fabsf(placed->y) * frame->focal - placed->z * frame->half_height > reach * frame->side_y) return RAINDROP__OUTSIDE;
+    return RAINDROP__NEAR;
+}
+
+/* Direction from the eye to a view-space point, in the world. */
+static inline void raindrop__to_world(float out[3], const raindrop_camera *camera, float x, float y, float forward)
+{
+    int i;
+    for (i = 0; i < 3; i++) out[i] = x * camera->right[i] + y * camera->up[i] - forward * camera->back[i];
+}
+
+static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop__frame *frame, uint32_t index, double *left_out)
+{
+    const raindrop_drop *drop = &frame->rain->drops[index];
+    raindrop__placed placed;
+    raindrop__fate fate;
+    raindrop__box box;
+    float tangent2, stretch, area, world[3], colour[4];
+    raindrop__place_drop(&placed, frame, drop);
+    v->streak[0] = v->streak[1] = v->blur = 0;
+    fate = raindrop__reject(frame, drop, &placed, 1);
+    if (fate == RAINDROP__INVALID || fate == RAINDROP__INSIDE || fate == RAINDROP__BEHIND || fate == RAINDROP__NEAR_PLANE) return fate;
+#ifndef RAINDROP_NO_STREAK
+    if (!raindrop__is_sprite(frame) && (frame->camera.exposure > 0 || frame->camera.aperture > 0)) {
+        raindrop__add_motion(v, frame, &placed, drop);
+        fate = raindrop__reject(frame, drop, &placed, 1 + v->blur + 0.5f * (fabsf(v->streak[0]) + fabsf(v->streak[1])));
+    }
+#endif
+    if (fate != RAINDROP__NEAR) return fate;
+    /* the silhouette is an ellipse of half axes f tan and about f tan / cos^2 of the angle off axis: area f^2 tan^2 pi / cos^3 */
+    tangent2 = placed.radius * placed.radius / (placed.distance2 - placed.radius * placed.radius);
+    stretch = sqrtf(placed.distance2) / placed.z;
+    v->radius = frame->focal * sqrtf(tangent2 * placed.flatness * stretch * stretch * stretch);
+    area = (float)RAINDROP__PI * v->radius * v->radius;
+    if (area < frame->options.coverage_threshold) {
+        *left_out += (double)area;
+        return RAINDROP__BELOW;
+    }
+    v->x = frame->half_width + frame->focal * placed.x / placed.z;
+    v->y = frame->half_height - frame->focal * placed.y / placed.z;
+    v->depth = placed.z;
+    v->drop = index;
+    if (frame->options.look == RAINDROP_LOOK_AUTO && v->radius < frame->options.far_radius) {
+        v->drop |= RAINDROP__FAR_BIT;
+        fate = RAINDROP__FAR;
+    }
+    box = raindrop__bounds(frame, v, &placed);
+    if (box.x0 >= box.x1 || box.y0 >= box.y1) return RAINDROP__OUTSIDE;
+    if (raindrop__all_occluded(frame, &box, v->depth)) return RAINDROP__HIDDEN;
+    v->rows = (uint32_t)box.y0 << 16 | (uint32_t)box.y1;
+    if (fate == RAINDROP__FAR || !raindrop__is_still(v)) {
+        raindrop__to_world(world, &frame->camera, placed.x, placed.y, placed.z);
+        raindrop__far(colour, frame->environment, world);
+        raindrop__set(v->colour, colour[0], colour[1], colour[2]);
+    }
+    return fate;
+}
+
+static void raindrop__cull_range(int begin, int end, int worker, void *context)
+{
+    const raindrop__frame *frame = (const raindrop__frame *)context;
+    int chunk, i;
+    (void)worker;
+    for (chunk = begin; chunk < end; chunk++) {
+        int first = chunk * RAINDROP__CHUNK, last = sat__min_int(first + RAINDROP__CHUNK, frame->rain->count);
+        raindrop__chunk tally;
+        memset(&tally, 0, sizeof tally);
+        for (i = first; i < last; i++) {
+            raindrop__fate fate = raindrop__cull(&frame->rain->visible[first + tally.visible], frame, (uint32_t)i, &tally.coverage_left_out);
+            tally.fates[fate]++;
+            tally.visible += fate <= RAINDROP__FAR;
+        }
+        frame->rain->chunks[chunk] = tally;
+    }
+}
+
+/* ---- 2 sort: a stable radix sort by depth, three passes of 11 bits */
+
+static inline int raindrop__gather_pairs(const raindrop_rain *rain)
+{
+    int chunk, i, n = 0, chunks = rain->count / RAINDROP__CHUNK + (rain->count % RAINDROP__CHUNK != 0);
+    for (chunk = 0; chunk < chunks; chunk++) {
+        for (i = 0; i < rain->chunks[chunk].visible; i++, n++) {
+            uint32_t at = (uint32_t)(chunk * RAINDROP__CHUNK + i);
+            rain->pairs[0][n].key = ~sat__float_bits(rain->visible[at].depth); /* depths are positive: bits order as values do */
+            rain->pairs[0][n].at = at;
+        }
+    }
+    return n;
+}
+
+static inline void raindrop__sort_pass(raindrop__pair *out, const raindrop__pair *in, int n, int shift)
+{
+    uint32_t start[2049], digit;
+    int i;
+    memset(start, 0, sizeof start);
+    for (i = 0; i < n; i++) start[((in[i].key >> shift) & 2047u) + 1]++;
+    for (digit = 1; digit < 2048; digit++) start[digit] += start[digit - 1];
+    for (i = 0; i < n; i++) out[start[(in[i].key >> shift) & 2047u]++] = in[i];
+}
+
+static inline const raindrop__pair *raindrop__sort(const raindrop_rain *rain, int n, int sort)
+{
+    const raindrop__pair *order = rain->pairs[0];
+    int i;
+    if (sort) {
+        raindrop__sort_pass(rain->pairs[1], rain->pairs[0], n, 0);
+        raindrop__sort_pass(rain->pairs[0], rain->pairs[1], n, 11);
+        raindrop__sort_pass(rain->pairs[1], rain->pairs[0], n, 22);
+        order = rain->pairs[1];
+    }
+    for (i = 0; i < n; i++) rain->rows[i] = rain->visible[order[i].at].rows;
+    return order;
+}
+
+/* ---- 3 draw: fragments of near drops in batches of arrays */
+
+typedef struct raindrop__batch {
+    const raindrop__frame *frame;
+    raindrop__tally *tally;
+    int count, samples; /* fragments; consecutive ones that are averaged before they are blended */
+    float focal_in_radii; /* of the drop being drawn: z / (focal radius), so that q = pixels times this */
+    float width, blur;    /* footprint of a pixel in b, and its widening */
+    int orders;           /* -1: the short way without orders */
+    float flatness;
+    int pixel[RAINDROP__BATCH];
+    float slope_x[RAINDROP__BATCH], slope_y[RAINDROP__BATCH]; /* the pixel's ray (x, y, -1) */
+    float offset_x[RAINDROP__BATCH], offset_y[RAINDROP__BATCH]; /* q: where it passes the plane of the centre, in radii */
+    float alpha[RAINDROP__BATCH];
+    float direction[3][RAINDROP__BATCH], closest[3][RAINDROP__BATCH], one_minus_b2[RAINDROP__BATCH];
+    float reflect[3][RAINDROP__BATCH], refract[3][RAINDROP__BATCH], fresnel[RAINDROP__BATCH], pass[RAINDROP__BATCH];
+    float reflect_cone[RAINDROP__BATCH], refract_cone[RAINDROP__BATCH]; /* footprints in radians */
+} raindrop__batch;
+
+/* b and its gradient at a pixel decide how much of it the drop covers; p and 1-b^2 stay this side of the rim. */
+static inline void raindrop__batch_rays(raindrop__batch *batch, int keep_alpha)
+{
+    const raindrop_camera *camera = &batch->frame->camera;
+    const raindrop__v one = raindrop__splat(1), half = raindrop__splat(0.5f), rim = raindrop__splat(batch->flatness < 1 ? 1e9f : 0.999f);
+    const raindrop__v k = raindrop__splat(batch->focal_in_radii), per_focal = raindrop__splat(1 / batch->frame->focal);
+    int at, i;
+    for (at = 0; at < batch->count; at += RAINDROP__LANES) {
+        raindrop__v x = raindrop__load(batch->slope_x + at), y = raindrop__load(batch->slope_y + at);
+        raindrop__v qx = raindrop__load(batch->offset_x + at), qy = raindrop__load(batch->offset_y + at);
+        raindrop__v per_length2 = raindrop__div(one, raindrop__add(one, raindrop__add(raindrop__mul(x, x), raindrop__mul(y, y))));
+        raindrop__v per_length = raindrop__sqrt(per_length2), w = raindrop__add(raindrop__mul(qx, x), raindrop__mul(qy, y));
+        raindrop__v t = raindrop__mul(w, per_length2); /* p = q - t (x, y, -1) */
+        raindrop__v px = raindrop__sub(qx, raindrop__mul(t, x)), py = raindrop__sub(qy, raindrop__mul(t, y));
+        raindrop__v b2 = raindrop__add(raindrop__add(raindrop__mul(px, px), raindrop__mul(py, py)), raindrop__mul(t, t));
+        raindrop__v b = raindrop__sqrt(raindrop__max(b2, raindrop__splat(1e-12f))), inward, pz = t;
+        if (!keep_alpha) {
+            /* half the gradient of b^2: (q - t r) (k - t / f), without the small change of the ray's length */
+            raindrop__v scale = raindrop__sub(k, raindrop__mul(t, per_focal));
+            raindrop__v gx = raindrop__mul(px, scale), gy = raindrop__mul(py, scale);
+            raindrop__v slope = raindrop__div(raindrop__sqrt(raindrop__add(raindrop__mul(gx, gx), raindrop__mul(gy, gy))), b);
+            raindrop__v cover = raindrop__add(half, raindrop__div(raindrop__sub(one, b), raindrop__max(slope, raindrop__splat(1e-9f))));
+            raindrop__store(batch->alpha + at, raindrop__min(raindrop__max(cover, raindrop__splat(0)), one));
+        }
+        inward = raindrop__min(one, raindrop__div(rim, b));
+        raindrop__store(batch->one_minus_b2 + at, raindrop__max(raindrop__sub(one, b2), raindrop__splat(1 - 0.999f * 0.999f)));
+        px = raindrop__mul(px, inward);
+        py = raindrop__mul(py, inward);
+        pz = raindrop__mul(pz, inward);
+        for (i = 0; i < 3; i++) {
+            raindrop__v right = raindrop__splat(camera->right[i]), up = raindrop__splat(camera->up[i]), back = raindrop__splat(camera->back[i]);
+            raindrop__v d = raindrop__sub(raindrop__add(raindrop__mul(x, right), raindrop__mul(y, up)), back);
+            raindrop__store(batch->direction[i] + at, raindrop__mul(d, per_length));
+            raindrop__store(batch->closest[i] + at, raindrop__add(raindrop__add(raindrop__mul(px, right), raindrop__mul(py, up)), raindrop__mul(pz, back)));
+        }
+    }
+}
+
+/* The two lookups' directions, weights and cones. */
+static inline void raindrop__batch_trace(raindrop__batch *batch)
+{
+    const raindrop__v width = raindrop__splat(batch->width), pixel = raindrop__splat(1 / batch->frame->focal), blur = raindrop__splat(batch->blur);
+    const int exit_fresnel = batch->frame->options.exit_fresnel;
+    const float n = batch->frame->environment->n;
+    int at, i;
+    for (at = 0; at < batch->count; at += RAINDROP__LANES) {
+        raindrop__v d[3], p[3];
+        raindrop__rays rays;
+        for (i = 0; i < 3; i++) {
+            d[i] = raindrop__load(batch->direction[i] + at);
+            p[i] = raindrop__load(batch->closest[i] + at);
+        }
+        raindrop__trace_v(&rays, d, p, raindrop__load(batch->one_minus_b2 + at), n);
+        for (i = 0; i < 3; i++) {
+            raindrop__store(batch->reflect[i] + at, rays.reflect[i]);
+            raindrop__store(batch->refract[i] + at, rays.refract[i]);
+        }
+        raindrop__store(batch->fresnel + at, rays.fresnel);
+        raindrop__store(batch->pass + at, exit_fresnel ? rays.transmit : raindrop__sub(raindrop__splat(1), rays.fresnel));
+        raindrop__store(batch->reflect_cone + at, raindrop__mul(blur, raindrop__add(raindrop__mul(rays.footprint_reflect, width), pixel)));
+        raindrop__store(batch->refract_cone + at, raindrop__mul(blur, raindrop__abs(raindrop__sub(raindrop__mul(rays.footprint_refract, width), pixel))));
+    }
+}
+
+/* Square coordinates and mip scale of a block of directions: raindrop__fold without branches. */
+static inline void raindrop__batch_fold(float *u, float *v, float *texels, float (*direction)[RAINDROP__BATCH], const float *cone, int at, float half_resolution)
+{
+    const raindrop__v one = raindrop__splat(1), zero = raindrop__splat(0), half = raindrop__splat(0.5f);
+    raindrop__v x = raindrop__load(direction[0] + at), y = raindrop__load(direction[1] + at), z = raindrop__load(direction[2] + at);
+    raindrop__v sum = raindrop__add(raindrop__add(raindrop__abs(x), raindrop__abs(y)), raindrop__abs(z)), scale = raindrop__div(one, sum);
+    raindrop__v a = raindrop__mul(x, scale), b = raindrop__mul(z, scale), c, d, wide;
+    c = raindrop__sub(one, raindrop__abs(b));
+    d = raindrop__sub(one, raindrop__abs(a));
+    c = raindrop__if_less(a, zero, raindrop__sub(zero, c), c);
+    d = raindrop__if_less(b, zero, raindrop__sub(zero, d), d);
+    a = raindrop__if_less(y, zero, c, a);
+    b = raindrop__if_less(y, zero, d, b);
+    a = raindrop__add(raindrop__mul(a, half), half);
+    b = raindrop__add(raindrop__mul(b, half), half);
+    wide = raindrop__mul(raindrop__load(cone + at), raindrop__splat(half_resolution));
+    raindrop__store(u + at, raindrop__min(raindrop__max(a, zero), one));
+    raindrop__store(v + at, raindrop__min(raindrop__max(b, zero), one));
+    raindrop__store(texels + at, raindrop__div(wide, raindrop__mul(sum, raindrop__sqrt(sum))));
+}
+
+/* Colours by two lookups each; colour[i] gets red, green, blue, and a lane that means nothing. */
+static inline void raindrop__batch_lookup(float (*colour)[4], raindrop__batch *batch)
+{
+    const raindrop_environment *environment = batch->frame->environment;
+    const raindrop__sphere *sphere = &environment->near_sphere;
+    float u[2][RAINDROP__BATCH], v[2][RAINDROP__BATCH], texels[2][RAINDROP__BATCH], mirrored[4], through[4], half = 0.5f * (float)sphere->resolution;
+    int i, c;
+    if (!environment->table) {
+        for (i = 0; i < batch->count; i += RAINDROP__LANES) {
+            raindrop__batch_fold(u[0], v[0], texels[0], batch->reflect, batch->reflect_cone, i, half);
+            raindrop__batch_fold(u[1], v[1], texels[1], batch->refract, batch->refract_cone, i, half);
+        }
+    }
+    for (i = 0; i < batch->count; i++) {
+        if (!(batch->alpha[i] > 0)) {
+            memset(colour[i], 0, sizeof colour[i]);
+            continue;
+        }
+        if (environment->table) {
+            float d[3];
+            raindrop__set(d, batch->reflect[0][i], batch->reflect[1][i], batch->reflect[2][i]);
+            raindrop__sample_table(mirrored, environment, d, batch->reflect_cone[i]);
+            raindrop__set(d, batch->refract[0][i], batch->refract[1][i], batch->refract[2][i]);
+            raindrop__sample_table(through, environment, d, batch->refract_cone[i]);
+        } else {
+            float at[2];
+            at[0] = u[0][i];
+            at[1] = v[0][i];
+            raindrop__trilinear(mirrored, sphere, at, texels[0][i]);
+            at[0] = u[1][i];
+            at[1] = v[1][i];
+            raindrop__trilinear(through, sphere, at, texels[1][i]);
+        }
+        for (c = 0; c < 4; c++) colour[i][c] = batch->fresnel[i] * mirrored[c] + batch->pass[i] * through[c];
+    }
+}
+
+/* Share of pixel i that a flattened drop covers, by b and its gradient in the space where it is a sphere; p moves to
+   this side of the rim. */
+static inline float raindrop__flat_cover(const raindrop__batch *batch, const float d[3], float p[3])
+{
+    const raindrop_camera *camera = &batch->frame->camera;
+    float stretch = 1 / batch->flatness, unit[3], q[3], along, b, gx, gy;
+    raindrop__set(unit, d[0], d[1] * stretch, d[2]);
+    raindrop__set(q, p[0], p[1] * stretch, p[2]);
+    along = raindrop__dot(q, unit) / raindrop__dot(unit, unit);
+    raindrop__combine(q, 1, q, -along, unit);
+    b = sqrtf(raindrop__dot(q, q)) + 1e-9f;
+    gx = q[0] * camera->right[0] + q[1] * stretch * camera->right[1] + q[2] * camera->right[2];
+    gy = q[0] * camera->up[0] + q[1] * stretch * camera->up[1] + q[2] * camera->up[2];
+    gx = batch->focal_in_radii * sqrtf(gx * gx + gy * gy) / b;
+    if (b > 0.999f) raindrop__combine(q, 0.999f / b, q, 0, q);
+    raindrop__set(p, q[0], q[1] * batch->flatness, q[2]);
+    return raindrop__clamp((1 - b) / (gx + 1e-9f) + 0.5f, 0, 1);
+}
+
+/* One fragment of a flattened drop. */
+static inline void raindrop__flat_colour(float colour[4], raindrop__batch *batch, int i, const float d[3], float p[3])
+{
+    const raindrop_environment *environment = batch->frame->environment;
+    float pixel = 1 / batch->frame->focal, v[4], cover = raindrop__flat_cover(batch, d, p);
+    raindrop_ray ray;
+    int c;
+    if (batch->samples == 1 && !(batch->blur > 1)) batch->alpha[i] = cover;
+    if (!raindrop_trace_spheroid(&ray, d, p, batch->flatness, environment->n)) return;
+    raindrop__sample(v, environment, ray.reflect, batch->blur * (ray.footprint_reflect * batch->width + pixel));
+    for (c = 0; c < 3; c++) colour[c] = ray.fresnel * v[c];
+    raindrop__sample(v, environment, ray.refract, batch->blur * fabsf(ray.footprint_refract * batch->width - pixel));
+    for (c = 0; c < 3; c++) colour[c] += (batch->frame->options.exit_fresnel ? ray.transmit : 1 - ray.fresnel) * v[c];
+}
+
+/* Large drops: all orders, one ray at a time. Flattened ones: their own two hits. */
+static inline void raindrop__batch_slow(float (*colour)[4], raindrop__batch *batch)
+{
+    const raindrop_environment *environment = batch->frame->environment;
+    float pixel = 1 / batch->frame->focal, v[4], d[3], p[3];
+    int i, c, k;
+    for (i = 0; i < batch->count; i++) {
+        raindrop_ray ray;
+        memset(colour[i], 0, sizeof colour[i]);
+        if (!(batch->alpha[i] > 0)) continue;
+        raindrop__set(d, batch->direction[0][i], batch->direction[1][i], batch->direction[2][i]);
+        raindrop__set(p, batch->closest[0][i], batch->closest[1][i], batch->closest[2][i]);
+        if (batch->flatness < 1) {
+            raindrop__flat_colour(colour[i], batch, i, d, p);
+            continue;
+        }
+        raindrop_trace(&ray, d, p, batch->one_minus_b2[i], environment->n);
+        raindrop__sample(v, environment, ray.reflect, batch->blur * (ray.footprint_reflect * batch->width + pixel));
+        for (c = 0; c < 3; c++) colour[i][c] = ray.fresnel * v[c];
+        for (k = 0; k <= batch->orders; k++) {
+            raindrop_order order;
+            float share;
+            raindrop_trace_order(&order, d, p, batch->one_minus_b2[i], environment->n, k);
+            share = k == batch->orders && !batch->frame->options.exit_fresnel ? order.rest : order.weight;
+            raindrop__sample(v, environment, order.direction, batch->blur * fabsf(order.footprint * batch->width - pixel));
+            for (c = 0; c < 3; c++) colour[i][c] += share * v[c];
+        }
+        batch->tally->order_fragments += batch->orders > 0;
+    }
+}
+
+static inline void raindrop__blend(const raindrop__frame *frame, int pixel, float alpha, const float colour[3])
+{
+    float *out = (float *)(void *)(frame->rgb + (ptrdiff_t)(pixel / frame->width) * frame->stride) + 3 * (pixel % frame->width);
+    out[0] += alpha * (colour[0] - out[0]);
+    out[1] += alpha * (colour[1] - out[1]);
+    out[2] += alpha * (colour[2] - out[2]);
+}
+
+static inline void raindrop__batch_blend(raindrop__batch *batch, float (*colour)[4])
+{
+    int i, j, c, m = batch->samples;
+    for (i = 0; i + m <= batch->count; i += m) {
+        float mean[3] = {0, 0, 0};
+        for (j = i; j < i + m; j++)
+            for (c = 0; c < 3; c++) mean[c] += colour[j][c];
+        for (c = 0; c < 3; c++) mean[c] /= (float)m;
+        if (!(batch->alpha[i] > 0)) continue;
+        raindrop__blend(batch->frame, batch->pixel[i], batch->alpha[i], mean);
+        batch->tally->fragments++;
+    }
+    batch->count = 0;
+}
+
+/* The arrays are traced in whole vectors: what lies behind the last fragment repeats it. */
+static inline void raindrop__batch_pad(raindrop__batch *batch)
+{
+    int at, last = batch->count - 1, end = (batch->count + RAINDROP__LANES - 1) / RAINDROP__LANES * RAINDROP__LANES;
+    for (at = batch->count; at < end; at++) {
+        batch->slope_x[at] = batch->slope_x[last];
+        batch->slope_y[at] = batch->slope_y[last];
+        batch->offset_x[at] = batch->offset_x[last];
+        batch->offset_y[at] = batch->offset_y[last];
+    }
+}
+
+static inline void raindrop__flush_rays(raindrop__batch *batch, int keep_alpha)
+{
+    float colour[RAINDROP__BATCH][4];
+    if (!batch->count) return;
+    raindrop__batch_pad(batch);
+    raindrop__batch_rays(batch, keep_alpha);
+    if (batch->orders >= 0 || batch->flatness < 1) raindrop__batch_slow(colour, batch);
+    else {
+        raindrop__batch_trace(batch);
+        raindrop__batch_lookup(colour, batch);
+    }
+    raindrop__batch_blend(batch, colour);
+}
+
+/* A fragment: pixel (x, y) sees the drop whose centre is projected to (centre_x, centre_y). */
+static inline void raindrop__push_ray(raindrop__batch *batch, int x, int y, float centre_x, float centre_y)
+{
+    const raindrop__frame *frame = batch->frame;
+    int at = batch->count++;
+    batch->pixel[at] = y * frame->width + x;
+    batch->slope_x[at] = ((float)x + 0.5f - frame->half_width) / frame->focal;
+    batch->slope_y[at] = (frame->half_height - (float)y - 0.5f) / frame->focal;
+    batch->offset_x[at] = ((float)x + 0.5f - centre_x) * batch->focal_in_radii;
+    batch->offset_y[at] = (centre_y - (float)y - 0.5f) * batch->focal_in_radii;
+}
+
+static inline void raindrop__begin_drop(raindrop__batch *batch, const raindrop__visible *v, const raindrop__placed *placed)
+{
+    const raindrop_render_options *o = &batch->frame->options;
+    batch->focal_in_radii = placed->z / (batch->frame->focal * placed->radius);
+    batch->width = 1 / (batch->frame->focal * placed->radius / sqrtf(placed->distance2 - placed->radius * placed->radius));
+    batch->blur = 1;
+    batch->samples = 1;
+    batch->flatness = placed->flatness;
+    batch->orders = (o->orders > 0 || o->exit_fresnel) && v->radius >= o->orders_radius && !raindrop__is_sprite(batch->frame) ? o->orders : -1;
+}
+
+static inline void raindrop__draw_still(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
+{
+    const raindrop__frame *frame = batch->frame;
+    int x, y;
+    for (y = box->y0; y < box->y1; y++) {
+        for (x = box->x0; x < box->x1; x++) {
+            if (raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth)) continue;
+            raindrop__push_ray(batch, x, y, v->x, v->y);
+            if (batch->count == RAINDROP__BATCH) raindrop__flush_rays(batch, 0);
+        }
+    }
+    raindrop__flush_rays(batch, 0);
+}
+
+/* ---- motion and defocus
+
+   A disc of radius r that moves l pixels covers a pixel, u along and w across the path from the middle, for the share
+   ([u-h, u+h] cut with [-l/2, l/2]) / l of the time, h = sqrt(r^2 - w^2) being half its chord: for every l, and in the
+   limit l = 0 the disc itself. Its integral over the picture is the disc's area. */
+
+typedef struct raindrop__path { float along[2], length, radius; } raindrop__path;
+
+static inline raindrop__path raindrop__path_of(const raindrop__visible *v, float radius)
+{
+    raindrop__path path;
+    float length = sqrtf(v->streak[0] * v->streak[0] + v->streak[1] * v->streak[1]);
+    path.along[0] = length > 1e-6f ? v->streak[0] / length : 1;
+    path.along[1] = length > 1e-6f ? v->streak[1] / length : 0;
+    path.length = length > 1 ? length : 1; /* a pixel of softness along the path */
+    path.radius = radius;
+    return path;
+}
+
+/* [from, to] along the path, in pixels from its middle, while the pixel is covered; returns its share. */
+static inline float raindrop__path_cover(float span[2], const raindrop__path *path, float dx, float dy)
+{
+    float u = dx * path->along[0] + dy * path->along[1], w = dy * path->along[0] - dx * path->along[1];
+    float h2 = path->radius * path->radius - w * w, h;
+    if (h2 <= 0) return 0;
+    h = sqrtf(h2);
+    span[0] = u - h > -0.5f * path->length ? u - h : -0.5f * path->length;
+    span[1] = u + h < 0.5f * path->length ? u + h : 0.5f * path->length;
+    return span[1] > span[0] ? (span[1] - span[0]) / path->length : 0;
+}
+
+static inline void raindrop__draw_far_soft(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
+{
+    const raindrop__frame *frame = batch->frame;
+    raindrop__path path = raindrop__path_of(v, raindrop__soft_radius(v));
+    float opacity = v->radius * v->radius / (path.radius * path.radius), span[2];
+    int x, y;
+    for (y = box->y0; y < box->y1; y++) {
+        for (x = box->x0; x < box->x1; x++) {
+            int pixel = y * frame->width + x;
+            float alpha = opacity * raindrop__path_cover(span, &path, (float)x + 0.5f - v->x, (float)y + 0.5f - v->y);
+            if (!(alpha > 0) || raindrop__occluded(frame, (size_t)pixel, v->depth)) continue;
+            raindrop__blend(frame, pixel, alpha, v->colour);
+            batch->tally->fragments++;
+        }
+    }
+}
+
+#ifndef RAINDROP_NO_STREAK
+/* Area that discs of radii r and c share, their centres `apart`: how much of a lens sees the drop. */
+static inline float raindrop__lens(float r, float c, float apart)
+{
+    float small = r < c ? r : c, x, y, k;
+    if (apart >= r + c) return 0;
+    if (apart <= fabsf(r - c)) return (float)RAINDROP__PI * small * small;
+    x = raindrop__clamp((apart * apart + r * r - c * c) / (2 * apart * r), -1, 1);
+    y = raindrop__clamp((apart * apart + c * c - r * r) / (2 * apart * c), -1, 1);
+    k = (r + c - apart) * (apart + r - c) * (apart - r + c) * (apart + r + c);
+    return r * r * acosf(x) + c * c * acosf(y) - 0.5f * sqrtf(k > 0 ? k : 0);
+}
+
+static inline void raindrop__flush_soft(raindrop__batch *batch, float *alpha)
+{
+    int i;
+    for (i = 0; i < batch->count; i++) batch->alpha[i] = alpha[i];
+    raindrop__flush_rays(batch, 1);
+}
+
+/* A near drop that moves or is out of focus. Its colour at a pixel is the mean of a few rays along the covered part of
+   the path; across the lens the drop is blurred by wider footprints. */
+static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
+{
+    const raindrop__frame *frame = batch->frame;
+    raindrop__path path = raindrop__path_of(v, v->blur > 0.25f ? sqrtf(v->radius * v->radius + v->blur * v->blur) : v->radius);
+    int moving = v->streak[0] * v->streak[0] + v->streak[1] * v->streak[1] > 0.0625f, samples = !moving ? 1 : v->radius < 6 ? 4 : v->radius < 24 ? 8 : 16;
+    float opacity = v->radius * v->radius / (path.radius * path.radius), alpha[RAINDROP__BATCH], span[2] = {0, 0}, spacing;
+    int x, y, j;
+    batch->samples = samples;
+    batch->orders = -1;
+    spacing = moving ? (2 * v->radius < path.length ? 2 * v->radius : path.length) / (float)samples : 0;
+    batch->blur = 1 + 2 * v->blur + (spacing > 1 ? spacing - 1 : 0);
+    for (y = box->y0; y < box->y1; y++) {
+        for (x = box->x0; x < box->x1; x++) {
+            float dx = (float)x + 0.5f - v->x, dy = (float)y + 0.5f - v->y, cover;
+            if (moving) cover = opacity * raindrop__path_cover(span, &path, dx, dy);
+            else {
+                float blur = v->blur > 0.5f ? v->blur : 0.5f;
+                cover = raindrop__lens(v->radius, blur, sqrtf(dx * dx + dy * dy)) / ((float)RAINDROP__PI * blur * blur);
+            }
+            if (!(cover > 0) || raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth)) continue;
+            for (j = 0; j < samples; j++) {
+                float t = span[0] + (span[1] - span[0]) * ((float)j + 0.5f) / (float)samples;
+                alpha[batch->count] = cover;
+                raindrop__push_ray(batch, x, y, v->x + t * path.along[0], v->y + t * path.along[1]);
+            }
+            if (batch->count + samples > RAINDROP__BATCH) raindrop__flush_soft(batch, alpha);
+        }
+    }
+    raindrop__flush_soft(batch, alpha);
+}
+#endif
+
+/* A far drop that stands still: a square of its area, cut exactly with the pixels. */
+static inline void raindrop__draw_far(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
+{
+    const raindrop__frame *frame = batch->frame;
+    float half = 0.886227f * v->radius; /* sqrt(pi)/2 */
+    int x, y;
+    for (y = box->y0; y < box->y1; y++) {
+        float low = v->y - half > (float)y ? v->y - half : (float)y, high = v->y + half < (float)(y + 1) ? v->y + half : (float)(y + 1);
+        for (x = box->x0; x < box->x1; x++) {
+            float left = v->x - half > (float)x ? v->x - half : (float)x, right = v->x + half < (float)(x + 1) ? v->x + half : (float)(x + 1);
+            float alpha = (high - low) * (right - left);
+            if (!(high > low) || !(right > left) || raindrop__occluded(frame, (size_t)(y * frame->width + x), v->depth)) continue;
+            raindrop__blend(frame, y * frame->width + x, alpha, v->colour);
+            batch->tally->fragments++;
+        }
+    }
+}
+
+/* ---- the published sprites
+
+   R = [u v n] turns the map's frame into the world (eq 2.1), n pointing from the drop to the eye (eq 2.2). Eq 2.3 takes
+   u = V x n, which is not a unit vector and vanishes where n is parallel to V. Here u and v are the camera's right and
+   up under the shortest rotation that takes its back to n: orthonormal for every drop before the camera. */
+static inline void raindrop__sprite_frame(float u[3], float v[3], float n[3], const raindrop_camera *camera, const raindrop__placed *placed)
+{
+    float per_distance = 1 / sqrtf(placed->distance2), r = -placed->x * per_distance, t = -placed->y * per_distance, b = placed->z * per_distance;
+    float k = 1 / (1 + b);
+    int i;
+    for (i = 0; i < 3; i++) {
+        n[i] = r * camera->right[i] + t * camera->up[i] + b * camera->back[i];
+        u[i] = camera->right[i] - r * k * (camera->back[i] + n[i]);
+        v[i] = camera->up[i] - t * k * (camera->back[i] + n[i]);
+    }
+}
+
+static inline void raindrop__rotate(float out[3], const float u[3], const float v[3], const float n[3], const float in[3])
+{
+    int i;
+    for (i = 0; i < 3; i++) out[i] = u[i] * in[0] + v[i] * in[1] + n[i] * in[2];
+}
+
+static inline void raindrop__flush_sprite(raindrop__batch *batch)
+{
+    float colour[RAINDROP__BATCH][4];
+    if (!batch->count) return;
+    if (batch->frame->options.look == RAINDROP_LOOK_SPRITE) raindrop__batch_trace(batch);
+    raindrop__batch_lookup(colour, batch);
+    raindrop__batch_blend(batch, colour);
+}
+
+#ifndef RAINDROP_NO_MAP
+/* One texel of the map, turned; 0 when it is transparent. */
+static inline int raindrop__push_map(raindrop__batch *batch, int at, float s, float t, float lod, float frame[3][3])
+{
+    float texel[8], turned[3], n = batch->frame->environment->n, pixel = 1 / batch->frame->focal;
+    float b2 = raindrop__clamp(s * s + t * t, 0, 0.9999f * (n < 1 ? n * n : 1));
+    raindrop_ray ray;
+    int i;
+    raindrop__map_trilinear(texel, batch->frame->options.map, s, t, lod);
+    if (!(texel[7] > 1.0f / 255)) return 0;
+    raindrop__rotate(turned, frame[0], frame[1], frame[2], texel);
+    raindrop__normalise(turned); /* interpolated vectors are shorter than 1 */
+    for (i = 0; i < 3; i++) batch->reflect[i][at] = turned[i];
+    raindrop__rotate(turned, frame[0], frame[1], frame[2], texel + 4);
+    raindrop__normalise(turned);
+    for (i = 0; i < 3; i++) batch->refract[i][at] = turned[i];
+    batch->alpha[at] = texel[7];
+    batch->fresnel[at] = texel[3];
+    batch->pass[at] = 1 - texel[3];
+    raindrop__surface(&ray, sqrtf(1 - b2), sqrtf(n * n - b2) / n, n);
+    batch->reflect_cone[at] = 2 * batch->width + pixel;
+    batch->refract_cone[at] = fabsf(ray.footprint_refract * batch->width - pixel);
+    return 1;
+}
+#endif
+
+static inline int raindrop__push_sprite(raindrop__batch *batch, int at, float s, float t, float distance, float frame[3][3])
+{
+    float d[3], p[3], turned[3], rho = sqrtf(s * s + t * t);
+    int i;
+    batch->alpha[at] = raindrop__clamp((1 - rho) / batch->width + 0.5f, 0, 1);
+    if (!(batch->alpha[at] > 0)) return 0;
+    if (rho > 0.999f) {
+        s *= 0.999f / rho;
+        t *= 0.999f / rho;
+    }
+    raindrop_sprite_ray(d, p, &batch->one_minus_b2[at], s, t, distance);
+    raindrop__rotate(turned, frame[0], frame[1], frame[2], d);
+    for (i = 0; i < 3; i++) batch->direction[i][at] = turned[i];
+    raindrop__rotate(turned, frame[0], frame[1], frame[2], p);
+    for (i = 0; i < 3; i++) batch->closest[i][at] = turned[i];
+    return 1;
+}
+
+static inline void raindrop__draw_sprite(raindrop__batch *batch, const raindrop__visible *v, const raindrop__placed *placed, const raindrop__box *box)
+{
+    const raindrop__frame *frame = batch->frame;
+    float per_half = 1 / raindrop__sprite_half(frame, placed), axes[3][3], distance2 = placed->distance2 / (placed->radius * placed->radius);
+    float distance = sqrtf(distance2);
+    int x, y, kept;
+#ifndef RAINDROP_NO_MAP
+    float lod = raindrop__map_lod(distance2);
+#endif
+    raindrop__sprite_frame(axes[0], axes[1], axes[2], &frame->camera, placed);
+    for (y = box->y0; y < box->y1; y++) {
+        for (x = box->x0; x < box->x1; x++) {
+            float s = ((float)x + 0.5f - v->x) * per_half, t = (v->y - (float)y - 0.5f) * per_half;
+            int at = batch->count;
+            if (raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth)) continue;
+#ifndef RAINDROP_NO_MAP
+            if (frame->options.look == RAINDROP_LOOK_MAP) kept = raindrop__push_map(batch, at, s, t, lod, axes);
+            else
+#endif
+                kept = raindrop__push_sprite(batch, at, s, t, distance, axes);
+            if (!kept) continue;
+            batch->pixel[at] = y * frame->width + x;
+            batch->count++;
+            if (batch->count == RAINDROP__BATCH) raindrop__flush_sprite(batch);
+        }
+    }
+    raindrop__flush_sprite(batch);
+}
+
+/* ---- one drop, one band, one picture */
+
+static inline void raindrop__draw(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
+{
+    const raindrop__frame *frame = batch->frame;
+    raindrop__placed placed;
+    raindrop__box box;
+    memset(&placed, 0, sizeof placed);
+    if (!(v->drop & RAINDROP__FAR_BIT)) {
+        raindrop__place_drop(&placed, frame, &frame->rain->drops[v->drop]);
+        raindrop__begin_drop(batch, v, &placed);
+    }
+    box = raindrop__bounds(frame, v, &placed);
+    box.y0 = sat__max_int(box.y0, y0);
+    box.y1 = sat__min_int(box.y1, y1);
+    if (raindrop__is_sprite(frame)) raindrop__draw_sprite(batch, v, &placed, &box);
+    else if (v->drop & RAINDROP__FAR_BIT) {
+        if (raindrop__is_still(v)) raindrop__draw_far(batch, v, &box);
+        else raindrop__draw_far_soft(batch, v, &box);
+    }
+#ifndef RAINDROP_NO_STREAK
+    else if (!raindrop__is_still(v)) raindrop__draw_soft(batch, v, &box);
+#endif
+    else raindrop__draw_still(batch, v, &box);
+}
+
+static void raindrop__draw_bands(int begin, int end, int worker, void *context)
+{
+    const raindrop__frame *frame = (const raindrop__frame *)context;
+    raindrop__batch batch;
+    int band, i;
+    memset(&batch, 0, sizeof batch);
+    batch.frame = frame;
+    batch.tally = &frame->rain->tally[worker];
+    for (band = begin; band < end; band++) {
+        int y0 = band * RAINDROP__BAND, y1 = sat__min_int(y0 + RAINDROP__BAND, frame->height);
+        for (i = 0; i < frame->visible; i++) {
+            uint32_t rows = frame->rain->rows[i];
+            if ((int)(rows >> 16) < y1 && (int)(rows & 0xffffu) > y0) raindrop__draw(&batch, &frame->rain->visible[frame->order[i].at], y0, y1);
+        }
+    }
+}
+
+static inline int raindrop__camera_is_valid(const raindrop_camera *c)
+{
+    float rr = raindrop__dot(c->right, c->right), uu = raindrop__dot(c->up, c->up), bb = raindrop__dot(c->back, c->back);
+    float skew = fabsf(raindrop__dot(c->right, c->up)) + fabsf(raindrop__dot(c->up, c->back)) + fabsf(raindrop__dot(c->back, c->right));
+    if (!raindrop__finite3(c->position) || !raindrop__finite3(c->velocity)) return 0;
+    if (!(fabsf(rr - 1) < 0.01f && fabsf(uu - 1) < 0.01f && fabsf(bb - 1) < 0.01f && skew < 0.01f)) return 0;
+    if (!(c->fov_y >= 0.001f && c->fov_y <= 3) || !(c->near_distance >= 0) || !sat__is_finite(c->near_distance)) return 0;
+    if (!(c->exposure >= 0 && c->aperture >= 0) || !sat__is_finite(c->exposure) || !sat__is_finite(c->aperture)) return 0;
+#ifdef RAINDROP_NO_STREAK
+    if (c->exposure > 0 || c->aperture > 0) return 0;
+#endif
+    return c->focus_distance > 0 && sat__is_finite(c->focus_distance);
+}
+
+static inline int raindrop__render_is_valid(const raindrop__frame *frame, const raindrop_environment *environment)
+{
+    const raindrop_render_options *o = &frame->options;
+    ptrdiff_t row = (ptrdiff_t)frame->width * 3 * (ptrdiff_t)sizeof(float);
+    if (!frame->rgb || !frame->rain || !environment || frame->width < 1 || frame->height < 1 || frame->width > 32768 || frame->height > 32768) return 0;
+    if ((frame->stride < row && frame->stride > -row) || frame->stride % (ptrdiff_t)sizeof(float)) return 0;
+    if (!raindrop__camera_is_valid(&frame->camera) || (unsigned)o->look > RAINDROP_LOOK_AUTO) return 0;
+    if (!(o->far_radius >= 0 && o->far_radius <= 64) || !(o->coverage_threshold >= 0 && o->coverage_threshold <= 1)) return 0;
+    if (o->orders < 0 || o->orders > 3 || !(o->orders_radius >= 0)) return 0;
+#ifdef RAINDROP_NO_MAP
+    return o->look != RAINDROP_LOOK_MAP;
+#else
+    return o->look != RAINDROP_LOOK_MAP || o->map;
+#endif
+}
+
+static inline void raindrop__set_frame(raindrop__frame *frame)
+{
+    frame->half_width = 0.5f * (float)frame->width;
+    frame->half_height = 0.5f * (float)frame->height;
+    frame->focal = frame->half_height / tanf(0.5f * frame->camera.fov_y);
+    frame->side_x = sqrtf(frame->focal * frame->focal + frame->half_width * frame->half_width);
+    frame->side_y = sqrtf(frame->focal * frame->focal + frame->half_height * frame->half_height);
+}
+
+static inline void raindrop__sum_stats(raindrop_render_stats *stats, const raindrop__frame *frame, int workers)
+{
+    const raindrop_rain *rain = frame->rain;
+    size_t fates[RAINDROP__FATES];
+    int i, k, chunks = rain->count / RAINDROP__CHUNK + (rain->count % RAINDROP__CHUNK != 0);
+    memset(stats, 0, sizeof *stats);
+    memset(fates, 0, sizeof fates);
+    for (i = 0; i < chunks; i++) {
+        for (k = 0; k < RAINDROP__FATES; k++) fates[k] += (size_t)rain->chunks[i].fates[k];
+        stats->coverage_left_out += rain->chunks[i].coverage_left_out;
+    }
+    for (i = 0; i < workers; i++) {
+        stats->fragments += rain->tally[i].fragments;
+        stats->order_fragments += rain->tally[i].order_fragments;
+    }
+    stats->drops = (size_t)rain->count;
+    stats->drawn_near = fates[RAINDROP__NEAR];
+    stats->drawn_far = fates[RAINDROP__FAR];
+    stats->invalid = fates[RAINDROP__INVALID];
+    stats->inside = fates[RAINDROP__INSIDE];
+    stats->behind = fates[RAINDROP__BEHIND];
+    stats->near_plane = fates[RAINDROP__NEAR_PLANE];
+    stats->outside = fates[RAINDROP__OUTSIDE];
+    stats->hidden = fates[RAINDROP__HIDDEN];
+    stats->below_threshold = fates[RAINDROP__BELOW];
+}
+
+RAINDROP_DEF sat_result raindrop_render(float *rgb, ptrdiff_t stride, int width, int height, const float *depth,
+                                        const raindrop_camera *camera, const raindrop_rain *rain,
+                                        const raindrop_environment *environment, const raindrop_render_options *options,
+                                        raindrop_render_stats *stats)
+{
+    raindrop__frame frame;
+    const sat_threads *threads;
+    int workers;
+    memset(&frame, 0, sizeof frame);
+    frame.camera = camera ? *camera : raindrop_camera_defaults();
+    frame.options = options ? *options : raindrop_render_defaults();
+    frame.rain = rain;
+    frame.environment = environment;
+    frame.depth = depth;
+    frame.rgb = (unsigned char *)rgb;
+    frame.stride = stride;
+    frame.width = width;
+    frame.height = height;
+    if (!raindrop__render_is_valid(&frame, environment)) return SAT_ERR_ARGUMENT;
+    raindrop__set_frame(&frame);
+    threads = &rain->options.threads;
+    workers = sat__worker_count(threads);
+    memset(rain->tally, 0, (size_t)workers * sizeof *rain->tally);
+    sat__parallel_for(threads, rain->count / RAINDROP__CHUNK + (rain->count % RAINDROP__CHUNK != 0), raindrop__cull_range, &frame);
+    frame.visible = raindrop__gather_pairs(rain);
+    frame.order = raindrop__sort(rain, frame.visible, frame.options.sort);
+    sat__parallel_for(threads, (height + RAINDROP__BAND - 1) / RAINDROP__BAND, raindrop__draw_bands, &frame);
+    if (stats) raindrop__sum_stats(stats, &frame, workers);
+    return SAT_OK;
+}
+
+/* ---- the background */
+
+static void raindrop__background_rows(int begin, int end, int worker, void *context)
+{
+    const raindrop__frame *frame = (const raindrop__frame *)context;
+    int x, y;
+    (void)worker;
+    for (y = begin; y < end; y++) {
+        float *row = (float *)(void *)(frame->rgb + (ptrdiff_t)y * frame->stride), d[3];
+        for (x = 0; x < frame->width; x++) {
+            raindrop__to_world(d, &frame->camera, ((float)x + 0.5f - frame->half_width) / frame->focal,
+                               (frame->half_height - (float)y - 0.5f) / frame->focal, 1);
+            raindrop_environment_sample(row + 3 * x, frame->environment, d, 1 / frame->focal);
+        }
+    }
+}
+
+RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride, int width, int height,
+                                                    const raindrop_camera *camera, const raindrop_environment *environment,
+                                                    const sat_threads *threads)
+{
+    raindrop__frame frame;
+    ptrdiff_t row = (ptrdiff_t)width * 3 * (ptrdiff_t)sizeof(float);
+    memset(&frame, 0, sizeof frame);
+    frame.camera = camera ? *camera : raindrop_camera_defaults();
+    frame.environment = environment;
+    frame.rgb = (unsigned char *)rgb;
+    frame.stride = stride;
+    frame.width = width;
+    frame.height = height;
+    if (!rgb || !environment || width < 1 || height < 1 || width > 32768 || height > 32768) return SAT_ERR_ARGUMENT;
+    if ((stride < row && stride > -row) || stride % (ptrdiff_t)sizeof(float) || !raindrop__camera_is_valid(&frame.camera)) return SAT_ERR_ARGUMENT;
+    if (threads && !sat__threads_are_valid(threads)) return SAT_ERR_ARGUMENT;
+    raindrop__set_frame(&frame);
+    sat__parallel_for(threads, height, raindrop__background_rows, &frame);
+    return SAT_OK;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* RAINDROP_IMPLEMENTATION */
