@@ -2557,6 +2557,7 @@ static void sat__build_bands(int begin, int end, int worker, void *context)
     const sat_table *t = b->table;
     float *column = (float *)(void *)(t->columns + (size_t)worker * t->columns_stride);
     int job, y, care;
+    SAT_ASSERT(t->columns);
     for (job = begin; job < end; job++) {
         int channel = job / b->bands, band = b->first_band + job % b->bands;
         int y0 = band << t->shift, y1 = sat__min_int(t->height - y0, t->options.tile) + y0;
@@ -2818,6 +2819,7 @@ static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_b
 {
     sat__build b;
     int channel;
+    SAT_ASSERT(t->sums && t->columns && t->pixels && t->tallies);
     memset(&b, 0, sizeof b);
     b.table = t;
     b.image = image;
