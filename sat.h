@@ -2557,7 +2557,7 @@ static void sat__build_bands(int begin, int end, int worker, void *context)
     const sat_table *t = b->table;
     float *column = (float *)(void *)(t->columns + (size_t)worker * t->columns_stride);
     int job, y, care;
-    SAT_ASSERT(t->columns);
+    SAT_ASSERT(t->tallies);
     for (job = begin; job < end; job++) {
         int channel = job / b->bands, band = b->first_band + job % b->bands;
         int y0 = band << t->shift, y1 = sat__min_int(t->height - y0, t->options.tile) + y0;
