@@ -1,0 +1,1782 @@
+/* ssao_sat.h - 0.1.0 - screen-space ambient occlusion from summed-area tables - SPDX-License-Identifier: MIT-0 OR Unlicense
+
+   Accessibility without noise, random numbers or a blur pass, in every depth convention.
+*/
+
+#if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SSAO_SAT_IMPLEMENTATION)
+#define SSAO_SAT_IMPLEMENTATION
+#endif
+
+#ifndef SSAO_SAT_H
+#define SSAO_SAT_H
+
+#define SSAO_SAT_VERSION_MAJOR 0
+#define SSAO_SAT_VERSION_MINOR 1
+#define SSAO_SAT_VERSION_PATCH 0
+#define SSAO_SAT_VERSION (SSAO_SAT_VERSION_MAJOR * 10000 + SSAO_SAT_VERSION_MINOR * 100 + SSAO_SAT_VERSION_PATCH)
+
+#if defined(SSAO_SAT_IMPLEMENT) || defined(SSAO_SAT_IMPL)
+#error "ssao_sat.h: the macro is called SSAO_SAT_IMPLEMENTATION"
+#endif
+
+#if defined(SSAO_SAT_GL) && !defined(SAT_GL)
+#define SAT_GL
+#endif
+#include "sat.h"
+#if SAT_VERSION < 100
+#error "ssao_sat.h needs sat.h 0.1.0 or newer"
+#endif
+
+/* SSAO_SAT_STATIC makes every function private to the file; SSAO_SAT_DEF replaces the linkage altogether. */
+#ifndef SSAO_SAT_DEF
+#ifdef SSAO_SAT_STATIC
+#define SSAO_SAT_DEF static inline
+#else
+#define SSAO_SAT_DEF extern
+#endif
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Types
+   ------------------------------------------------------------------------------------------------ */
+
+typedef enum ssao_sat_method {
+    SSAO_SAT_SLABS,         /* centroids of depth slabs in cells at several scales */
+    SSAO_SAT_PLANE,         /* mean of what is affine on planes, less the tangent plane, in 2x2 boxes */
+    SSAO_SAT_MINIMALIST,    /* Slomp 2012, 5.4.1 */
+    SSAO_SAT_NORMAL_GUIDED, /* Slomp 2012, 5.4.2 */
+    SSAO_SAT_REFINED        /* Slomp 2012, 5.4.3, on 5.4.2 */
+} ssao_sat_method;
+
+/* What the depth buffer holds. The matrix that drew it says the rest. */
+typedef enum ssao_sat_depth {
+    SSAO_SAT_DEPTH_LINEAR,   /* distance along the view axis, > 0; sky: infinity, NaN, <= 0 or >= input.sky */
+    SSAO_SAT_DEPTH_HARDWARE, /* 0..1, grows with distance; cleared to 1 */
+    SSAO_SAT_DEPTH_REVERSED  /* 0..1, falls with distance; cleared to 0 */
+} ssao_sat_depth;
+
+/* One frame. View space is OpenGL's: +x right, +y up, the camera looks along -z. Row 0 is the top of the picture.
+   Strides are bytes between rows, 0: packed, may be negative. */
+typedef struct ssao_sat_input {
+    const float *depth;
+    ptrdiff_t depth_stride;
+    int width, height;         /* those of ssao_sat_create */
+    const float *normals;      /* view space xyz; NULL: derived from depth */
+    ptrdiff_t normal_stride;
+    ssao_sat_depth depth_kind; /* SSAO_SAT_DEPTH_LINEAR */
+    float projection[16];      /* column-major; perspective or orthographic, off-centre, flipped, infinite far: all read from it */
+    int clip_zero_to_one;      /* 0: the matrix maps depth to [-1,1] (OpenGL); 1: to [0,1] (Vulkan, Direct3D, glClipControl) */
+    const uint16_t *half_depth;/* binary16 depths instead of `depth`, which is then NULL */
+    float sky;                 /* LINEAR: distances >= sky are sky; 0: only infinity is */
+} ssao_sat_input;
+
+typedef struct ssao_sat_options {
+    ssao_sat_method method;  /* SSAO_SAT_SLABS */
+    double radius;           /* 0.5 world units; >= 0: occluders farther away than this do not count; 0: all is open */
+    double gain;             /* 1; >= 0: times the strength fitted for the method; 0: all is open */
+    double power;            /* 1; > 0: exponent on the accessibility, on top of the fitted one */
+    int half_resolution;     /* 1; tables and estimates from every second pixel of every second row, then a
+                                plane-aware upsample (5.5) */
+    int slabs;               /* 8; 1..16; 4 halve the memory */
+    int scales;              /* 3; 1..4: rings of cells, each a third of the one before */
+    int plane_boxes;         /* 2; 1 or 2: PLANE uses n x n boxes */
+    double normal_offset;    /* 1.5; >= 0: NORMAL_GUIDED, REFINED: shift of the region, in its half sizes; 0: no shift */
+    int refine_levels;       /* 2; 0..2 */
+    double refine_threshold; /* 0.15; >= 0: regions are split while |mean - depth| < this part of the depth */
+    int as_printed;          /* 0; 1: the text of 5.4.2 and 5.4.3 to the letter: shift along n.xy, keep the children of higher value */
+    double region_pixels;    /* 0: the region follows the projected radius; > 0: half its side in pixels, for all pixels */
+    double depth_gain;       /* 0; gain grows by this factor from the nearest to the farthest pixel (published methods) */
+    int inverted_depth;      /* 0; 1: published methods average 1 / depth (5.5) */
+    int float_table;         /* 0: integers modulo 2^32; 1: floats, 2: floats less the mean (4.6): for comparison only */
+    double min_pixels;       /* 1.5; >= 1: regions with a smaller half side fade out, measured in pixels of the tables */
+    double max_pixels;       /* 256; min_pixels..512: regions are cut to this half side */
+    int band_rows;           /* 0: tables of the whole picture; >= 16: of this many rows and a radius above and below */
+    int bottom_up;           /* 0; 1: row 0 is the bottom of the picture, in all buffers */
+    int skip_flat;           /* 1; regions that are one plane are not looked at */
+    sat_allocator allocator; /* malloc; used by create and destroy only */
+    sat_threads threads;     /* serial; same bits for any worker count */
+} ssao_sat_options;
+
+/* What the last call met. Counts are pixels of the tables (a quarter of the picture at half resolution). */
+typedef struct ssao_sat_stats {
+    size_t pixels;            /* of the tables; = sky + small + flat + estimated */
+    size_t sky;               /* nothing there, or depth not a positive finite number */
+    size_t small;             /* radius below min_pixels */
+    size_t flat;              /* left out: the whole region is one plane */
+    size_t estimated;
+    size_t border;            /* estimated with a region that the picture's border cuts */
+    size_t cut;               /* radius cut to max_pixels */
+    size_t slabs_visited, slabs_skipped; /* SLABS, summed over groups of pixels: outside [z - R, z + R], or empty */
+    size_t lookups;           /* published methods and PLANE: table entries read */
+    size_t normals_replaced;  /* given normals that were NaN, infinite or zero */
+    size_t normals_backfacing;/* given normals that point away from the camera: most of them, when a convention is wrong */
+    double nearest, farthest; /* depth range; 0, 0 when all is sky */
+    size_t bytes;             /* memory the object holds */
+} ssao_sat_stats;
+
+typedef struct ssao_sat ssao_sat;
+
+/* ------------------------------------------------------------------------------------------------
+   Calls
+   ------------------------------------------------------------------------------------------------ */
+
+SSAO_SAT_DEF int ssao_sat_version(void);
+SSAO_SAT_DEF ssao_sat_options ssao_sat_defaults(void);
+/* Linear depth and a symmetric perspective of this vertical field of view: fill in buffers and strides. */
+SSAO_SAT_DEF ssao_sat_input ssao_sat_input_linear(const float *depth, int width, int height, double vertical_fov);
+
+/* Scratch memory for pictures of this size; exactly one allocation. 1 <= width, height <= 32768. */
+SSAO_SAT_DEF sat_result ssao_sat_create(ssao_sat **out, int width, int height, const ssao_sat_options *options);
+/* Accessibility of every pixel, 0 blocked .. 1 open; sky is 1. Allocates nothing. The output must not overlap the
+   input. stats may be NULL. On an error nothing is written. */
+SSAO_SAT_DEF sat_result ssao_sat_apply(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride, const ssao_sat_input *input,
+                                       ssao_sat_stats *stats);
+#ifndef SSAO_SAT_NO_BENT
+/* The same, and the mean unblocked direction (unit, view space, xyz; the normal where all is open, 0 0 1 on sky): look up
+   irradiance along it instead of the normal. SLABS only. */
+SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride, float *bent_normals,
+                                            ptrdiff_t bent_stride, const ssao_sat_input *input, ssao_sat_stats *stats);
+#endif
+/* Depth unsharp masking (Luft 2006): mean depth of the region less the own depth, over the radius, times options.gain, clamped to
+   -1..1: negative in creases and beside nearer objects, positive on ridges and rims. Sky is 0. From the same table. */
+SSAO_SAT_DEF sat_result ssao_sat_apply_signed(ssao_sat *ao, float *out, ptrdiff_t out_stride, const ssao_sat_input *input,
+                                              ssao_sat_stats *stats);
+SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao); /* NULL is fine */
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SSAO_SAT_H */
+/* ------------------------------------------------------------------------------------------------
+   Stop here if you only want to use the library.
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(SSAO_SAT_IMPLEMENTATION) && !defined(SSAO_SAT_IMPLEMENTED)
+#define SSAO_SAT_IMPLEMENTED
+
+#ifndef SAT_SIBLING
+#define SAT_SIBLING
+#endif
+#if defined(SSAO_SAT_GL) && !defined(SAT_SIBLING_GL)
+#define SAT_SIBLING_GL
+#endif
+#include "sat.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Vectors of four: SSE2 and NEON through sat.h, or plain C. One kernel serves them all.
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(SAT__VECTOR)
+typedef sat__f32x4 ssao_sat__f;
+typedef sat__i32x4 ssao_sat__i;
+static inline ssao_sat__f ssao_sat__load(const float *p) { return sat__f32x4_load(p); }
+static inline void ssao_sat__store(float *p, ssao_sat__f v) { sat__f32x4_store(p, v); }
+static inline ssao_sat__f ssao_sat__set(float v) { return sat__f32x4_set1(v); }
+static inline ssao_sat__f ssao_sat__add(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_add(a, b); }
+static inline ssao_sat__f ssao_sat__sub(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_sub(a, b); }
+static inline ssao_sat__f ssao_sat__mul(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_mul(a, b); }
+static inline ssao_sat__f ssao_sat__div(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_div(a, b); }
+static inline ssao_sat__f ssao_sat__max(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_max(a, b); }
+static inline ssao_sat__f ssao_sat__sqrt(ssao_sat__f a) { return sat__f32x4_sqrt(a); }
+static inline ssao_sat__f ssao_sat__abs(ssao_sat__f a) { return sat__f32x4_abs(a); }
+static inline ssao_sat__f ssao_sat__if_positive(ssao_sat__f a, ssao_sat__f b) /* a > 0 ? b : 0 */
+{
+    return sat__f32x4_select(sat__f32x4_less(sat__f32x4_set1(0), a), b, sat__f32x4_set1(0));
+}
+static inline int ssao_sat__any_positive(ssao_sat__f a) { return sat__i32x4_any(sat__f32x4_less(sat__f32x4_set1(0), a)); }
+static inline ssao_sat__i ssao_sat__load_i(const uint32_t *p) { return sat__i32x4_load((const int32_t *)(const void *)p); }
+static inline void ssao_sat__store_i(uint32_t *p, ssao_sat__i v) { sat__i32x4_store((int32_t *)(void *)p, v); }
+static inline ssao_sat__i ssao_sat__add_i(ssao_sat__i a, ssao_sat__i b) { return sat__i32x4_add(a, b); }
+static inline ssao_sat__i ssao_sat__sub_i(ssao_sat__i a, ssao_sat__i b) { return sat__i32x4_sub(a, b); }
+static inline ssao_sat__f ssao_sat__to_f(ssao_sat__i a) { return sat__i32x4_to_f32(a); }
+#if defined(SAT__SSE2)
+static inline void ssao_sat__transpose(ssao_sat__f *m) { _MM_TRANSPOSE4_PS(m[0], m[1], m[2], m[3]); }
+#else
+static inline void ssao_sat__transpose(ssao_sat__f *m)
+{
+    float32x4x2_t a = vtrnq_f32(m[0], m[1]), b = vtrnq_f32(m[2], m[3]);
+    m[0] = vcombine_f32(vget_low_f32(a.val[0]), vget_low_f32(b.val[0]));
+    m[1] = vcombine_f32(vget_low_f32(a.val[1]), vget_low_f32(b.val[1]));
+    m[2] = vcombine_f32(vget_high_f32(a.val[0]), vget_high_f32(b.val[0]));
+    m[3] = vcombine_f32(vget_high_f32(a.val[1]), vget_high_f32(b.val[1]));
+}
+#endif
+#else
+typedef struct ssao_sat__f { float v[4]; } ssao_sat__f;
+typedef struct ssao_sat__i { uint32_t v[4]; } ssao_sat__i;
+#define SSAO_SAT__EACH(type, expression) type r; int k; for (k = 0; k < 4; k++) r.v[k] = (expression); return r
+static inline ssao_sat__f ssao_sat__load(const float *p) { SSAO_SAT__EACH(ssao_sat__f, p[k]); }
+static inline void ssao_sat__store(float *p, ssao_sat__f v) { int k; for (k = 0; k < 4; k++) p[k] = v.v[k]; }
+static inline ssao_sat__f ssao_sat__set(float v) { SSAO_SAT__EACH(ssao_sat__f, v); }
+static inline ssao_sat__f ssao_sat__add(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] + b.v[k]); }
+static inline ssao_sat__f ssao_sat__sub(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] - b.v[k]); }
+static inline ssao_sat__f ssao_sat__mul(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] * b.v[k]); }
+static inline ssao_sat__f ssao_sat__div(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] / b.v[k]); }
+static inline ssao_sat__f ssao_sat__max(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] > b.v[k] ? a.v[k] : b.v[k]); }
+static inline ssao_sat__f ssao_sat__sqrt(ssao_sat__f a) { SSAO_SAT__EACH(ssao_sat__f, sqrtf(a.v[k])); }
+static inline ssao_sat__f ssao_sat__abs(ssao_sat__f a) { SSAO_SAT__EACH(ssao_sat__f, fabsf(a.v[k])); }
+static inline ssao_sat__f ssao_sat__if_positive(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] > 0 ? b.v[k] : 0); }
+static inline int ssao_sat__any_positive(ssao_sat__f a) { return a.v[0] > 0 || a.v[1] > 0 || a.v[2] > 0 || a.v[3] > 0; }
+static inline ssao_sat__i ssao_sat__load_i(const uint32_t *p) { SSAO_SAT__EACH(ssao_sat__i, p[k]); }
+static inline void ssao_sat__store_i(uint32_t *p, ssao_sat__i v) { int k; for (k = 0; k < 4; k++) p[k] = v.v[k]; }
+static inline ssao_sat__i ssao_sat__add_i(ssao_sat__i a, ssao_sat__i b) { SSAO_SAT__EACH(ssao_sat__i, a.v[k] + b.v[k]); }
+static inline ssao_sat__i ssao_sat__sub_i(ssao_sat__i a, ssao_sat__i b) { SSAO_SAT__EACH(ssao_sat__i, a.v[k] - b.v[k]); }
+static inline ssao_sat__f ssao_sat__to_f(ssao_sat__i a) { SSAO_SAT__EACH(ssao_sat__f, (float)(int32_t)a.v[k]); }
+static inline void ssao_sat__transpose(ssao_sat__f *m)
+{
+    ssao_sat__f t[4];
+    int i, k;
+    for (i = 0; i < 4; i++) t[i] = m[i];
+    for (i = 0; i < 4; i++)
+        for (k = 0; k < 4; k++) m[i].v[k] = t[k].v[i];
+}
+#undef SSAO_SAT__EACH
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   The object and the frame
+   ------------------------------------------------------------------------------------------------ */
+
+enum {
+    SSAO_SAT__PAD = 16,       /* words of nothing left and right of a row: neighbours may be read blindly */
+    SSAO_SAT__MAX_SLABS = 16,
+    SSAO_SAT__MAX_SCALES = 4,
+    SSAO_SAT__GRID = 32       /* the slabs are cut from a sample of 32 x 32 depths */
+};
+#define SSAO_SAT__BLOCKED 2.0f  /* length of blocked directions against occlusion, fitted */
+#define SSAO_SAT__SHARPNESS 50 /* upsampling: a neighbour off the tangent plane by 1/50 of the distance has no weight */
+#define SSAO_SAT__FAR 1e18f   /* distances beyond are sky: their squares would overflow */
+
+/* What was fitted to ray-traced references by tests/bench/bench_ssao_sat.c. reach: half side of the region in radii. range: SLABS:
+   occluders count less with their distance, to nothing at this many radii; PLANE: heights h (in radii) count as h / (1 + range h^2). */
+typedef struct ssao_sat__fit { float reach, range, bias, gain, power; } ssao_sat__fit;
+static const float ssao_sat__ring_weights[4] = {1.6f, 1.0f, 0.37f, 0.37f}; /* outermost first */
+static const ssao_sat__fit ssao_sat__fits[6] = {
+    {0.91f, 1.8f, 0.06f, 1.10f, 3.0f}, /* SLABS */
+    {0.3f, 8.0f, 0.00f, 3.3f, 1.0f},   /* PLANE, 2 x 2 boxes */
+    {0.6f, 0.0f, 0.00f, 0.1f, 1.0f},   /* MINIMALIST: the fit wants no more than this; artists may */
+    {1.5f, 0.0f, 0.00f, 0.1f, 1.0f},   /* NORMAL_GUIDED */
+    {0.3f, 0.0f, 0.00f, 0.06f, 1.0f},  /* REFINED */
+    {0.3f, 16.0f, 0.00f, 1.6f, 2.0f}   /* PLANE, one box */
+};
+
+/* View position of table pixel (i, j) at distance z along the axis: ((ax i + bx) s, (ay j + by) s, z), s = z in
+   perspective and 1 in orthographic views. z points forward here, away from the camera. */
+typedef struct ssao_sat__camera {
+    double full[4];         /* ax, bx, ay, by for pixels of the picture, whose centres lie at i + 1/2 */
+    float ax, bx, ay, by;   /* for pixels of the tables, centre offset included */
+    double depth_a, depth_b;/* 1/z (perspective) or z (orthographic) = depth_a d + depth_b */
+    int orthographic;
+    float pixels;           /* table pixels per world unit, at z = 1 in perspective */
+    float aspect;           /* those along y over those along x */
+} ssao_sat__camera;
+
+/* One slab: depths between two edges. Its words: count, sum of the quantised affine depth, of x, of y. */
+typedef struct ssao_sat__slab { float low, quantum, inverse; } ssao_sat__slab;
+
+typedef struct ssao_sat__worker {
+    ssao_sat_stats stats;
+    float nearest, farthest;
+} ssao_sat__worker;
+
+struct ssao_sat {
+    ssao_sat_options options;
+    void *block;
+    size_t bytes;
+    int width, height;      /* of the picture */
+    int step;               /* 2 at half resolution */
+    int columns, rows;      /* of the tables: ceil(width / step), ceil(height / step) */
+    int capacity, reserve;  /* rows held at once; those of them above and below the ones being estimated */
+    size_t stride, table_stride, table_plane;
+    int tables;             /* words a pixel: 4 a slab, or 1 */
+    /* arrays of `capacity` rows, `stride` apart */
+    float *z, *affine, *nx, *ny, *nz, *open, *blocked[3];
+    uint32_t *quantised;
+    uint8_t *slab;
+    uint32_t *row_slabs;    /* which slabs occur in the row */
+    uint32_t *table, *flags;
+    float *scratch;         /* per worker: a row of the picture */
+    ssao_sat__worker *workers;
+
+    /* this frame */
+    ssao_sat_input input;
+    ssao_sat__camera camera;
+    ssao_sat__fit fit;
+    float radius, reach;    /* world units; reach = radius fit.reach */
+    float range;            /* SLABS: world units */
+    float limit, largest;   /* half sides in table pixels: allowed, and of the nearest pixel */
+    float nearest, farthest;
+    float edge[SSAO_SAT__MAX_SLABS + 1]; /* distances */
+    ssao_sat__slab slabs[SSAO_SAT__MAX_SLABS];
+    uint32_t used_slabs;
+    ssao_sat__slab value;   /* single table: how a value is quantised */
+    float sky_value, mean;  /* what stands for sky in it; mean taken off float tables */
+    float flat_limit;
+    int frame_slabs;        /* <= options.slabs */
+    int bent_wanted, is_signed;
+    float *out, *bent_out;
+    ptrdiff_t out_stride, bent_stride;
+    /* this band: rows [first, first + held) are held, [begin, end) estimated */
+    int first, held, begin, end;
+};
+
+SSAO_SAT_DEF int ssao_sat_version(void) { return SSAO_SAT_VERSION; }
+
+SSAO_SAT_DEF ssao_sat_options ssao_sat_defaults(void)
+{
+    ssao_sat_options o;
+    memset(&o, 0, sizeof o);
+    o.method = SSAO_SAT_SLABS;
+    o.radius = 0.5;
+    o.gain = 1;
+    o.power = 1;
+    o.half_resolution = 1;
+    o.slabs = 8;
+    o.scales = 3;
+    o.plane_boxes = 2;
+    o.normal_offset = 1.5;
+    o.refine_levels = 2;
+    o.refine_threshold = 0.15;
+    o.min_pixels = 1.5;
+    o.max_pixels = 256;
+    o.skip_flat = 1;
+    return o;
+}
+
+SSAO_SAT_DEF ssao_sat_input ssao_sat_input_linear(const float *depth, int width, int height, double vertical_fov)
+{
+    ssao_sat_input in;
+    double f = 1 / tan(0.5 * vertical_fov);
+    memset(&in, 0, sizeof in);
+    in.depth = depth;
+    in.width = width;
+    in.height = height;
+    in.projection[0] = (float)(width > 0 ? f * height / width : f);
+    in.projection[5] = (float)f;
+    in.projection[10] = -1;
+    in.projection[11] = -1;
+    in.projection[14] = -1;
+    return in;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Camera: one matrix decides perspective or orthographic, the depth convention and the direction of y
+   ------------------------------------------------------------------------------------------------ */
+
+/* Solves clip = M view for the view coordinates of a pixel; 0 when M is no projection of the stated kind. */
+static int ssao_sat__read_axes(ssao_sat__camera *c, const float *m, int width, int height, int bottom_up)
+{
+    double w = c->orthographic ? (double)m[15] : -(double)m[11];
+    double shift_x = c->orthographic ? -(double)m[12] : (double)m[8], shift_y = c->orthographic ? -(double)m[13] : (double)m[9];
+    double top = m[5] > 0 ? 1 : -1; /* normalised y of the upper border: -1 when the matrix flips y, as Vulkan's do */
+    if (bottom_up) top = -top;
+    c->full[0] = 2 * w / (width * (double)m[0]);
+    c->full[1] = (shift_x - w) / (double)m[0];
+    c->full[2] = -2 * w * top / (height * (double)m[5]);
+    c->full[3] = (w * top + shift_y) / (double)m[5];
+    return sat__is_finite((float)c->full[0]) && sat__is_finite((float)c->full[1]) && sat__is_finite((float)c->full[2]) &&
+           sat__is_finite((float)c->full[3]) && c->full[0] != 0 && c->full[2] != 0;
+}
+
+/* depth d -> 1/z (perspective) or z (orthographic), both affine in d. The kind must agree with the matrix. */
+static int ssao_sat__read_depth(ssao_sat__camera *c, const float *m, ssao_sat_depth kind, int zero_to_one)
+{
+    double scale = zero_to_one ? 1 : 2, shift = zero_to_one ? 0 : -1; /* normalised z = scale d + shift */
+    double a, b;
+    if (kind == SSAO_SAT_DEPTH_LINEAR) return 1;
+    if (c->orthographic) {
+        a = -(double)m[15] * scale / (double)m[10];
+        b = ((double)m[14] - (double)m[15] * shift) / (double)m[10];
+    } else {
+        a = -(double)m[11] * scale / (double)m[14];
+        b = (-(double)m[11] * shift + (double)m[10]) / (double)m[14];
+    }
+    c->depth_a = a;
+    c->depth_b = b;
+    if (!sat__is_finite_double(a) || !sat__is_finite_double(b) || a == 0) return 0;
+    return (kind == SSAO_SAT_DEPTH_REVERSED) == (c->orthographic ? a < 0 : a > 0);
+}
+
+static int ssao_sat__read_camera(ssao_sat__camera *c, const ssao_sat_input *in, int step, int bottom_up)
+{
+    static const int zero[6] = {1, 2, 3, 4, 6, 7};
+    const float *m = in->projection;
+    int i;
+    memset(c, 0, sizeof *c);
+    for (i = 0; i < 16; i++)
+        if (!sat__is_finite(m[i])) return 0;
+    for (i = 0; i < 6; i++)
+        if (m[zero[i]] != 0) return 0;
+    if (m[11] < 0 && m[15] == 0 && m[12] == 0 && m[13] == 0) c->orthographic = 0;
+    else if (m[11] == 0 && m[15] > 0 && m[8] == 0 && m[9] == 0) c->orthographic = 1;
+    else return 0;
+    if (m[0] == 0 || m[5] == 0 || !ssao_sat__read_axes(c, m, in->width, in->height, bottom_up)) return 0;
+    if (!ssao_sat__read_depth(c, m, in->depth_kind, in->clip_zero_to_one)) return 0;
+    /* table pixel (i, j) is pixel (step i, step j) of the picture */
+    c->ax = (float)(c->full[0] * step);
+    c->bx = (float)(c->full[0] * 0.5 + c->full[1]);
+    c->ay = (float)(c->full[2] * step);
+    c->by = (float)(c->full[2] * 0.5 + c->full[3]);
+    c->pixels = (float)(1 / (fabs(c->full[0]) * step));
+    c->aspect = (float)fabs(c->full[0] / c->full[2]);
+    return 1;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Reading the picture: distance, affine depth and normal of pixels; 0 where there is nothing
+   ------------------------------------------------------------------------------------------------ */
+
+/* Distance along the axis; 0 for sky and for whatever is no distance. Tested on bits: NaN must not reach a table. */
+static inline float ssao_sat__distance(const ssao_sat *s, int x, int y)
+{
+    const ssao_sat_input *in = &s->input;
+    float d, z;
+    double affine;
+    if (in->half_depth) {
+        const unsigned char *row = (const unsigned char *)in->half_depth + (ptrdiff_t)y * in->depth_stride;
+        d = sat__half_to_float(((const uint16_t *)(const void *)row)[x]);
+    } else {
+        const unsigned char *row = (const unsigned char *)in->depth + (ptrdiff_t)y * in->depth_stride;
+        d = ((const float *)(const void *)row)[x];
+    }
+    if (!sat__is_finite(d)) return 0;
+    if (in->depth_kind == SSAO_SAT_DEPTH_LINEAR) z = in->sky > 0 && d >= in->sky ? 0 : d;
+    else {
+        if (in->depth_kind == SSAO_SAT_DEPTH_HARDWARE ? d < 0 || d >= 1 : d <= 0 || d > 1) return 0;
+        affine = s->camera.depth_a * (double)d + s->camera.depth_b;
+        if (!(affine > 1e-30)) return 0;
+        z = (float)(s->camera.orthographic ? affine : 1 / affine);
+    }
+    return z > 1 / SSAO_SAT__FAR && z < SSAO_SAT__FAR ? z : 0;
+}
+
+typedef struct ssao_sat__vector { float x, y, z; } ssao_sat__vector;
+
+static inline ssao_sat__vector ssao_sat__position(const ssao_sat *s, int x, int y, float z)
+{
+    ssao_sat__vector p;
+    float scale = s->camera.orthographic ? 1 : z;
+    p.x = (float)(s->camera.full[0] * (x + 0.5) + s->camera.full[1]) * scale;
+    p.y = (float)(s->camera.full[2] * (y + 0.5) + s->camera.full[3]) * scale;
+    p.z = z;
+    return p;
+}
+
+/* Tangent along x or y from the neighbour whose affine depth is nearer; 0 when both are missing. */
+static int ssao_sat__tangent(ssao_sat__vector *t, const ssao_sat *s, int x, int y, float z, int dx, int dy)
+{
+    ssao_sat__vector p = ssao_sat__position(s, x, y, z), q;
+    int side, best = 0;
+    float nearest = 0;
+    for (side = -1; side <= 1; side += 2) {
+        int i = x + side * dx, j = y + side * dy;
+        float zi, difference;
+        if (i < 0 || j < 0 || i >= s->width || j >= s->height) continue;
+        zi = ssao_sat__distance(s, i, j);
+        if (!(zi > 0)) continue;
+        difference = fabsf(s->camera.orthographic ? zi - z : 1 / zi - 1 / z);
+        if (best && difference >= nearest) continue;
+        best = side;
+        nearest = difference;
+        q = ssao_sat__position(s, i, j, zi);
+        t->x = (q.x - p.x) * (float)side;
+        t->y = (q.y - p.y) * (float)side;
+        t->z = (q.z - p.z) * (float)side;
+    }
+    return best;
+}
+
+/* Unit normal that faces the camera, from the pixel and two of its four neighbours. */
+static ssao_sat__vector ssao_sat__depth_normal(const ssao_sat *s, int x, int y, float z)
+{
+    ssao_sat__vector n = {0, 0, -1}, u, v, p = ssao_sat__position(s, x, y, z);
+    float length, facing;
+    if (!ssao_sat__tangent(&u, s, x, y, z, 1, 0) || !ssao_sat__tangent(&v, s, x, y, z, 0, 1)) return n;
+    length = 1 / sqrtf((u.x * u.x + u.y * u.y + u.z * u.z) * (v.x * v.x + v.y * v.y + v.z * v.z));
+    u.x *= length; u.y *= length; u.z *= length; /* the cross product is then of order 1 at any scale */
+    n.x = u.y * v.z - u.z * v.y;
+    n.y = u.z * v.x - u.x * v.z;
+    n.z = u.x * v.y - u.y * v.x;
+    length = sqrtf(n.x * n.x + n.y * n.y + n.z * n.z);
+    facing = s->camera.orthographic ? n.z : n.x * p.x + n.y * p.y + n.z * p.z;
+    if (!(length > 1e-12f) || !sat__is_finite(length)) { n.x = n.y = 0; n.z = -1; return n; }
+    length = (facing > 0 ? -1 : 1) / length;
+    n.x *= length;
+    n.y *= length;
+    n.z *= length;
+    return n;
+}
+
+/* The given normal, made unit; from depth when there is none or when it is no direction. */
+static inline ssao_sat__vector ssao_sat__normal(const ssao_sat *s, int x, int y, float z, ssao_sat_stats *stats)
+{
+    ssao_sat__vector n;
+    const float *p;
+    float square;
+    if (!s->input.normals) return ssao_sat__depth_normal(s, x, y, z);
+    p = (const float *)(const void *)((const unsigned char *)s->input.normals + (ptrdiff_t)y * s->input.normal_stride) + 3 * (ptrdiff_t)x;
+    n.x = p[0];
+    n.y = p[1];
+    n.z = -p[2];
+    square = n.x * n.x + n.y * n.y + n.z * n.z;
+    if (!sat__is_finite(square) || !(square > 1e-20f)) {
+        stats->normals_replaced++;
+        return ssao_sat__depth_normal(s, x, y, z);
+    }
+    if (fabsf(square - 1) > 1e-6f) {
+        square = 1 / sqrtf(square);
+        n.x *= square;
+        n.y *= square;
+        n.z *= square;
+    }
+    if (s->camera.orthographic) stats->normals_backfacing += n.z > 0;
+    else {
+        ssao_sat__vector ray = ssao_sat__position(s, x, y, 1);
+        stats->normals_backfacing += n.x * ray.x + n.y * ray.y + n.z > 0;
+    }
+    return n;
+}
+
+/* Every step-th pixel of row y from x0 on: distances and normals. */
+static void ssao_sat__read_row(const ssao_sat *s, int y, int x0, int step, float *z, float *nx, float *ny, float *nz,
+                               ssao_sat_stats *stats)
+{
+    int x, i = 0;
+    for (x = x0; x < s->width; x += step, i++) {
+        float d = ssao_sat__distance(s, x, y);
+        ssao_sat__vector n = {0, 0, -1};
+        if (d > 0) n = ssao_sat__normal(s, x, y, d, stats);
+        z[i] = d;
+        nx[i] = n.x;
+        ny[i] = n.y;
+        nz[i] = n.z;
+    }
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Depth range and slab edges
+   ------------------------------------------------------------------------------------------------ */
+
+static void ssao_sat__range_rows(int begin, int end, int worker, void *context)
+{
+    ssao_sat *s = (ssao_sat *)context;
+    ssao_sat__worker *w = &s->workers[worker];
+    int x, y;
+    for (y = begin; y < end; y++)
+        for (x = 0; x < s->columns; x++) {
+            float z = ssao_sat__distance(s, x * s->step, y * s->step);
+            if (!(z > 0)) continue;
+            if (!(w->farthest > 0) || z < w->nearest) w->nearest = z;
+            if (z > w->farthest) w->farthest = z;
+        }
+}
+
+static void ssao_sat__sort(float *v, int n) /* heap sort: no worst case, no recursion */
+{
+    int i, start = n / 2;
+    while (n > 1) {
+        float moved;
+        int hole;
+        if (start > 0) moved = v[--start];
+        else {
+            moved = v[--n];
+            v[n] = v[0];
+        }
+        for (hole = start; (i = 2 * hole + 1) < n; hole = i) {
+            if (i + 1 < n && v[i + 1] > v[i]) i++;
+            if (moved >= v[i]) break;
+            v[hole] = v[i];
+        }
+        v[hole] = moved;
+    }
+}
+
+static float ssao_sat__scale_depth(const ssao_sat *s, float z) { return s->camera.orthographic ? z : logf(z); }
+
+/* Edges at equal steps of F = half the share of the logarithmic (orthographic: linear) range + half the share of the pixels,
+   so that neither a long empty range nor a crowd at one depth leaves a slab useless. F from 32 x 32 pixels. */
+static void ssao_sat__cut_slabs(ssao_sat *s)
+{
+    float sample[SSAO_SAT__GRID * SSAO_SAT__GRID], low, range;
+    int i, j, k, n = 0, slabs = s->frame_slabs;
+    for (j = 0; j < SSAO_SAT__GRID; j++)
+        for (i = 0; i < SSAO_SAT__GRID; i++) {
+            int x = (int)((2 * i + 1) * (int64_t)s->columns / (2 * SSAO_SAT__GRID)), y = (int)((2 * j + 1) * (int64_t)s->rows / (2 * SSAO_SAT__GRID));
+            float z = ssao_sat__distance(s, x * s->step, y * s->step);
+            if (z > 0) sample[n++] = ssao_sat__scale_depth(s, z);
+        }
+    ssao_sat__sort(sample, n);
+    low = ssao_sat__scale_depth(s, s->nearest);
+    range = ssao_sat__scale_depth(s, s->farthest) - low;
+    s->edge[0] = s->nearest;
+    s->edge[slabs] = s->farthest;
+    for (k = 1; k < slabs; k++) {
+        float target = (float)k / (float)slabs, a = 0, b = 1;
+        for (i = 0; i < 24; i++) { /* bisection of F(low + t range) = target */
+            float t = 0.5f * (a + b), z = low + t * range;
+            int below = 0, above = n;
+            while (below < above) {
+                int middle = (below + above) / 2;
+                if (sample[middle] < z) below = middle + 1;
+                else above = middle;
+            }
+            if (0.5f * t + 0.5f * (n ? (float)below / (float)n : t) < target) a = t;
+            else b = t;
+        }
+        s->edge[k] = s->camera.orthographic ? low + b * range : expf(low + b * range);
+        s->edge[k] = s->edge[k] < s->edge[k - 1] ? s->edge[k - 1] : s->edge[k] > s->farthest ? s->farthest : s->edge[k];
+    }
+}
+
+/* The quantum spends the bits that a sum over `area` pixels leaves of 31. */
+static ssao_sat__slab ssao_sat__quantise(float low, float high, double area)
+{
+    ssao_sat__slab q;
+    int bits = 31;
+    while (bits > 1 && area * ((double)((uint32_t)1 << bits)) > 2147483648.0) bits--;
+    if (bits > 20) bits = 20;
+    q.low = low;
+    q.quantum = (high - low) / (float)(((uint32_t)1 << bits) - 1);
+    q.inverse = q.quantum > 0 ? 1 / q.quantum : 0;
+    if (!sat__is_finite(q.inverse)) q.inverse = 0;
+    return q;
+}
+
+static inline uint32_t ssao_sat__level(const ssao_sat__slab *q, float v, uint32_t top)
+{
+    float level = (v - q->low) * q->inverse + 0.5f;
+    return level > 0 ? level < (float)top ? (uint32_t)level : top : 0;
+}
+
+static inline float ssao_sat__affine(const ssao_sat *s, float z) { return s->camera.orthographic ? z : 1 / z; }
+
+/* Slabs thinner than the radius tell nothing new: a shallow picture takes fewer. */
+static void ssao_sat__prepare_slabs(ssao_sat *s)
+{
+    double cell = 2 * (double)s->largest / 3 + 2, thick = ((double)s->farthest - (double)s->nearest) / (double)s->radius;
+    int k;
+    s->frame_slabs = thick < s->options.slabs ? (int)thick + 1 : s->options.slabs;
+    ssao_sat__cut_slabs(s);
+    for (k = 0; k < s->frame_slabs; k++) {
+        float a = ssao_sat__affine(s, s->edge[k]), b = ssao_sat__affine(s, s->edge[k + 1]);
+        s->slabs[k] = ssao_sat__quantise(a < b ? a : b, a < b ? b : a, cell * cell);
+    }
+}
+
+/* The single table holds: PLANE: 1/z, or farthest - z when orthographic, sky 0. Published: z, sky just beyond the farthest, or 1/z, sky 0. */
+static int ssao_sat__table_is_inverse(const ssao_sat *s)
+{
+    return s->options.method == SSAO_SAT_PLANE ? !s->camera.orthographic : s->options.inverted_depth;
+}
+
+static inline float ssao_sat__table_value(const ssao_sat *s, float z)
+{
+    if (!(z > 0)) return s->sky_value;
+    if (ssao_sat__table_is_inverse(s)) return 1 / z;
+    return s->options.method == SSAO_SAT_PLANE ? s->farthest - z : z;
+}
+
+static void ssao_sat__prepare_value(ssao_sat *s)
+{
+    double side = 2 * (double)s->largest + 2;
+    float high;
+    s->sky_value = 0;
+    if (ssao_sat__table_is_inverse(s)) high = 1 / s->nearest;
+    else if (s->options.method == SSAO_SAT_PLANE) high = s->farthest - s->nearest;
+    else high = s->sky_value = 1.05f * s->farthest;
+    s->value = ssao_sat__quantise(0, high, side * side);
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Regions
+   ------------------------------------------------------------------------------------------------ */
+
+/* Half side along x, in table pixels, of a region of `reach` world units at distance z, cut so that neither side exceeds the limit. */
+static inline float ssao_sat__half_side(const ssao_sat *s, float z, int *cut)
+{
+    float r;
+    if (s->options.region_pixels > 0) r = (float)s->options.region_pixels / (float)s->step;
+    else r = s->reach * s->camera.pixels / (s->camera.orthographic ? 1 : z);
+    *cut = r > s->limit;
+    return r < s->limit ? r : s->limit;
+}
+
+/* Regions fade out between twice min_pixels and min_pixels: far surfaces must not flicker. */
+static inline float ssao_sat__fade(const ssao_sat *s, float half_side)
+{
+    float fade = half_side / (float)s->options.min_pixels - 1;
+    return s->options.region_pixels > 0 || fade > 1 ? 1 : fade > 0 ? fade : 0;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Holding the rows of a band, and their tables. All tables are sums modulo 2^32: box sums are exact
+   wherever the table starts, so bands, workers and GPUs get the same bits.
+   ------------------------------------------------------------------------------------------------ */
+
+/* Where row y (counted in the table picture) of an array of `stride` words lies. */
+static inline size_t ssao_sat__at(const ssao_sat *s, int y)
+{
+    return (size_t)(y - s->first) * s->stride + SSAO_SAT__PAD;
+}
+
+static void ssao_sat__classify_row(ssao_sat *s, int y)
+{
+    size_t at = ssao_sat__at(s, y);
+    const float *z = s->z + at;
+    float *affine = s->affine + at;
+    uint8_t *slab = s->slab + at;
+    uint32_t *q = s->quantised + at, found = 0;
+    int x, k, slabs = s->frame_slabs;
+    for (x = 0; x < s->columns; x++) affine[x] = z[x] > 0 ? ssao_sat__affine(s, z[x]) : 0;
+    if (s->options.method != SSAO_SAT_SLABS) return;
+    for (x = 0; x < s->columns; x++) {
+        int index = 0;
+        for (k = 1; k < slabs; k++) index += z[x] >= s->edge[k];
+        slab[x] = (uint8_t)(z[x] > 0 ? index : SSAO_SAT__MAX_SLABS);
+        q[x] = 0;
+        if (!(z[x] > 0)) continue;
+        q[x] = ssao_sat__level(&s->slabs[index], affine[x], (1u << 20) - 1);
+        found |= 1u << index;
+    }
+    s->row_slabs[y - s->first] = found;
+}
+
+static void ssao_sat__hold_rows(int begin, int end, int worker, void *context)
+{
+    ssao_sat *s = (ssao_sat *)context;
+    int i;
+    for (i = begin; i < end; i++) {
+        int y = s->first + i;
+        size_t at = ssao_sat__at(s, y);
+        ssao_sat_stats unused, *stats = y >= s->begin && y < s->end ? &s->workers[worker].stats : &unused;
+        memset(&unused, 0, sizeof unused);
+        ssao_sat__read_row(s, y * s->step, 0, s->step, s->z + at, s->nx + at, s->ny + at, s->nz + at, stats);
+        ssao_sat__classify_row(s, y);
+    }
+}
+
+/* Count, sum of q, x and y of one slab. Rows without it are copies of the row above. */
+static void ssao_sat__build_slab(ssao_sat *s, int k)
+{
+    size_t stride = 4 * s->table_stride;
+    uint32_t *table = s->table + 4 * (size_t)k * s->table_plane, word[4];
+    int row, x;
+    memset(table, 0, stride * sizeof *table);
+    word[0] = 1;
+    for (row = 0; row < s->held; row++) {
+        uint32_t *o = table + (size_t)(row + 1) * stride;
+        const uint32_t *above = o - stride, *level = s->quantised + (size_t)row * s->stride + SSAO_SAT__PAD;
+        const uint8_t *slab = s->slab + (size_t)row * s->stride + SSAO_SAT__PAD;
+        ssao_sat__i sum;
+        if (!(s->row_slabs[row] >> k & 1)) {
+            memcpy(o, above, stride * sizeof *table);
+            continue;
+        }
+        memset(o, 0, 4 * sizeof *o);
+        sum = ssao_sat__load_i(o);
+        word[3] = (uint32_t)(s->first + row); /* counted in the picture, so that bands give the same bits */
+        for (x = 0; x < s->columns; x++) {
+            o += 4;
+            above += 4;
+            if (slab[x] == k) {
+                word[1] = level[x];
+                word[2] = (uint32_t)x;
+                sum = ssao_sat__add_i(sum, ssao_sat__load_i(word));
+            }
+            ssao_sat__store_i(o, ssao_sat__add_i(sum, ssao_sat__load_i(above)));
+        }
+    }
+}
+
+/* The single table of the other methods; floats restart nothing and round as they did in 2012. */
+static void ssao_sat__build_value(ssao_sat *s)
+{
+    size_t stride = s->table_stride;
+    int row, x;
+    memset(s->table, 0, stride * sizeof *s->table);
+    for (row = 0; row < s->held; row++) {
+        uint32_t *o = s->table + (size_t)(row + 1) * stride, sum = 0;
+        const uint32_t *above = o - stride;
+        const float *z = s->z + (size_t)row * s->stride + SSAO_SAT__PAD;
+        float real = 0;
+        o[0] = 0;
+        for (x = 0; x < s->columns; x++) {
+            float v = ssao_sat__table_value(s, z[x]);
+            if (s->options.float_table) {
+                real += v - s->mean;
+                o[x + 1] = sat__float_bits(real + sat__float_from_bits(above[x + 1]));
+            } else {
+                sum += ssao_sat__level(&s->value, v, (1u << 20) - 1);
+                o[x + 1] = above[x + 1] + sum;
+            }
+        }
+    }
+}
+
+/* Is the pixel no part of a plane that its neighbours see too? Affine depth has no second differences on planes, and the
+   tangent plane of the given normal falls as the depth does. What passes moves no sine beyond the bias: flat_limit. */
+static int ssao_sat__is_bent(const ssao_sat *s, const float *a, size_t at, float rx, float ry)
+{
+    const float *above = a - s->stride, *below = a + s->stride;
+    float c = *a, limit = s->flat_limit * c, z = s->z[at], nx = s->nx[at], ny = s->ny[at], nz = s->nz[at];
+    float gx = 0.5f * (a[1] - a[-1]), gy = 0.5f * (*below - *above), scale;
+    if (!(z > 0) || !(c > 0)) return 1;
+    if (fabsf(a[-1] + a[1] - 2 * c) > limit || fabsf(*above + *below - 2 * c) > limit ||
+        fabsf(a[0] - a[-1] - above[0] + above[-1]) > limit) return 1;
+    if (s->camera.orthographic) {
+        gx += s->camera.ax * nx / nz;
+        gy += s->camera.ay * ny / nz;
+        scale = s->camera.pixels;
+    } else {
+        float facing = (nx * rx + ny * ry + nz) * z;
+        gx -= s->camera.ax * nx / facing;
+        gy -= s->camera.ay * ny / facing;
+        scale = s->camera.pixels * z;
+    }
+    return !((fabsf(gx) + fabsf(gy)) * scale < 0.5f * s->fit.bias);
+}
+
+/* Table of the pixels that are no part of a plane. The border takes the differences of its inner neighbours. */
+static void ssao_sat__build_flags(ssao_sat *s)
+{
+    int row, x, small = s->held < 3 || s->columns < 3;
+    memset(s->flags, 0, s->table_stride * sizeof *s->flags);
+    for (row = 0; row < s->held; row++) {
+        uint32_t *o = s->flags + (size_t)(row + 1) * s->table_stride, sum = 0;
+        const uint32_t *up = o - s->table_stride;
+        size_t at = (size_t)row * s->stride + SSAO_SAT__PAD;
+        const float *a = s->affine + (size_t)(small ? row : sat__clamp_int(row, 1, s->held - 2)) * s->stride + SSAO_SAT__PAD;
+        float ry = s->camera.ay * (float)(s->first + row) + s->camera.by;
+        o[0] = 0;
+        for (x = 0; x < s->columns; x++) {
+            int inner = sat__clamp_int(x, 1, s->columns - 2);
+            sum += small || ssao_sat__is_bent(s, a + inner, at + (size_t)x, s->camera.ax * (float)x + s->camera.bx, ry);
+            o[x + 1] = up[x + 1] + sum;
+        }
+    }
+}
+
+/* Table number `begin`..: the slabs, then the flags. */
+static void ssao_sat__build_tables(int begin, int end, int worker, void *context)
+{
+    ssao_sat *s = (ssao_sat *)context;
+    int slabs = s->options.method == SSAO_SAT_SLABS ? s->frame_slabs : 0, i;
+    (void)worker;
+    for (i = begin; i < end; i++) {
+        if (i < slabs) ssao_sat__build_slab(s, i);
+        else if (slabs) ssao_sat__build_flags(s);
+        else ssao_sat__build_value(s);
+    }
+}
+
+/* ------------------------------------------------------------------------------------------------
+   SLABS: in every cell of every ring, what each slab holds is one occluder at its exact centroid
+
+       occlusion = sum over cells and slabs of coverage max(0, n.d / |d| - bias) max(0, 1 - |d|^2 / range^2)
+
+   The eight cells around a pixel are two vectors: corners and sides. The four words of a table entry are one load.
+   ------------------------------------------------------------------------------------------------ */
+
+typedef struct ssao_sat__point {
+    int x, y;
+    float z, facing, slope[2];             /* n.ray and its change a column and a row; orthographic: n.z, n.x, n.y */
+    ssao_sat__f px, py, pz, nx, ny, nz;    /* the same in all lanes */
+    ssao_sat__f occlusion[2], blocked[2][3]; /* by cell */
+} ssao_sat__point;
+
+/* Columns and rows of the 3 x 3 cells, clipped to the picture, and what one pixel weighs in each of the eight outer ones. */
+typedef struct ssao_sat__cells {
+    int column[4], row[4];
+    ssao_sat__f weight[2];
+} ssao_sat__cells;
+
+/* The occluders of one slab in four cells, given the sums over each. */
+static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__slab *slab, ssao_sat__f *sums, int group,
+                                           ssao_sat__f weight)
+{
+    const ssao_sat__f one = ssao_sat__set(1), zero = ssao_sat__set(0), falloff = ssao_sat__set(1 / (s->range * s->range));
+    ssao_sat__f count, affine, r, z, dx, dy, dz, square, height, near, inverse, part;
+    ssao_sat__transpose(sums); /* count, level, x, y of the four cells */
+    count = sums[0];
+    affine = ssao_sat__add(ssao_sat__mul(ssao_sat__set(slab->low), count), ssao_sat__mul(ssao_sat__set(slab->quantum), sums[1]));
+    r = ssao_sat__div(one, s->camera.orthographic ? ssao_sat__max(count, one) : ssao_sat__max(affine, ssao_sat__set(1e-30f)));
+    z = ssao_sat__mul(s->camera.orthographic ? affine : count, r);
+    dx = ssao_sat__add(ssao_sat__mul(ssao_sat__set(s->camera.ax), sums[2]), ssao_sat__mul(ssao_sat__set(s->camera.bx), count));
+    dy = ssao_sat__add(ssao_sat__mul(ssao_sat__set(s->camera.ay), sums[3]), ssao_sat__mul(ssao_sat__set(s->camera.by), count));
+    dx = ssao_sat__sub(ssao_sat__mul(dx, r), p->px);
+    dy = ssao_sat__sub(ssao_sat__mul(dy, r), p->py);
+    dz = ssao_sat__sub(z, p->pz);
+    square = ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, dx), ssao_sat__mul(dy, dy)), ssao_sat__mul(dz, dz));
+    height = ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, p->nx), ssao_sat__mul(dy, p->ny)), ssao_sat__mul(dz, p->nz));
+    near = ssao_sat__sub(one, ssao_sat__mul(square, falloff));
+    near = ssao_sat__if_positive(height, ssao_sat__mul(ssao_sat__max(zero, near), count));
+    if (!ssao_sat__any_positive(near)) return;
+    inverse = ssao_sat__div(one, ssao_sat__sqrt(ssao_sat__max(square, ssao_sat__set(1e-12f * s->range * s->range))));
+    part = ssao_sat__max(zero, ssao_sat__sub(ssao_sat__mul(height, inverse), ssao_sat__set(s->fit.bias)));
+    part = ssao_sat__mul(ssao_sat__mul(part, near), weight);
+    p->occlusion[group] = ssao_sat__add(p->occlusion[group], part);
+#ifndef SSAO_SAT_NO_BENT
+    if (s->bent_wanted) {
+        part = ssao_sat__mul(part, inverse);
+        p->blocked[group][0] = ssao_sat__add(p->blocked[group][0], ssao_sat__mul(part, dx));
+        p->blocked[group][1] = ssao_sat__add(p->blocked[group][1], ssao_sat__mul(part, dy));
+        p->blocked[group][2] = ssao_sat__add(p->blocked[group][2], ssao_sat__mul(part, dz));
+    }
+#endif
+}
+
+/* Sixteen table entries make the sums over eight cells of one slab. */
+static inline void ssao_sat__add_slab(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__cells *c, int k)
+{
+    const uint32_t *table = s->table + 4 * (size_t)k * s->table_plane, *row[4];
+    ssao_sat__i band[3][4], upper, lower;
+    ssao_sat__f corners[4], sides[4];
+    size_t column[4];
+    int j, t;
+    for (t = 0; t < 4; t++) {
+        column[t] = 4 * (size_t)c->column[t];
+        row[t] = table + 4 * (size_t)(c->row[t] - s->first) * s->table_stride;
+    }
+    if (row[3][column[3]] - row[3][column[0]] == row[0][column[3]] - row[0][column[0]]) return; /* no pixel of the slab in sight */
+    for (t = 0; t < 4; t++) {
+        upper = ssao_sat__load_i(row[0] + column[t]);
+        for (j = 0; j < 3; j++, upper = lower) {
+            lower = ssao_sat__load_i(row[j + 1] + column[t]);
+            band[j][t] = ssao_sat__sub_i(lower, upper);
+        }
+    }
+#define SSAO_SAT__CELL(j, t) ssao_sat__to_f(ssao_sat__sub_i(band[j][(t) + 1], band[j][t]))
+    corners[0] = SSAO_SAT__CELL(0, 0);
+    corners[1] = SSAO_SAT__CELL(0, 2);
+    corners[2] = SSAO_SAT__CELL(2, 0);
+    corners[3] = SSAO_SAT__CELL(2, 2);
+    sides[0] = SSAO_SAT__CELL(0, 1);
+    sides[1] = SSAO_SAT__CELL(1, 0);
+    sides[2] = SSAO_SAT__CELL(1, 2);
+    sides[3] = SSAO_SAT__CELL(2, 1);
+#undef SSAO_SAT__CELL
+    ssao_sat__add_occluders(p, s, &s->slabs[k], corners, 0, c->weight[0]);
+    ssao_sat__add_occluders(p, s, &s->slabs[k], sides, 1, c->weight[1]);
+}
+
+/* Borders of the cells along one axis: [at - outer, at - inner) [at - inner, at + inner] (at + inner, at + outer]; 1 / length. */
+static inline void ssao_sat__cut_axis(int *border, float *per_length, int at, int inner, int outer, int end)
+{
+    int t;
+    border[0] = sat__max_int(at - outer, 0);
+    border[1] = sat__max_int(at - inner, 0);
+    border[2] = sat__min_int(at + inner + 1, end);
+    border[3] = sat__min_int(at + outer + 1, end);
+    for (t = 0; t < 3; t++) per_length[t] = border[t + 1] > border[t] ? 1 / (float)(border[t + 1] - border[t]) : 0;
+}
+
+static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, int y, const int *inner, const int *outer, float weight)
+{
+    float u[3], v[3], corners[4], sides[4];
+    ssao_sat__cut_axis(c->column, u, x, inner[0], outer[0], s->columns);
+    ssao_sat__cut_axis(c->row, v, y, inner[1], outer[1], s->rows);
+    corners[0] = u[0] * v[0];
+    corners[1] = u[2] * v[0];
+    corners[2] = u[0] * v[2];
+    corners[3] = u[2] * v[2];
+    sides[0] = u[1] * v[0];
+    sides[1] = u[0] * v[1];
+    sides[2] = u[2] * v[1];
+    sides[3] = u[1] * v[2];
+    c->weight[0] = ssao_sat__mul(ssao_sat__load(corners), ssao_sat__set(weight));
+    c->weight[1] = ssao_sat__mul(ssao_sat__load(sides), ssao_sat__set(weight));
+}
+
+/* Can anything of the slab within the ring rise above the tangent plane by more than the bias? Its height is at most that of a corner
+   of the frustum that holds it, and its distance at least that along the axis. */
+static inline int ssao_sat__may_occlude(const ssao_sat__point *p, const ssao_sat *s, const int *outer, int k)
+{
+    float near = s->edge[k], far = s->edge[k + 1], spread = p->slope[0] * (float)outer[0] + p->slope[1] * (float)outer[1];
+    float distance = near > p->z ? near - p->z : far < p->z ? p->z - far : 0, height;
+    if (s->camera.orthographic) height = p->facing * ((p->facing > 0 ? far : near) - p->z) + spread;
+    else height = (p->facing + spread) * (p->facing + spread > 0 ? far : near) - p->facing * p->z;
+    return height > s->fit.bias * distance;
+}
+
+/* All rings around the point; those that round to the same pixels are looked up once. */
+static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, float half_side, int first_slab, int end_slab)
+{
+    float r = half_side, weight = 0, total = 0;
+    int inner[2], outer[2], next[2][2], ring, k;
+    ssao_sat__cells cells;
+    for (ring = 0; ring < s->options.scales; ring++) total += 8 * ssao_sat__ring_weights[ring];
+    for (ring = 0; ring <= s->options.scales; ring++, r *= 1 / 3.0f) {
+        next[0][0] = sat__max_int(1, (int)(r / 3 + 0.5f));
+        next[1][0] = sat__max_int(next[0][0] + 1, (int)(r + 0.5f));
+        next[0][1] = sat__max_int(1, (int)(r * s->camera.aspect / 3 + 0.5f));
+        next[1][1] = sat__max_int(next[0][1] + 1, (int)(r * s->camera.aspect + 0.5f));
+        if (ring > 0 && (ring == s->options.scales || memcmp(next[0], inner, sizeof inner) || memcmp(next[1], outer, sizeof outer))) {
+            ssao_sat__cut_cells(&cells, s, p->x, p->y, inner, outer, weight / total);
+            for (k = first_slab; k < end_slab; k++)
+                if (s->used_slabs >> k & 1 && ssao_sat__may_occlude(p, s, outer, k)) ssao_sat__add_slab(p, s, &cells, k);
+            weight = 0;
+        }
+        memcpy(inner, next[0], sizeof inner);
+        memcpy(outer, next[1], sizeof outer);
+        if (ring < s->options.scales) weight += ssao_sat__ring_weights[ring];
+    }
+}
+
+/* Box sum of a table of single words, rows and columns within it. */
+static inline uint32_t ssao_sat__box(const ssao_sat *s, const uint32_t *table, size_t words, int x0, int y0, int x1, int y1)
+{
+    const uint32_t *above = table + words * (size_t)(y0 - s->first) * s->table_stride;
+    const uint32_t *below = table + words * (size_t)(y1 - s->first) * s->table_stride;
+    return below[words * (size_t)x1] - below[words * (size_t)x0] - above[words * (size_t)x1] + above[words * (size_t)x0];
+}
+
+/* (1 - strength occlusion)^power; the fitted exponents are 1, 1.5, 2 or 3, so powf is for callers who ask for others. */
+static inline float ssao_sat__accessibility(const ssao_sat *s, float occlusion, float gain)
+{
+    float open = 1 - gain * occlusion;
+    open = open > 0 ? open < 1 ? open : 1 : 0;
+    if (s->fit.power == 1.5f) open *= sqrtf(open);
+    else if (s->fit.power == 2.0f) open *= open;
+    else if (s->fit.power == 3.0f) open *= open * open;
+    return s->options.power == 1 ? open : powf(open, (float)s->options.power);
+}
+
+static inline float ssao_sat__sum_lanes(ssao_sat__f a, ssao_sat__f b)
+{
+    float v[4];
+    ssao_sat__store(v, ssao_sat__add(a, b));
+    return (v[0] + v[1]) + (v[2] + v[3]);
+}
+
+#ifndef SSAO_SAT_NO_BENT
+/* Sum of the blocked directions. Kept as it is until the picture is written: upsampled, it spoils no detail of the normals. */
+static void ssao_sat__store_blocked(const ssao_sat *s, const ssao_sat__point *p, size_t at, float gain)
+{
+    int c;
+    for (c = 0; c < 3; c++) s->blocked[c][at] = gain * ssao_sat__sum_lanes(p->blocked[0][c], p->blocked[1][c]);
+}
+#endif
+
+/* Is everything in sight one plane? */
+static inline int ssao_sat__is_flat(const ssao_sat *s, int x, int y, float half_side)
+{
+    int rx = (int)(half_side + 0.5f) + 2, ry = (int)(half_side * s->camera.aspect + 0.5f) + 2;
+    return s->options.skip_flat && ssao_sat__box(s, s->flags, 1, sat__max_int(x - rx, 0), sat__max_int(y - ry, 0), sat__min_int(x + rx + 1, s->columns),
+                                                 sat__min_int(y + ry + 1, s->rows)) == 0;
+}
+
+static void ssao_sat__set_point(ssao_sat__point *p, const ssao_sat *s, int x, int y, size_t at)
+{
+    float z = s->z[at], scale = s->camera.orthographic ? 1 : z;
+    int i;
+    p->x = x;
+    p->y = y;
+    p->z = z;
+    p->facing = s->nz[at];
+    if (!s->camera.orthographic)
+        p->facing += s->nx[at] * (s->camera.ax * (float)x + s->camera.bx) + s->ny[at] * (s->camera.ay * (float)y + s->camera.by);
+    p->slope[0] = fabsf(s->nx[at] * s->camera.ax);
+    p->slope[1] = fabsf(s->ny[at] * s->camera.ay);
+    p->px = ssao_sat__set((s->camera.ax * (float)x + s->camera.bx) * scale);
+    p->py = ssao_sat__set((s->camera.ay * (float)y + s->camera.by) * scale);
+    p->pz = ssao_sat__set(z);
+    p->nx = ssao_sat__set(s->nx[at]);
+    p->ny = ssao_sat__set(s->ny[at]);
+    p->nz = ssao_sat__set(s->nz[at]);
+    p->occlusion[0] = p->occlusion[1] = ssao_sat__set(0);
+    for (i = 0; i < 6; i++) p->blocked[i / 3][i % 3] = p->occlusion[0];
+}
+
+/* Occlusion of one pixel of the tables from the slabs that meet [z - range, z + range]. */
+static void ssao_sat__estimate_slabs(ssao_sat *s, int x, int y, ssao_sat_stats *stats)
+{
+    size_t at = ssao_sat__at(s, y) + (size_t)x;
+    ssao_sat__point p;
+    float half_side, fade, z = s->z[at];
+    int k, first = 0, end = s->frame_slabs, cut, side_x, side_y;
+    s->open[at] = 1;
+    if (!(z > 0)) { stats->sky++; return; }
+    half_side = ssao_sat__half_side(s, z, &cut);
+    fade = ssao_sat__fade(s, half_side);
+    ssao_sat__set_point(&p, s, x, y, at);
+    stats->cut += (size_t)cut;
+    if (!(fade > 0)) stats->small++;
+    else if (ssao_sat__is_flat(s, x, y, half_side)) stats->flat++;
+    else {
+        while (first < end - 1 && s->edge[first + 1] < z - s->range) first++;
+        while (end > first + 1 && s->edge[end - 1] > z + s->range) end--;
+        for (k = 0; k < s->frame_slabs; k++)
+            if (k >= first && k < end && s->used_slabs >> k & 1) stats->slabs_visited++;
+            else stats->slabs_skipped++;
+        side_x = (int)half_side + 1;
+        side_y = (int)(half_side * s->camera.aspect) + 1;
+        stats->border += x < side_x || y < side_y || x + side_x >= s->columns || y + side_y >= s->rows;
+        stats->estimated++;
+        ssao_sat__add_rings(&p, s, half_side, first, end);
+        s->open[at] = ssao_sat__accessibility(s, ssao_sat__sum_lanes(p.occlusion[0], p.occlusion[1]), fade * s->fit.gain);
+    }
+#ifndef SSAO_SAT_NO_BENT
+    if (s->bent_wanted) ssao_sat__store_blocked(s, &p, at, fade * s->fit.gain * SSAO_SAT__BLOCKED);
+#endif
+}
+
+/* ------------------------------------------------------------------------------------------------
+   The single-table methods: MINIMALIST, NORMAL_GUIDED, REFINED as published, and PLANE
+   ------------------------------------------------------------------------------------------------ */
+
+/* A region and its corners in the table: 3 x 3 of them first, 5 x 5 when a child is split again (Slomp 2012, figure 5.12:
+   9 and 25 lookups instead of 20 and 84). */
+typedef struct ssao_sat__region {
+    int x[5], y[5];
+    uint32_t corner[5][5];
+    int fine; /* all 25 are there */
+} ssao_sat__region;
+
+/* Looks up the corners at multiples of `step`, except those at multiples of `have`. */
+static void ssao_sat__look_up(ssao_sat__region *r, const ssao_sat *s, int step, int have, ssao_sat_stats *stats)
+{
+    int i, j;
+    for (j = 0; j < 5; j += step)
+        for (i = 0; i < 5; i += step) {
+            if (have && i % have == 0 && j % have == 0) continue;
+            r->corner[j][i] = s->table[(size_t)(r->y[j] - s->first) * s->table_stride + (size_t)r->x[i]];
+            stats->lookups++;
+        }
+}
+
+static void ssao_sat__set_region(ssao_sat__region *r, const ssao_sat *s, float cx, float cy, float half_x, float half_y)
+{
+    float x0 = cx - half_x, x1 = cx + half_x, y0 = cy - half_y, y1 = cy + half_y;
+    r->x[0] = sat__clamp_int((int)floorf(x0 + 0.5f), 0, s->columns - 1);
+    r->y[0] = sat__clamp_int((int)floorf(y0 + 0.5f), 0, s->rows - 1);
+    r->x[4] = sat__clamp_int((int)floorf(x1 + 0.5f), r->x[0] + 1, s->columns);
+    r->y[4] = sat__clamp_int((int)floorf(y1 + 0.5f), r->y[0] + 1, s->rows);
+    r->x[2] = (r->x[0] + r->x[4]) / 2;
+    r->y[2] = (r->y[0] + r->y[4]) / 2;
+    r->x[1] = (r->x[0] + r->x[2]) / 2;
+    r->y[1] = (r->y[0] + r->y[2]) / 2;
+    r->x[3] = (r->x[2] + r->x[4]) / 2;
+    r->y[3] = (r->y[2] + r->y[4]) / 2;
+    r->fine = 0;
+}
+
+static inline int ssao_sat__area(const ssao_sat__region *r, int i0, int j0, int i1, int j1)
+{
+    return (r->x[i1] - r->x[i0]) * (r->y[j1] - r->y[j0]);
+}
+
+/* Mean of the table's values over part of the region, of area > 0. */
+static float ssao_sat__mean(const ssao_sat__region *r, const ssao_sat *s, int i0, int j0, int i1, int j1)
+{
+    float area = (float)ssao_sat__area(r, i0, j0, i1, j1);
+    uint32_t a = r->corner[j0][i0], b = r->corner[j0][i1], c = r->corner[j1][i0], d = r->corner[j1][i1];
+    if (s->options.float_table)
+        return s->mean + (sat__float_from_bits(d) - sat__float_from_bits(c) - sat__float_from_bits(b) + sat__float_from_bits(a)) / area;
+    return s->value.low + s->value.quantum * (float)(d - c - b + a) / area;
+}
+
+/* How much nearer than z the mean is (Slomp 2012, 5.4.1), in world units. */
+static float ssao_sat__deficit(const ssao_sat *s, float mean, float z)
+{
+    return s->options.inverted_depth ? (mean * z - 1) * z : z - mean;
+}
+
+/* Eq 5.4 over the children of one node: those that are nearer than their parent, weighted by area. As printed (E: "higher",
+   where 5.4.1 calls higher values farther away) the others are kept. No child passes: the parent. */
+static float ssao_sat__refine(ssao_sat__region *r, const ssao_sat *s, float z, int i0, int j0, int step, int level, ssao_sat_stats *stats)
+{
+    float parent_mean = ssao_sat__mean(r, s, i0, j0, i0 + 2 * step, j0 + 2 * step), parent = ssao_sat__deficit(s, parent_mean, z);
+    float sum = 0, weight = 0;
+    int i, j;
+    if (level >= s->options.refine_levels || fabsf(parent) >= (float)s->options.refine_threshold * z) return parent;
+    if (r->x[i0 + 2 * step] - r->x[i0] < 2 || r->y[j0 + 2 * step] - r->y[j0] < 2) return parent;
+    if (level == 0) ssao_sat__look_up(r, s, 2, 4, stats);
+    else if (!r->fine) {
+        ssao_sat__look_up(r, s, 1, 2, stats);
+        r->fine = 1;
+    }
+    for (j = j0; j < j0 + 2 * step; j += step)
+        for (i = i0; i < i0 + 2 * step; i += step) {
+            float mean = ssao_sat__mean(r, s, i, j, i + step, j + step), child = ssao_sat__deficit(s, mean, z);
+            float area = (float)ssao_sat__area(r, i, j, i + step, j + step);
+            if (!(s->options.as_printed ? mean > parent_mean : child > parent)) continue;
+            if (step == 2) child = ssao_sat__refine(r, s, z, i, j, 1, level + 1, stats);
+            sum += area * child;
+            weight += area;
+        }
+    return weight > 0 ? sum / weight : parent;
+}
+
+/* Where the region is centred: moved along the projected normal (5.4.2). A normal n at P moves its point along
+   n.xy - n.z P.xy / P.z on the screen; the text's n.xy is right in orthographic views. */
+static void ssao_sat__guide(const ssao_sat *s, const ssao_sat__vector *n, float rx, float ry, float half_side, float *cx, float *cy)
+{
+    float straight = s->options.as_printed || s->camera.orthographic ? 0 : n->z, length;
+    float dx = (n->x - straight * rx) * (s->camera.ax > 0 ? 1.0f : -1.0f), dy = (n->y - straight * ry) * (s->camera.ay > 0 ? 1.0f : -1.0f);
+    float offset = (float)s->options.normal_offset * half_side;
+    length = dx * dx + dy * dy;
+    if (length > 1) offset /= sqrtf(length);
+    *cx += dx * offset;
+    *cy += dy * offset * s->camera.aspect;
+}
+
+static float ssao_sat__published(const ssao_sat *s, ssao_sat__region *r, float z, ssao_sat_stats *stats)
+{
+    float deficit, gain = 1;
+    ssao_sat__look_up(r, s, 4, 0, stats);
+    if (s->options.method == SSAO_SAT_REFINED) deficit = ssao_sat__refine(r, s, z, 0, 0, 2, 0, stats);
+    else deficit = ssao_sat__deficit(s, ssao_sat__mean(r, s, 0, 0, 4, 4), z);
+    if (s->farthest > s->nearest) gain += (float)s->options.depth_gain * (z - s->nearest) / (s->farthest - s->nearest);
+    return deficit > 0 ? gain * deficit / s->radius : 0;
+}
+
+/* Height of the mean over the tangent plane, for each of the boxes. In perspective the plane is 1/z = n.ray / n.P, in orthographic
+   views z itself is affine: both are compared at the centre of the box, where their mean over the box lies. */
+static float ssao_sat__over_plane(const ssao_sat *s, ssao_sat__region *r, const ssao_sat__vector *n, float x, float y, float z,
+                                  float rx, float ry, ssao_sat_stats *stats)
+{
+    float gx, gy, own, to_height, sum = 0;
+    int i, j, step = s->options.plane_boxes == 2 ? 2 : 4;
+    if (s->camera.orthographic) {
+        float facing = n->z < -1e-3f ? n->z : -1e-3f;
+        gx = n->x / facing * s->camera.ax;
+        gy = n->y / facing * s->camera.ay;
+        own = s->farthest - z;
+        to_height = -facing / s->radius;
+    } else {
+        float facing = n->x * rx + n->y * ry + n->z; /* n.P / z; grazing and back-facing normals count as nearly grazing */
+        if (facing > -1e-3f) facing = -1e-3f;
+        gx = n->x * s->camera.ax / (facing * z);
+        gy = n->y * s->camera.ay / (facing * z);
+        own = 1 / z;
+        to_height = -facing * z * z / s->radius;
+    }
+    ssao_sat__look_up(r, s, step, 0, stats);
+    for (j = 0; j < 4; j += step)
+        for (i = 0; i < 4; i += step) {
+            float height, cx = 0.5f * (float)(r->x[i] + r->x[i + step]), cy = 0.5f * (float)(r->y[j] + r->y[j + step]);
+            if (ssao_sat__area(r, i, j, i + step, j + step) == 0) continue;
+            height = (ssao_sat__mean(r, s, i, j, i + step, j + step) - own - gx * (cx - x) - gy * (cy - y)) * to_height;
+            if (height > 0) sum += height / (1 + s->fit.range * height * height);
+        }
+    return sum / (float)(s->options.plane_boxes * s->options.plane_boxes);
+}
+
+/* Mean depth of a region; harmonic where the table holds 1/z. */
+static float ssao_sat__mean_depth(const ssao_sat *s, ssao_sat__region *r, ssao_sat_stats *stats)
+{
+    float mean;
+    if (s->options.method == SSAO_SAT_SLABS) {
+        float affine = 0;
+        uint32_t total = 0;
+        int k;
+        for (k = 0; k < s->frame_slabs; k++) {
+            const uint32_t *table = s->table + 4 * (size_t)k * s->table_plane;
+            uint32_t count = ssao_sat__box(s, table, 4, r->x[0], r->y[0], r->x[4], r->y[4]);
+            uint32_t level = ssao_sat__box(s, table + 1, 4, r->x[0], r->y[0], r->x[4], r->y[4]);
+            affine += s->slabs[k].low * (float)count + s->slabs[k].quantum * (float)level;
+            total += count;
+            stats->lookups += 8;
+        }
+        mean = affine / (float)(total ? total : 1);
+        return s->camera.orthographic ? mean : 1 / mean;
+    }
+    ssao_sat__look_up(r, s, 4, 0, stats);
+    mean = ssao_sat__mean(r, s, 0, 0, 4, 4);
+    if (ssao_sat__table_is_inverse(s)) return 1 / mean;
+    return s->options.method == SSAO_SAT_PLANE ? s->farthest - mean : mean;
+}
+
+/* One pixel of a single-table method, or of the signed output of any method. */
+static float ssao_sat__estimate_pixel(const ssao_sat *s, int x, int y, ssao_sat_stats *stats)
+{
+    size_t at = ssao_sat__at(s, y) + (size_t)x;
+    float z = s->z[at], cx = (float)x + 0.5f, cy = (float)y + 0.5f, half_side, fade;
+    float perspective = s->camera.orthographic ? 0.0f : 1.0f;
+    float rx = (s->camera.ax * (float)x + s->camera.bx) * perspective, ry = (s->camera.ay * (float)y + s->camera.by) * perspective;
+    ssao_sat__region region;
+    ssao_sat__vector n;
+    int cut;
+    if (!(z > 0)) { stats->sky++; return s->is_signed ? 0.0f : 1.0f; }
+    half_side = ssao_sat__half_side(s, z, &cut);
+    fade = ssao_sat__fade(s, half_side);
+    if (!(fade > 0)) { stats->small++; return s->is_signed ? 0.0f : 1.0f; }
+    stats->cut += (size_t)cut;
+    stats->estimated++;
+    n.x = s->nx[at];
+    n.y = s->ny[at];
+    n.z = s->nz[at];
+    if (!s->is_signed && (s->options.method == SSAO_SAT_NORMAL_GUIDED || s->options.method == SSAO_SAT_REFINED))
+        ssao_sat__guide(s, &n, rx, ry, half_side, &cx, &cy);
+    else if (!s->is_signed && s->options.method == SSAO_SAT_PLANE) {
+        cx += n.x * half_side * (s->camera.ax > 0 ? 1.0f : -1.0f);
+        cy += n.y * half_side * s->camera.aspect * (s->camera.ay > 0 ? 1.0f : -1.0f);
+    }
+    if (cx - half_side < 0 || cx + half_side > (float)s->columns || cy - half_side * s->camera.aspect < 0 ||
+        cy + half_side * s->camera.aspect > (float)s->rows) stats->border++;
+    ssao_sat__set_region(&region, s, cx, cy, half_side, half_side * s->camera.aspect);
+    if (s->is_signed) {
+        float v = fade * (float)s->options.gain * (ssao_sat__mean_depth(s, &region, stats) - z) / s->radius;
+        return v > 1 ? 1 : v > -1 ? v : -1;
+    }
+    if (s->options.method == SSAO_SAT_PLANE)
+        return ssao_sat__accessibility(s, ssao_sat__over_plane(s, &region, &n, (float)x + 0.5f, (float)y + 0.5f, z, rx, ry, stats), fade * s->fit.gain);
+    return ssao_sat__accessibility(s, ssao_sat__published(s, &region, z, stats), fade * s->fit.gain);
+}
+
+static void ssao_sat__estimate_rows(int begin, int end, int worker, void *context)
+{
+    ssao_sat *s = (ssao_sat *)context;
+    ssao_sat_stats unused;
+    int y, x, slabs = s->options.method == SSAO_SAT_SLABS && !s->is_signed, above = s->step == 2 && s->begin > 0;
+    memset(&unused, 0, sizeof unused);
+    for (y = s->begin - above + begin; y < s->begin - above + end; y++) {
+        ssao_sat_stats *stats = y >= s->begin && y < s->end ? &s->workers[worker].stats : &unused; /* neighbours of the band count there */
+        if (slabs) for (x = 0; x < s->columns; x++) ssao_sat__estimate_slabs(s, x, y, stats);
+        else for (x = 0; x < s->columns; x++) s->open[ssao_sat__at(s, y) + (size_t)x] = ssao_sat__estimate_pixel(s, x, y, stats);
+    }
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Output: copied, or upsampled with weights that fall with the distance of a neighbour from the pixel's tangent plane and with
+   the angle between the normals. Sky has no weight; a pixel without neighbours on its plane takes what is near.
+   ------------------------------------------------------------------------------------------------ */
+
+static inline float *ssao_sat__out_row(float *out, ptrdiff_t stride, int y)
+{
+    return (float *)(void *)((unsigned char *)out + (ptrdiff_t)y * stride);
+}
+
+#ifndef SSAO_SAT_NO_BENT
+/* Mean free direction: that of the open hemisphere, 2/3 n, less what is blocked. z turns from forward to OpenGL's. */
+static inline void ssao_sat__write_bent(float *out, float z, float nx, float ny, float nz, float bx, float by, float bz)
+{
+    float x = (2 / 3.0f) * nx - bx, y = (2 / 3.0f) * ny - by, w = (2 / 3.0f) * nz - bz, length = sqrtf(x * x + y * y + w * w);
+    if (!(z > 0)) { nx = ny = 0; nz = -1; }
+    if (z > 0 && length > 1e-3f) { nx = x / length; ny = y / length; nz = w / length; }
+    out[0] = nx;
+    out[1] = ny;
+    out[2] = -nz;
+}
+#endif
+
+static void ssao_sat__copy_row(const ssao_sat *s, int y)
+{
+    size_t at = ssao_sat__at(s, y);
+    memcpy(ssao_sat__out_row(s->out, s->out_stride, y), s->open + at, (size_t)s->width * sizeof(float));
+#ifndef SSAO_SAT_NO_BENT
+    if (s->bent_wanted) {
+        float *bent = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
+        int x;
+        for (x = 0; x < s->width; x++, at++)
+            ssao_sat__write_bent(bent + 3 * x, s->z[at], s->nx[at], s->ny[at], s->nz[at], s->blocked[0][at], s->blocked[1][at], s->blocked[2][at]);
+    }
+#endif
+}
+
+typedef struct ssao_sat__picture_row { float *z, *nx, *ny, *nz, *open, *blocked[3]; } ssao_sat__picture_row; /* every second pixel */
+
+/* Pixels x0 + 2 i, i = first .. first + lanes - 1, of row y: the 3 x 3 table pixels around (x / 2, y / 2). */
+static void ssao_sat__upsample_lanes(const ssao_sat *s, const ssao_sat__picture_row *r, int x0, int y, int first)
+{
+    const float orthographic = s->camera.orthographic ? 1.0f : 0.0f, perspective = 1 - orthographic;
+    const ssao_sat__f zero = ssao_sat__set(0), one = ssao_sat__set(1), nx = ssao_sat__load(r->nx + first), ny = ssao_sat__load(r->ny + first);
+    const ssao_sat__f nz = ssao_sat__load(r->nz + first), z = ssao_sat__load(r->z + first);
+    const ssao_sat__f scale = ssao_sat__add(ssao_sat__mul(z, ssao_sat__set(perspective)), ssao_sat__set(orthographic));
+    float lane[4], ry = (float)(s->camera.full[2] * (y + 0.5) + s->camera.full[3]);
+    ssao_sat__f total = ssao_sat__set(1e-20f), sum = total, rx, own, sharpness, blocked[3];
+    int i, j, k, c;
+    for (i = 0; i < 4; i++) lane[i] = (float)(s->camera.full[0] * (x0 + 2 * (first + i) + 0.5) + s->camera.full[1]);
+    rx = ssao_sat__load(lane);
+    own = ssao_sat__add(ssao_sat__mul(scale, ssao_sat__add(ssao_sat__mul(nx, rx), ssao_sat__mul(ny, ssao_sat__set(ry)))), ssao_sat__mul(nz, z));
+    sharpness = ssao_sat__div(ssao_sat__set(SSAO_SAT__SHARPNESS), ssao_sat__max(z, ssao_sat__set(1 / SSAO_SAT__FAR)));
+    for (c = 0; c < 3; c++) blocked[c] = zero;
+    for (j = sat__max_int(y / 2 - 1, 0); j <= sat__min_int(y / 2 + 1, s->rows - 1); j++) {
+        size_t at = ssao_sat__at(s, j) + (size_t)first;
+        float rowy = s->camera.ay * (float)j + s->camera.by;
+        for (k = -1; k <= 1; k++) {
+            const size_t t = at + (size_t)k; /* at >= 1: rows are padded */
+            const int dx = 2 * k - x0, dy = 2 * j - y;
+            ssao_sat__f tx = ssao_sat__add(rx, ssao_sat__set((float)s->camera.full[0] * (float)dx)), tz = ssao_sat__load(s->z + t);
+            ssao_sat__f tscale = ssao_sat__add(ssao_sat__mul(tz, ssao_sat__set(perspective)), ssao_sat__set(orthographic));
+            ssao_sat__f along = ssao_sat__add(ssao_sat__mul(tscale, ssao_sat__add(ssao_sat__mul(nx, tx), ssao_sat__mul(ny, ssao_sat__set(rowy)))), ssao_sat__mul(nz, tz));
+            ssao_sat__f on_plane = ssao_sat__max(zero, ssao_sat__sub(one, ssao_sat__mul(ssao_sat__abs(ssao_sat__sub(along, own)), sharpness)));
+            ssao_sat__f alike = ssao_sat__add(ssao_sat__add(ssao_sat__mul(nx, ssao_sat__load(s->nx + t)), ssao_sat__mul(ny, ssao_sat__load(s->ny + t))),
+                                              ssao_sat__mul(nz, ssao_sat__load(s->nz + t)));
+            ssao_sat__f weight;
+            alike = ssao_sat__max(zero, alike);
+            alike = ssao_sat__mul(alike, alike);
+            weight = ssao_sat__add(ssao_sat__mul(on_plane, ssao_sat__mul(alike, alike)), ssao_sat__set(1e-4f));
+            weight = ssao_sat__if_positive(tz, ssao_sat__mul(weight, ssao_sat__set(1 / (1 + (float)(dx * dx + dy * dy)))));
+            total = ssao_sat__add(total, weight);
+            sum = ssao_sat__add(sum, ssao_sat__mul(weight, ssao_sat__load(s->open + t)));
+            if (s->bent_wanted)
+                for (c = 0; c < 3; c++) blocked[c] = ssao_sat__add(blocked[c], ssao_sat__mul(weight, ssao_sat__load(s->blocked[c] + t)));
+        }
+    }
+    ssao_sat__store(r->open + first, ssao_sat__div(sum, total));
+    if (s->bent_wanted)
+        for (c = 0; c < 3; c++) ssao_sat__store(r->blocked[c] + first, ssao_sat__div(blocked[c], total));
+}
+
+static void ssao_sat__write_row(const ssao_sat *s, const ssao_sat__picture_row *r, int x0, int y)
+{
+    float *out = ssao_sat__out_row(s->out, s->out_stride, y);
+    int x, i;
+    for (x = x0, i = 0; x < s->width; x += 2, i++) out[x] = r->z[i] > 0 ? r->open[i] : s->is_signed ? 0.0f : 1.0f;
+#ifndef SSAO_SAT_NO_BENT
+    if (s->bent_wanted) {
+        float *bent = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
+        for (x = x0, i = 0; x < s->width; x += 2, i++)
+            ssao_sat__write_bent(bent + 3 * x, r->z[i], r->nx[i], r->ny[i], r->nz[i], r->blocked[0][i], r->blocked[1][i], r->blocked[2][i]);
+    }
+#endif
+}
+
+static void ssao_sat__write_rows(int begin, int end, int worker, void *context)
+{
+    ssao_sat *s = (ssao_sat *)context;
+    float *scratch = s->scratch + (size_t)worker * 8 * s->stride;
+    ssao_sat__picture_row r;
+    ssao_sat_stats unused;
+    int y, x0, i, c;
+    memset(&unused, 0, sizeof unused);
+    r.z = scratch;
+    r.nx = scratch + s->stride;
+    r.ny = scratch + 2 * s->stride;
+    r.nz = scratch + 3 * s->stride;
+    r.open = scratch + 4 * s->stride;
+    for (c = 0; c < 3; c++) r.blocked[c] = scratch + (size_t)(5 + c) * s->stride;
+    for (y = s->begin * s->step + begin; y < s->begin * s->step + end; y++) {
+        if (s->step == 1) {
+            ssao_sat__copy_row(s, y);
+            continue;
+        }
+        for (x0 = 0; x0 < 2 && x0 < s->width; x0++) {
+            ssao_sat__read_row(s, y, x0, 2, r.z, r.nx, r.ny, r.nz, &unused);
+            for (i = 0; x0 + 2 * i < s->width; i += 4) ssao_sat__upsample_lanes(s, &r, x0, y, i);
+            ssao_sat__write_row(s, &r, x0, y);
+        }
+    }
+}
+
+/* ------------------------------------------------------------------------------------------------
+   A frame: band by band rows are read, tables built, pixels estimated, rows written
+   ------------------------------------------------------------------------------------------------ */
+
+static void ssao_sat__run_band(ssao_sat *s, int begin, int end)
+{
+    const sat_threads *threads = &s->options.threads;
+    int reserve = s->reserve, k, i, estimated, tables = s->options.method == SSAO_SAT_SLABS ? s->frame_slabs + s->options.skip_flat : 1;
+    s->begin = begin;
+    s->end = end;
+    s->first = sat__max_int(0, begin - reserve);
+    s->held = sat__min_int(s->rows, end + reserve) - s->first;
+    sat__parallel_for(threads, s->held, ssao_sat__hold_rows, s);
+    s->used_slabs = 0;
+    for (i = 0; i < s->held && s->options.method == SSAO_SAT_SLABS; i++) s->used_slabs |= s->row_slabs[i];
+    sat__parallel_for(threads, tables, ssao_sat__build_tables, s);
+    for (k = 0, estimated = end - begin; k < 2 && s->step == 2; k++) estimated += k ? end < s->rows : begin > 0;
+    sat__parallel_for(threads, estimated, ssao_sat__estimate_rows, s);
+    sat__parallel_for(threads, sat__min_int(end * s->step, s->height) - begin * s->step, ssao_sat__write_rows, s);
+}
+
+/* Nothing can occlude: all open, signed 0. */
+static void ssao_sat__fill(ssao_sat *s)
+{
+    int y, x;
+    for (y = 0; y < s->height; y++) {
+        float *o = ssao_sat__out_row(s->out, s->out_stride, y);
+        for (x = 0; x < s->width; x++) o[x] = s->is_signed ? 0.0f : 1.0f;
+#ifndef SSAO_SAT_NO_BENT
+        if (s->bent_wanted) {
+            float *b = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
+            for (x = 0; x < s->width; x++) {
+                float z = ssao_sat__distance(s, x, y);
+                ssao_sat__vector n = {0, 0, -1};
+                if (z > 0) n = ssao_sat__normal(s, x, y, z, &s->workers[0].stats);
+                b[3 * x] = n.x;
+                b[3 * x + 1] = n.y;
+                b[3 * x + 2] = -n.z;
+            }
+        }
+#endif
+    }
+}
+
+static void ssao_sat__find_range(ssao_sat *s)
+{
+    int i, workers = sat__worker_count(&s->options.threads);
+    for (i = 0; i < workers; i++) memset(&s->workers[i], 0, sizeof s->workers[i]);
+    sat__parallel_for(&s->options.threads, s->rows, ssao_sat__range_rows, s);
+    s->nearest = s->farthest = 0;
+    for (i = 0; i < workers; i++) {
+        const ssao_sat__worker *w = &s->workers[i];
+        if (!(w->farthest > 0)) continue;
+        if (!(s->farthest > 0) || w->nearest < s->nearest) s->nearest = w->nearest;
+        if (w->farthest > s->farthest) s->farthest = w->farthest;
+    }
+}
+
+/* The mean that float_table 2 takes off: of the 32 x 32 sample, near enough and cheap. */
+static float ssao_sat__sample_mean(const ssao_sat *s)
+{
+    float sum = 0;
+    int i, j;
+    for (j = 0; j < SSAO_SAT__GRID; j++)
+        for (i = 0; i < SSAO_SAT__GRID; i++) {
+            int x = (int)((2 * i + 1) * (int64_t)s->columns / (2 * SSAO_SAT__GRID)), y = (int)((2 * j + 1) * (int64_t)s->rows / (2 * SSAO_SAT__GRID));
+            sum += ssao_sat__table_value(s, ssao_sat__distance(s, x * s->step, y * s->step));
+        }
+    return sum / (SSAO_SAT__GRID * SSAO_SAT__GRID);
+}
+
+static void ssao_sat__prepare_frame(ssao_sat *s)
+{
+    float side = (float)(1.5 * (sqrt(2147483648.0 / sat__max_int(s->columns, s->rows)) - 2)); /* sums of x and y fit 31 bits */
+    int cut;
+    s->limit = (float)s->options.max_pixels < side ? (float)s->options.max_pixels : side;
+    if (s->camera.aspect > 1) s->limit /= s->camera.aspect;
+    s->largest = s->limit;
+    side = ssao_sat__half_side(s, s->nearest, &cut);
+    s->largest = (side > 2 ? side : 2) * (s->camera.aspect > 1 ? s->camera.aspect : 1);
+    s->flat_limit = s->fit.bias / (4 * s->largest * s->camera.pixels);
+    if (s->camera.orthographic) s->flat_limit /= s->nearest; /* relative to z there */
+    if (s->flat_limit < 5e-7f) s->flat_limit = 5e-7f;         /* the rounding of float depths */
+    if (s->options.method == SSAO_SAT_SLABS) {
+        ssao_sat__prepare_slabs(s);
+    } else {
+        ssao_sat__prepare_value(s);
+        s->mean = s->options.float_table == 2 ? ssao_sat__sample_mean(s) : 0;
+    }
+}
+
+static void ssao_sat__run(ssao_sat *s, ssao_sat_stats *stats)
+{
+    int begin, band = s->options.band_rows ? s->options.band_rows : s->rows, i;
+    ssao_sat__find_range(s);
+    if (!(s->farthest > 0) || !(s->reach > 0) || !(s->fit.gain > 0)) ssao_sat__fill(s);
+    else {
+        ssao_sat__prepare_frame(s);
+        for (begin = 0; begin < s->rows; begin += band) ssao_sat__run_band(s, begin, sat__min_int(begin + band, s->rows));
+    }
+    if (!stats) return;
+    memset(stats, 0, sizeof *stats);
+    stats->pixels = (size_t)s->columns * (size_t)s->rows;
+    stats->nearest = (double)s->nearest;
+    stats->farthest = (double)s->farthest;
+    stats->bytes = s->bytes;
+    for (i = 0; i < sat__worker_count(&s->options.threads); i++) {
+        const ssao_sat_stats *w = &s->workers[i].stats;
+        stats->sky += w->sky;
+        stats->small += w->small;
+        stats->flat += w->flat;
+        stats->estimated += w->estimated;
+        stats->border += w->border;
+        stats->cut += w->cut;
+        stats->slabs_visited += w->slabs_visited;
+        stats->slabs_skipped += w->slabs_skipped;
+        stats->lookups += w->lookups;
+        stats->normals_replaced += w->normals_replaced;
+        stats->normals_backfacing += w->normals_backfacing;
+    }
+}
+
+/* ------------------------------------------------------------------------------------------------
+   Calls
+   ------------------------------------------------------------------------------------------------ */
+
+/* Rows of `bytes` each, `stride` apart (0: packed): resolves the stride; 0 when they overlap or are not aligned. */
+static int ssao_sat__rows_are_valid(const void *pixels, ptrdiff_t *stride, int height, size_t bytes, size_t element)
+{
+    size_t step;
+    if (!pixels || (uintptr_t)pixels % element) return 0;
+    if (*stride == 0) *stride = (ptrdiff_t)bytes;
+    step = *stride < 0 ? (size_t)0 - (size_t)*stride : (size_t)*stride;
+    return (height == 1 || step >= bytes) && step % element == 0;
+}
+
+/* Do two sets of rows share a byte? Interleaved rows of one buffer count as sharing. */
+static int ssao_sat__overlap(const void *a, ptrdiff_t a_stride, size_t a_bytes, const void *b, ptrdiff_t b_stride, size_t b_bytes, int height)
+{
+    uintptr_t a0 = (uintptr_t)a, a1 = a0, b0 = (uintptr_t)b, b1 = b0;
+    if (!a || !b) return 0;
+    if (a_stride < 0) a0 -= (uintptr_t)(0 - a_stride) * (uintptr_t)(height - 1);
+    else a1 += (uintptr_t)a_stride * (uintptr_t)(height - 1);
+    if (b_stride < 0) b0 -= (uintptr_t)(0 - b_stride) * (uintptr_t)(height - 1);
+    else b1 += (uintptr_t)b_stride * (uintptr_t)(height - 1);
+    return a0 < b1 + b_bytes && b0 < a1 + a_bytes;
+}
+
+static sat_result ssao_sat__check_input(ssao_sat *s, const ssao_sat_input *input)
+{
+    ssao_sat_input *in = &s->input;
+    *in = *input;
+    if (in->width != s->width || in->height != s->height) return SAT_ERR_MISMATCH;
+    if ((unsigned)in->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED || !in->depth == !in->half_depth) return SAT_ERR_ARGUMENT;
+    if (!(in->sky >= 0)) return SAT_ERR_ARGUMENT;
+    if (in->depth && !ssao_sat__rows_are_valid(in->depth, &in->depth_stride, in->height, (size_t)in->width * 4, 4)) return SAT_ERR_ARGUMENT;
+    if (in->half_depth && !ssao_sat__rows_are_valid(in->half_depth, &in->depth_stride, in->height, (size_t)in->width * 2, 2)) return SAT_ERR_ARGUMENT;
+    if (in->normals && !ssao_sat__rows_are_valid(in->normals, &in->normal_stride, in->height, (size_t)in->width * 12, 4)) return SAT_ERR_ARGUMENT;
+    return ssao_sat__read_camera(&s->camera, in, s->step, s->options.bottom_up) ? SAT_OK : SAT_ERR_ARGUMENT;
+}
+
+static int ssao_sat__output_is_valid(const ssao_sat *s, const float *out, ptrdiff_t *stride, size_t bytes)
+{
+    const ssao_sat_input *in = &s->input;
+    const void *depth = in->depth ? (const void *)in->depth : (const void *)in->half_depth;
+    if (!ssao_sat__rows_are_valid(out, stride, s->height, bytes, 4)) return 0;
+    return !ssao_sat__overlap(out, *stride, bytes, depth, in->depth_stride, (size_t)s->width * (in->depth ? 4 : 2), s->height) &&
+           !ssao_sat__overlap(out, *stride, bytes, in->normals, in->normal_stride, (size_t)s->width * 12, s->height);
+}
+
+static sat_result ssao_sat__apply(ssao_sat *s, float *out, ptrdiff_t stride, float *bent, ptrdiff_t bent_stride,
+                                  const ssao_sat_input *input, ssao_sat_stats *stats, int is_signed)
+{
+    sat_result result;
+    if (!s || !out || !input) return SAT_ERR_ARGUMENT;
+    result = ssao_sat__check_input(s, input);
+    if (result != SAT_OK) return result;
+    if (!ssao_sat__output_is_valid(s, out, &stride, (size_t)s->width * 4)) return SAT_ERR_ARGUMENT;
+    if (bent) {
+        if (!ssao_sat__output_is_valid(s, bent, &bent_stride, (size_t)s->width * 12)) return SAT_ERR_ARGUMENT;
+        if (ssao_sat__overlap(out, stride, (size_t)s->width * 4, bent, bent_stride, (size_t)s->width * 12, s->height)) return SAT_ERR_ARGUMENT;
+    }
+    s->out = out;
+    s->out_stride = stride;
+    s->bent_out = bent;
+    s->bent_stride = bent_stride;
+    s->bent_wanted = bent != NULL;
+    s->is_signed = is_signed;
+    s->fit = ssao_sat__fits[s->options.method == SSAO_SAT_PLANE && s->options.plane_boxes == 1 ? 5 : (int)s->options.method];
+    s->fit.gain *= (float)s->options.gain;
+    s->radius = (float)s->options.radius;
+    s->reach = is_signed ? s->radius : s->radius * s->fit.reach;
+    s->range = s->radius * s->fit.range;
+    ssao_sat__run(s, stats);
+    return SAT_OK;
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_apply(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride, const ssao_sat_input *input,
+                                       ssao_sat_stats *stats)
+{
+    return ssao_sat__apply(ao, accessibility, out_stride, NULL, 0, input, stats, 0);
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_apply_signed(ssao_sat *ao, float *out, ptrdiff_t out_stride, const ssao_sat_input *input,
+                                              ssao_sat_stats *stats)
+{
+    return ssao_sat__apply(ao, out, out_stride, NULL, 0, input, stats, 1);
+}
+
+#ifndef SSAO_SAT_NO_BENT
+SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride, float *bent_normals,
+                                            ptrdiff_t bent_stride, const ssao_sat_input *input, ssao_sat_stats *stats)
+{
+    if (!ao || !bent_normals || ao->options.method != SSAO_SAT_SLABS) return SAT_ERR_ARGUMENT;
+    return ssao_sat__apply(ao, accessibility, out_stride, bent_normals, bent_stride, input, stats, 0);
+}
+#endif
+
+static int ssao_sat__in_range(double v, double low, double high) { return v >= low && v <= high; } /* NaN is not */
+
+static int ssao_sat__options_are_valid(const ssao_sat_options *o)
+{
+    return (unsigned)o->method <= (unsigned)SSAO_SAT_REFINED && ssao_sat__in_range(o->radius, 0, 1e15) && ssao_sat__in_range(o->gain, 0, 1e6) &&
+           o->power > 0 && ssao_sat__in_range(o->power, 0, 1e3) && (o->half_resolution == 0 || o->half_resolution == 1) &&
+           ssao_sat__in_range(o->slabs, 1, SSAO_SAT__MAX_SLABS) && ssao_sat__in_range(o->scales, 1, SSAO_SAT__MAX_SCALES) &&
+           ssao_sat__in_range(o->plane_boxes, 1, 2) && ssao_sat__in_range(o->normal_offset, 0, 1e3) && ssao_sat__in_range(o->refine_levels, 0, 2) &&
+           ssao_sat__in_range(o->refine_threshold, 0, 1e6) && ssao_sat__in_range(o->region_pixels, 0, 512) &&
+           ssao_sat__in_range(o->depth_gain, -1, 1e6) && ssao_sat__in_range(o->float_table, 0, 2) && ssao_sat__in_range(o->min_pixels, 1, 512) &&
+           ssao_sat__in_range(o->max_pixels, o->min_pixels, 512) && (o->band_rows == 0 || o->band_rows >= 16) && ssao_sat__in_range(o->skip_flat, 0, 1) &&
+           sat__threads_are_valid(&o->threads);
+}
+
+/* The same calls measure (base NULL) and lay out the one block. */
+static int ssao_sat__lay_out(ssao_sat *s, sat__arena *arena)
+{
+    size_t rows = (size_t)s->capacity, picture, words;
+    int bent = 0, i;
+#ifndef SSAO_SAT_NO_BENT
+    bent = s->options.method == SSAO_SAT_SLABS;
+#endif
+    if (!sat__multiply_size(&picture, rows, s->stride) || !sat__multiply_size(&s->table_plane, rows + 1, s->table_stride) ||
+        !sat__multiply_size(&words, s->table_plane, (size_t)s->tables)) return 0;
+    s->z = (float *)sat__carve(arena, picture, 4);
+    s->affine = (float *)sat__carve(arena, picture, 4);
+    s->nx = (float *)sat__carve(arena, picture, 4);
+    s->ny = (float *)sat__carve(arena, picture, 4);
+    s->nz = (float *)sat__carve(arena, picture, 4);
+    s->open = (float *)sat__carve(arena, picture, 4);
+    for (i = 0; i < 3; i++) s->blocked[i] = (float *)sat__carve(arena, bent ? picture : 0, 4);
+    s->slab = (uint8_t *)sat__carve(arena, s->tables > 1 ? picture : 0, 1);
+    s->quantised = (uint32_t *)sat__carve(arena, s->tables > 1 ? picture : 0, 4);
+    s->row_slabs = (uint32_t *)sat__carve(arena, rows, 4);
+    s->table = (uint32_t *)sat__carve(arena, words, 4);
+    s->flags = (uint32_t *)sat__carve(arena, s->tables > 1 ? s->table_plane : 0, 4);
+    s->scratch = (float *)sat__carve(arena, (size_t)sat__worker_count(&s->options.threads) * 8, s->stride * 4);
+    s->workers = (ssao_sat__worker *)sat__carve(arena, (size_t)sat__worker_count(&s->options.threads), sizeof(ssao_sat__worker));
+    return !arena->overflow;
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_create(ssao_sat **out, int width, int height, const ssao_sat_options *options)
+{
+    ssao_sat s, *made;
+    sat__arena arena;
+    sat_allocator allocator;
+    void *block;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    memset(&s, 0, sizeof s);
+    s.options = options ? *options : ssao_sat_defaults();
+    if (width < 1 || height < 1 || width > 32768 || height > 32768 || !ssao_sat__options_are_valid(&s.options)) return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(&allocator, &s.options.allocator)) return SAT_ERR_ARGUMENT;
+    s.options.allocator = allocator;
+    s.width = width;
+    s.height = height;
+    s.step = s.options.half_resolution ? 2 : 1;
+    s.columns = (width + s.step - 1) / s.step;
+    s.rows = (height + s.step - 1) / s.step;
+    s.reserve = (int)s.options.max_pixels + 4;
+    s.capacity = s.options.band_rows ? sat__min_int(s.rows, s.options.band_rows + 2 * s.reserve) : s.rows;
+    s.stride = ((size_t)s.columns + 15) / 16 * 16 + 3 * SSAO_SAT__PAD;
+    s.table_stride = ((size_t)s.columns + 1 + 15) / 16 * 16;
+    s.tables = s.options.method == SSAO_SAT_SLABS ? 4 * s.options.slabs : 1;
+    memset(&arena, 0, sizeof arena);
+    sat__carve(&arena, 1, sizeof s);
+    if (!ssao_sat__lay_out(&s, &arena)) return SAT_ERR_SIZE;
+    s.bytes = arena.used + 64;
+    block = sat__alloc(&allocator, s.bytes);
+    if (!block) return SAT_ERR_MEMORY;
+    memset(&arena, 0, sizeof arena);
+    arena.base = sat__align64(block);
+    made = (ssao_sat *)sat__carve(&arena, 1, sizeof s);
+    s.block = block;
+    ssao_sat__lay_out(&s, &arena);
+    memset(arena.base, 0, s.bytes - 64); /* the padding must be sky; the rest costs one touch at creation */
+    *made = s;
+    *out = made;
+    return SAT_OK;
+}
+
+SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao)
+{
+    sat_allocator allocator;
+    if (!ao) return;
+    allocator = ao->options.allocator;
+    sat__release(&allocator, ao->block, ao->bytes);
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SSAO_SAT_IMPLEMENTATION */
