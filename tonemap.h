@@ -123,6 +123,51 @@ TONEMAP_DEF void tonemap_destroy(tonemap *map); /* NULL is fine */
 #endif /* TONEMAP_H */
 
 /* ------------------------------------------------------------------------------------------------
+   OpenGL 3.3 core or ES 3.0 / WebGL 2 with EXT_color_buffer_float (define TONEMAP_GL)
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(TONEMAP_GL) && !defined(TONEMAP__GL_API)
+#define TONEMAP__GL_API
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL state
+   as it was (but for pending errors, which are lost). Nothing waits for the GPU: the log-average and the adaptation stay
+   there. All options but threads and tolerance_codes work; an estimated key or white, and Ashikhmin's range, take a
+   histogram that draws one point a pixel (on ES they need EXT_float_blend). */
+typedef struct tonemap_gl tonemap_gl;
+
+/* On an OpenGL error *out only answers tonemap_gl_message, and is to be destroyed; on the others it is NULL. */
+TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_proc, int width, int height,
+                                         const tonemap_options *options);
+/* Maps the 2D texture hdr (float RGB or RGBA, of the created size, level 0) to sRGB codes and alpha 1 in the texture ldr
+   (RGBA8, of that size), or, when ldr is 0, in tonemap_gl_texture(). */
+TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned hdr, double dt_seconds);
+TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl);
+/* What the last SAT_ERR_GL_... was about; never NULL. */
+TONEMAP_DEF const char *tonemap_gl_message(const tonemap_gl *gl);
+TONEMAP_DEF void tonemap_gl_destroy(tonemap_gl *gl); /* NULL is fine */
+
+/* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader, once or more:
+
+       float tonemap_luminance(vec3 rgb)                             0 for NaN and what is not positive
+       float tonemap_rho(float lux)                                  eq A.11
+       vec3  tonemap_mesopic(vec3 rgb, float luminance, float rho)   eq A.12 with the pixel's own white
+       vec3  tonemap_srgb(vec3 linear)                               clipped and encoded
+
+   and, after sat_gl_glsl(), the search of eq A.5 to A.9 on a table of SAT_GL_FIXED32:
+
+       float tonemap_local(usampler2D table, float quantum, ivec2 pixel, float scaled_luminance, float key) */
+TONEMAP_DEF const char *tonemap_gl_glsl(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TONEMAP__GL_API */
+
+/* ------------------------------------------------------------------------------------------------
    Stop here if you only want to use the library.
    ------------------------------------------------------------------------------------------------ */
 
@@ -1325,8 +1370,8 @@ static inline void tonemap__shift_red4(sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 
     sat__f32x4 y = sat__f32x4_mul(sat__f32x4_set1(0.95047f), sat__f32x4_max(luminance, sat__f32x4_set1(TONEMAP__DARKEST))), q, c, dx;
     sat__i32x4 red;
     q = sat__f32x4_div(sat__f32x4_add(x, sat__f32x4_mul(sat__f32x4_set1(0.1804375f), *b)), y);
-    red = sat__f32x4_less(one, q);
-    if (!sat__i32x4_any(sat__i32x4_and(red, sat__f32x4_less(rho, one)))) return;
+    red = sat__i32x4_and(sat__f32x4_less(one, q), sat__f32x4_less(rho, one));
+    if (!sat__i32x4_any(red)) return;
     q = sat__f32x4_min(q, sat__f32x4_set1(1048576));
     c = sat__f32x4_add(one, sat__f32x4_mul(rho, sat__f32x4_sub(tonemap__cbrt4(q), one)));
     dx = sat__f32x4_mul(sat__f32x4_sub(sat__f32x4_mul(sat__f32x4_mul(c, c), c), q), y);
@@ -1707,3 +1752,541 @@ TONEMAP_DEF sat_result tonemap_once_u8(unsigned char *out, const float *pixels, 
 }
 #endif
 #endif /* TONEMAP_IMPLEMENTATION */
+
+/* ------------------------------------------------------------------------------------------------
+   OpenGL
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(TONEMAP_IMPLEMENTATION) && defined(TONEMAP_GL) && !defined(TONEMAP__GL_IMPLEMENTED)
+#define TONEMAP__GL_IMPLEMENTED
+
+#ifndef SAT_SIBLING_GL
+#define SAT_SIBLING_GL
+#endif
+#include "sat.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+static const char tonemap__glsl_library[] =
+    "#ifndef TONEMAP_GLSL\n"
+    "#define TONEMAP_GLSL\n"
+    "#ifndef TONEMAP_PHI_TERM\n" /* epsilon, and epsilon 2^phi */
+    "#define TONEMAP_EPSILON 0.05\n"
+    "#define TONEMAP_PHI_TERM 12.8\n"
+    "#define TONEMAP_SCALES 8\n"
+    "#endif\n"
+    "float tonemap_luminance(vec3 rgb) {\n"
+    "    float y = 0.2126729 * rgb.r + 0.7151522 * rgb.g + 0.0721750 * rgb.b;\n"
+    "    uint bits = floatBitsToUint(y);\n"
+    "    if (bits > 0x7f800000u || bits < 0x0d800000u) return 0.0;\n"
+    "    return bits > 0x71800000u ? uintBitsToFloat(0x71800000u) : y;\n"
+    "}\n"
+    "float tonemap_rho(float lux) {\n"
+    "    float t = pow(clamp(lux, 1e-8, 10.0), 0.383);\n"
+    "    return lux < 10.0 ? min((t * (92.0 / 57.0) + 0.93227627) / (t + 2.41546083), 1.0) : 1.0;\n"
+    "}\n"
+    "vec3 tonemap_mesopic(vec3 rgb, float luminance, float rho) {\n"
+    "    float y = 0.95047 * max(luminance, 7.8886e-31);\n"
+    "    float q = min(dot(rgb, vec3(0.4124564, 0.3575761, 0.1804375)) / y, 1048576.0);\n"
+    "    if (!(q > 1.0 && rho < 1.0)) return rgb;\n"
+    "    float c = 1.0 + rho * (pow(q, 1.0 / 3.0) - 1.0);\n"
+    "    return rgb + (c * c * c - q) * y * vec3(3.2404542, -0.9692660, 0.0556434);\n"
+    "}\n"
+    "vec3 tonemap_srgb(vec3 v) {\n"
+    "    v = clamp(v, 0.0, 1.0);\n"
+    "    return mix(12.92 * v, 1.055 * pow(max(v, 0.0031308), vec3(1.0 / 2.4)) - 0.055, greaterThan(v, vec3(0.0031308)));\n"
+    "}\n"
+    "#ifdef SAT_GLSL\n"
+    "float tonemap_local(usampler2D table, float quantum, ivec2 pixel, float scaled, float key) {\n"
+    "    const int reach[8] = int[8](0, 1, 2, 3, 5, 8, 13, 20);\n"
+    "    float c = min(scaled, 256.0);\n"
+    "    for (int k = 1; k < TONEMAP_SCALES; k++) {\n"
+    "        float side = float(2 * reach[k - 1] + 1);\n"
+    "        float v = sat_mean(table, quantum, pixel - reach[k], pixel + reach[k] + 1);\n"
+    "        if (!(abs(c - v) < TONEMAP_EPSILON * c + TONEMAP_PHI_TERM * key / (side * side))) break;\n"
+    "        c = v;\n"
+    "    }\n"
+    "    return c;\n"
+    "}\n"
+    "#endif\n"
+    "#endif\n";
+
+TONEMAP_DEF const char *tonemap_gl_glsl(void) { return tonemap__glsl_library; }
+
+/* The luminance plane. */
+static const char tonemap__glsl_luminance[] =
+    "uniform sampler2D hdr;\n"
+    "out float value;\n"
+    "void main() { value = tonemap_luminance(texelFetch(hdr, ivec2(gl_FragCoord.xy), 0).rgb); }\n";
+
+/* Sums over 4 x 4 texels. Texel: whole and 2^-16 parts of the sum of log2, carried over; pixels; the float sum of the
+   luminances. Integers, so that the log-average is the CPU's. The polynomial is the CPU's, too. */
+static const char tonemap__glsl_reduce[] =
+    "#ifdef TONEMAP_FIRST\n"
+    "uniform sampler2D source;\n"
+    "ivec4 tonemap_read(ivec2 p) {\n"
+    "    float y = texelFetch(source, p, 0).x;\n"
+    "    uint bits = floatBitsToUint(y);\n"
+    "    if (!(y > 0.0) || bits >= 0x71800000u) return ivec4(0);\n"
+    "    float t = uintBitsToFloat((bits & 0x007fffffu) | 0x3f800000u) - 1.0;\n"
+    "    float q = -0.0959564262 + t * 0.0258414329;\n"
+    "    q = 0.442544943 + t * (-0.275600307 + t * (0.18194886 + t * q));\n"
+    "    return ivec4(int(bits >> 23) - 127, int((t + t * (1.0 - t) * q) * 65536.0 + 0.5), 1, floatBitsToInt(y));\n"
+    "}\n"
+    "#else\n"
+    "uniform highp isampler2D source;\n"
+    "ivec4 tonemap_read(ivec2 p) { return texelFetch(source, p, 0); }\n"
+    "#endif\n"
+    "uniform ivec2 size;\n"
+    "out ivec4 value;\n"
+    "void main() {\n"
+    "    ivec2 low = 4 * ivec2(gl_FragCoord.xy), high = min(low + 4, size);\n"
+    "    ivec3 sum = ivec3(0);\n"
+    "    float light = 0.0;\n"
+    "    for (int y = low.y; y < high.y; y++)\n"
+    "        for (int x = low.x; x < high.x; x++) {\n"
+    "            ivec4 v = tonemap_read(ivec2(x, y));\n"
+    "            sum += v.xyz;\n"
+    "            light += intBitsToFloat(v.w);\n"
+    "        }\n"
+    "    value = ivec4(sum.x + (sum.y >> 16), sum.y & 65535, sum.z, floatBitsToInt(light));\n"
+    "}\n";
+
+/* The histogram: a point a pixel, added up by blending; bins as on the CPU, 64 in a row. */
+static const char tonemap__glsl_scatter[] =
+    "uniform sampler2D luminance;\n"
+    "uniform int width;\n"
+    "void main() {\n"
+    "    float y = texelFetch(luminance, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x;\n"
+    "    uint bits = floatBitsToUint(y);\n"
+    "    int bin = int((bits - 0x0d800000u) >> 19);\n"
+    "    gl_PointSize = 1.0;\n"
+    "    gl_Position = vec4((vec2(bin % 64, bin / 64) + 0.5) / vec2(32.0, TONEMAP_BINS / 128.0) - 1.0, 0.0, 1.0);\n"
+    "    if (!(y > 0.0) || bits >= 0x71800000u) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);\n"
+    "}\n";
+
+static const char tonemap__glsl_count[] =
+    "out float value;\n"
+    "void main() { value = 1.0; }\n";
+
+/* The state, two texels: log2 of average, key and white, and 1; log2 of low and high, the mean, 0. An empty picture
+   keeps the old one. */
+static const char tonemap__glsl_state[] =
+    "uniform highp isampler2D sums;\n"
+    "uniform sampler2D old, histogram;\n"
+    "uniform float weight, key, white, pixels;\n" /* key and white as log2, or NaN bits: estimated */
+    "out vec4 value;\n"
+    "float tonemap_quantile(float share, float positive) {\n"
+    "    float wanted = share * positive, seen = 0.0;\n"
+    "    for (int bin = 0; bin < TONEMAP_BINS; bin++) {\n"
+    "        float count = texelFetch(histogram, ivec2(bin % 64, bin / 64), 0).x;\n"
+    "        if (count > 0.0 && seen + count >= wanted)\n"
+    "            return float(bin / 16 - 100) + log2(1.0 + (float(bin % 16) + max(wanted - seen, 0.0) / count) / 16.0);\n"
+    "        seen += count;\n"
+    "    }\n"
+    "    return 0.0;\n"
+    "}\n"
+    "void main() {\n"
+    "    ivec4 sum = texelFetch(sums, ivec2(0), 0);\n"
+    "    vec4 first = texelFetch(old, ivec2(0), 0), second = texelFetch(old, ivec2(1, 0), 0);\n"
+    "    if (sum.z > 0) {\n"
+    "        int whole = sum.x / sum.z;\n"
+    "        float positive = float(sum.z), average = float(whole) + (float(sum.x - whole * sum.z) + float(sum.y) / 65536.0) / positive;\n"
+    "        vec4 now = vec4(average, key, white, 1.0), range = vec4(0.0);\n"
+    "#if TONEMAP_HISTOGRAM\n"
+    "        float low = tonemap_quantile(0.01, positive), high = tonemap_quantile(0.99, positive);\n"
+    "        float place = high - low > 0.125 ? clamp((2.0 * average - low - high) / (high - low), -1.0, 1.0) : 0.0;\n"
+    "        if (TONEMAP_HISTOGRAM % 4 / 2 == 1) now.y = log2(0.18) + 2.0 * place;\n"
+    "        if (TONEMAP_HISTOGRAM % 8 / 4 == 1) now.z = max(log2(1.5) + high - low - 5.0, 0.0);\n"
+    "        range.xy = vec2(tonemap_quantile(0.0005, positive), tonemap_quantile(0.9995, positive));\n"
+    "#endif\n"
+    "        float share = first.w > 0.0 ? weight : 1.0;\n"
+    "        first = share < 1.0 ? mix(first, now, share) : now;\n"
+    "        second = share < 1.0 ? mix(second, range, share) : range;\n"
+    "        first.w = 1.0;\n"
+    "    }\n"
+    "    second.z = intBitsToFloat(sum.w) / pixels;\n"
+    "    value = gl_FragCoord.x < 1.0 ? first : second;\n"
+    "}\n";
+
+/* What a pass reads from the state. Ashikhmin's unit is the upper end of its range. */
+static const char tonemap__glsl_frame[] =
+    "uniform sampler2D luminance, state;\n"
+    "float tonemap_key() { vec4 s = texelFetch(state, ivec2(0), 0); return s.w > 0.0 ? exp2(s.y) : 0.18; }\n"
+    "float tonemap_scale() {\n"
+    "#if TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 3\n"
+    "    return exp2(-texelFetch(state, ivec2(1, 0), 0).y);\n"
+    "#else\n"
+    "    return tonemap_key() * exp2(-texelFetch(state, ivec2(0), 0).x);\n"
+    "#endif\n"
+    "}\n";
+
+static const char tonemap__glsl_quantize[] =
+    "out uint value;\n"
+    "void main() {\n"
+    "    float v = min(texelFetch(luminance, ivec2(gl_FragCoord.xy), 0).x * tonemap_scale(), TONEMAP_CAP);\n"
+    "    value = uint(v * TONEMAP_STEPS + 0.5);\n"
+    "}\n";
+
+/* La. Soft scales and Ashikhmin's search are here, the plain search in the library. */
+static const char tonemap__glsl_search[] =
+    "uniform highp usampler2D table;\n"
+    "float tonemap_box(ivec2 p, int reach) { return sat_mean(table, 1.0 / TONEMAP_STEPS, p - reach, p + reach + 1); }\n"
+    "#if TONEMAP_OPERATOR == 2\n"
+    "float tonemap_find(ivec2 p, float own, float key) {\n"
+    "    const int reach[20] = int[20](0, 1, 2, 3, 4, 5, 6, 6, 7, 8, 9, 10, 11, 12, 12, 13, 14, 15, 16, 17);\n"
+    "    float g = min(own, TONEMAP_CAP);\n"
+    "    for (int s = 0; s < 9; s++) {\n"
+    "        if (!(abs(g - tonemap_box(p, reach[2 * s + 1])) < 0.5 * g)) break;\n"
+    "        g = tonemap_box(p, reach[s + 1]);\n"
+    "    }\n"
+    "    return g * TONEMAP_STEPS < 1.0 ? own : g;\n"
+    "}\n"
+    "#elif TONEMAP_SOFT\n"
+    "float tonemap_find(ivec2 p, float own, float key) {\n"
+    "    const int reach[8] = int[8](0, 1, 2, 3, 5, 8, 13, 20);\n"
+    "    float c = min(own, 256.0), taken = c, weight = 1.0;\n"
+    "    for (int k = 1; k < TONEMAP_SCALES; k++) {\n"
+    "        float side = float(2 * reach[k - 1] + 1), v = tonemap_box(p, reach[k]);\n"
+    "        float limit = TONEMAP_EPSILON * c + TONEMAP_PHI_TERM * key / (side * side);\n"
+    "        weight *= clamp((1.0 + TONEMAP_SOFTNESS - abs(c - v) / limit) / (2.0 * TONEMAP_SOFTNESS), 0.0, 1.0);\n"
+    "        if (!(weight > 0.0)) break;\n"
+    "        taken += weight * (v - c);\n"
+    "        c = v;\n"
+    "    }\n"
+    "    return taken;\n"
+    "}\n"
+    "#else\n"
+    "float tonemap_find(ivec2 p, float own, float key) { return tonemap_local(table, 1.0 / TONEMAP_STEPS, p, own, key); }\n"
+    "#endif\n"
+    "float tonemap_at(ivec2 p) { return texelFetch(luminance, clamp(p, ivec2(0), textureSize(luminance, 0) - 1), 0).x; }\n"
+    "bool tonemap_is_edge(ivec2 p, float scale) {\n"
+    "    float a = tonemap_at(p + ivec2(-1, -1)), b = tonemap_at(p + ivec2(0, -1)), c = tonemap_at(p + ivec2(1, -1));\n"
+    "    float d = tonemap_at(p + ivec2(-1, 0)), e = tonemap_at(p + ivec2(1, 0));\n"
+    "    float f = tonemap_at(p + ivec2(-1, 1)), g = tonemap_at(p + ivec2(0, 1)), h = tonemap_at(p + ivec2(1, 1));\n"
+    "    vec2 gradient = vec2((c + 2.0 * e + h) - (a + 2.0 * d + f), (f + 2.0 * g + h) - (a + 2.0 * b + c)) * scale;\n"
+    "    return dot(gradient, gradient) > TONEMAP_SELECTIVE * TONEMAP_SELECTIVE;\n"
+    "}\n";
+
+/* Local luminance, mesopic vision, display luminance and colour in one pass. */
+static const char tonemap__glsl_map[] =
+    "uniform sampler2D hdr;\n"
+    "uniform float cd_per_unit, lux_per_cd;\n"
+    "out vec4 value;\n"
+    "float tonemap_capacity(float cd) {\n"
+    "    float ln = log(max(cd, 7.8886e-31));\n"
+    "    if (cd < 0.0034) return cd / 0.0014;\n"
+    "    if (cd < 1.0) return 16.5431894 + ln / 0.4027;\n"
+    "    return cd < 7.2444 ? 16.5431894 + (cd - 1.0) / 0.4027 : ln / 0.0556 - 3.56579561;\n"
+    "}\n"
+    "void main() {\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+    "    vec3 rgb = texelFetch(hdr, p, 0).rgb;\n"
+    "    vec4 first = texelFetch(state, ivec2(0), 0), second = texelFetch(state, ivec2(1, 0), 0);\n"
+    "    float y = texelFetch(luminance, p, 0).x, scale = tonemap_scale(), key = tonemap_key(), own = y * scale, la = own;\n"
+    "    float cd = cd_per_unit > 0.0 ? cd_per_unit : 10.0 * exp2(-first.x);\n"
+    "    if (!(y > 0.0)) {\n"
+    "        value = vec4(0.0, 0.0, 0.0, 1.0);\n"
+    "        return;\n"
+    "    }\n"
+    "#if TONEMAP_OPERATOR == 0 || TONEMAP_OPERATOR == 2\n"
+    "    if (TONEMAP_SELECTIVE <= 0.0 || tonemap_is_edge(p, scale)) la = tonemap_find(p, own, key);\n"
+    "#endif\n"
+    "#if TONEMAP_MESOPIC == 1\n"
+    "    rgb = tonemap_mesopic(rgb, y, tonemap_rho(second.z * cd * lux_per_cd));\n"
+    "#elif TONEMAP_MESOPIC == 2\n"
+    "    rgb = tonemap_mesopic(rgb, y, tonemap_rho(la / scale * cd * lux_per_cd));\n"
+    "#endif\n"
+    "#if TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 3\n"
+    "    float unit = cd / scale, low = tonemap_capacity(cd * exp2(second.x)), display = key;\n"
+    "    if (second.y - second.x > 0.125) display = (tonemap_capacity(la * unit) - low) / (tonemap_capacity(unit) - low);\n"
+    "    rgb *= max(display, 0.0) * scale / max(la, 7.8886e-31);\n"
+    "#elif TONEMAP_OPERATOR == 4\n"
+    "    rgb *= scale * (TONEMAP_BURN == 1 ? exp2(-first.z) : 1.0);\n"
+    "#else\n"
+    "    float burn = TONEMAP_BURN == 1 ? exp2(-2.0 * first.z) : 0.0;\n"
+    "    rgb *= scale * (1.0 + min(own, 1.1529215e18) * burn) / (1.0 + la);\n"
+    "#endif\n"
+    "    value = vec4(tonemap_srgb(rgb), 1.0);\n"
+    "}\n";
+
+enum { TONEMAP__LEVELS = 14, TONEMAP__BIN_ROWS = (TONEMAP__BINS + 63) / 64, TONEMAP__GL_UNITS = 4 };
+
+struct tonemap_gl {
+    sat__gl gl;
+    tonemap_options options;
+    sat_allocator allocator;
+    sat_gl *sat;                /* NULL for the global operators */
+    int width, height, levels, current, histogram; /* histogram: 0, or the estimates it serves, see the state shader */
+    unsigned luminance_program, first_program, reduce_program, scatter_program, state_program, quantize_program, map_program;
+    unsigned luminance, quanta, out, bins, state[2], level[TONEMAP__LEVELS]; /* textures */
+    unsigned luminance_target, quanta_target, out_target, bins_target, state_target[2], level_target[TONEMAP__LEVELS];
+};
+
+TONEMAP_DEF const char *tonemap_gl_message(const tonemap_gl *gl)
+{
+    if (!gl) return "no object";
+    return gl->sat && sat_gl_message(gl->sat)[0] ? sat_gl_message(gl->sat) : gl->gl.message;
+}
+
+TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl) { return gl ? gl->out : 0; }
+
+static inline void tonemap__gl_define_options(tonemap_gl *g)
+{
+    const tonemap_options *o = &g->options;
+    int ashikhmin = tonemap__is_ashikhmin(o);
+    sat__gl *gl = &g->gl;
+    sat__gl_define(gl, "TONEMAP_OPERATOR", (int)o->operation);
+    sat__gl_define(gl, "TONEMAP_MESOPIC", (int)o->mesopic);
+    sat__gl_define(gl, "TONEMAP_SCALES", o->scales);
+    sat__gl_define(gl, "TONEMAP_SOFT", o->soft > 0);
+    sat__gl_define(gl, "TONEMAP_HISTOGRAM", g->histogram);
+    sat__gl_define(gl, "TONEMAP_BINS", TONEMAP__BIN_ROWS * 64);
+    sat__gl_define(gl, "TONEMAP_BURN", !tonemap__is_infinite(o->white));
+    sat__gl_define_float(gl, "TONEMAP_EPSILON", (float)o->epsilon);
+    sat__gl_define_float(gl, "TONEMAP_PHI_TERM", (float)(o->epsilon * exp2(o->phi)));
+    sat__gl_define_float(gl, "TONEMAP_SOFTNESS", (float)o->soft);
+    sat__gl_define_float(gl, "TONEMAP_SELECTIVE", (float)o->selective);
+    sat__gl_define_float(gl, "TONEMAP_CAP", ashikhmin ? 1.0f : TONEMAP__LOCAL_CAP);
+    sat__gl_define_float(gl, "TONEMAP_STEPS", ashikhmin ? TONEMAP__ASHIKHMIN_QUANTUM : TONEMAP__QUANTUM);
+}
+
+static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, const char *name, const char *vertex, const char *frame,
+                                             const char *search, const char *body)
+{
+    const char *library[3], *fragment[4], *points[2];
+    sat__gl_shaders shaders;
+    int n = 0;
+    memset(&shaders, 0, sizeof shaders);
+    library[0] = sat_gl_glsl();
+    library[1] = tonemap_gl_glsl();
+    library[2] = NULL;
+    if (frame) fragment[n++] = frame;
+    if (search) fragment[n++] = search;
+    fragment[n++] = body;
+    fragment[n] = NULL;
+    points[0] = vertex;
+    points[1] = NULL;
+    shaders.name = name;
+    shaders.library = library;
+    shaders.vertex = vertex ? points : NULL;
+    shaders.fragment = fragment;
+    tonemap__gl_define_options(g);
+    return sat__gl_build(&g->gl, program, &shaders);
+}
+
+static inline sat_result tonemap__gl_programs(tonemap_gl *g)
+{
+    sat_result r = tonemap__gl_program(g, &g->luminance_program, "tonemap: luminance", NULL, NULL, NULL, tonemap__glsl_luminance);
+    if (r == SAT_OK) r = tonemap__gl_program(g, &g->reduce_program, "tonemap: reduction", NULL, NULL, NULL, tonemap__glsl_reduce);
+    sat__gl_define(&g->gl, "TONEMAP_FIRST", 1);
+    if (r == SAT_OK) r = tonemap__gl_program(g, &g->first_program, "tonemap: log-average", NULL, NULL, NULL, tonemap__glsl_reduce);
+    if (r == SAT_OK) r = tonemap__gl_program(g, &g->state_program, "tonemap: adaptation", NULL, NULL, NULL, tonemap__glsl_state);
+    if (r == SAT_OK && g->histogram) r = tonemap__gl_program(g, &g->scatter_program, "tonemap: histogram", tonemap__glsl_scatter, NULL, NULL, tonemap__glsl_count);
+    if (r == SAT_OK && g->sat) r = tonemap__gl_program(g, &g->quantize_program, "tonemap: rounding", NULL, tonemap__glsl_frame, NULL, tonemap__glsl_quantize);
+    if (r == SAT_OK) r = tonemap__gl_program(g, &g->map_program, "tonemap: mapping", NULL, tonemap__glsl_frame, g->sat ? tonemap__glsl_search : NULL, tonemap__glsl_map);
+    return r;
+}
+
+static inline sat_result tonemap__gl_target(tonemap_gl *g, unsigned *texture, unsigned *framebuffer, unsigned internal, int width, int height)
+{
+    sat_result r = sat__gl_texture(&g->gl, texture, internal, width, height, NULL);
+    return r == SAT_OK ? sat__gl_framebuffer(&g->gl, framebuffer, texture, 1, 0) : r;
+}
+
+static inline sat_result tonemap__gl_targets(tonemap_gl *g)
+{
+    int i, width = g->width, height = g->height;
+    sat_result r = tonemap__gl_target(g, &g->luminance, &g->luminance_target, SAT__GL_R32F, width, height);
+    if (r == SAT_OK && g->sat) r = tonemap__gl_target(g, &g->quanta, &g->quanta_target, SAT__GL_R32UI, width, height);
+    if (r == SAT_OK) r = tonemap__gl_target(g, &g->out, &g->out_target, SAT__GL_RGBA8, width, height);
+    if (r == SAT_OK && g->histogram) r = tonemap__gl_target(g, &g->bins, &g->bins_target, SAT__GL_R32F, 64, TONEMAP__BIN_ROWS);
+    for (i = 0; i < 2 && r == SAT_OK; i++) {
+        static const float nothing[4] = {0, 0, 0, 0};
+        r = tonemap__gl_target(g, &g->state[i], &g->state_target[i], SAT__GL_RGBA32F, 2, 1);
+        if (r == SAT_OK) g->gl.ClearBufferfv(SAT__GL_COLOR, 0, nothing);
+    }
+    while (r == SAT_OK && (g->levels == 0 || width > 1 || height > 1)) {
+        width = (width + 3) / 4;
+        height = (height + 3) / 4;
+        r = tonemap__gl_target(g, &g->level[g->levels], &g->level_target[g->levels], SAT__GL_RGBA32I, width, height);
+        g->levels++;
+    }
+    return r;
+}
+
+static inline sat_result tonemap__gl_make(tonemap_gl *g, sat_gl_get_proc *get_proc)
+{
+    const tonemap_options *o = &g->options;
+    sat__gl_state state;
+    sat_gl_options table = sat_gl_defaults();
+    sat_result r = sat__gl_open(&g->gl, get_proc);
+    if (r != SAT_OK) return r;
+    if (o->operation == TONEMAP_ASHIKHMIN || (o->operation == TONEMAP_PHOTOGRAPHIC_LOCAL && o->scales > 1)) {
+        table.format = SAT_GL_FIXED32;
+        table.unsigned_input = 1;
+        table.allocator = g->allocator;
+        r = sat_gl_create(&g->sat, get_proc, &table);
+        if (r != SAT_OK) return r;
+    }
+    g->histogram = (tonemap__is_ashikhmin(o) ? 1 : 0) + (o->key > 0 ? 0 : 2) + (o->white > 0 ? 0 : 4);
+    sat__gl_begin(&g->gl, &state, TONEMAP__GL_UNITS);
+    r = tonemap__gl_targets(g);
+    if (r == SAT_OK) r = tonemap__gl_programs(g);
+    sat__gl_end(&g->gl, &state);
+    return r;
+}
+
+TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_proc, int width, int height,
+                                         const tonemap_options *options)
+{
+    tonemap_options o = options ? *options : tonemap_defaults();
+    sat_allocator allocator;
+    tonemap_gl *g;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (!get_proc || width < 1 || height < 1 || width > 1 << 24 || height > 1 << 24 || !tonemap__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
+    g = (tonemap_gl *)sat__alloc(&allocator, sizeof *g);
+    if (!g) return SAT_ERR_MEMORY;
+    memset(g, 0, sizeof *g);
+    g->options = o;
+    g->allocator = allocator;
+    g->width = width;
+    g->height = height;
+    *out = g;
+    return tonemap__gl_make(g, get_proc);
+}
+
+TONEMAP_DEF void tonemap_gl_destroy(tonemap_gl *gl)
+{
+    sat_allocator allocator;
+    sat__gl *t;
+    if (!gl) return;
+    t = &gl->gl;
+    allocator = gl->allocator;
+    sat_gl_destroy(gl->sat);
+    if (t->vertex_array) { /* deleting 0 is fine */
+        const unsigned programs[7] = {gl->luminance_program, gl->first_program, gl->reduce_program, gl->scatter_program,
+                                      gl->state_program, gl->quantize_program, gl->map_program};
+        int i;
+        for (i = 0; i < 7; i++) t->DeleteProgram(programs[i]);
+        t->DeleteFramebuffers(TONEMAP__LEVELS, gl->level_target);
+        t->DeleteFramebuffers(2, gl->state_target);
+        t->DeleteFramebuffers(1, &gl->luminance_target);
+        t->DeleteFramebuffers(1, &gl->quanta_target);
+        t->DeleteFramebuffers(1, &gl->out_target);
+        t->DeleteFramebuffers(1, &gl->bins_target);
+        t->DeleteTextures(TONEMAP__LEVELS, gl->level);
+        t->DeleteTextures(2, gl->state);
+        t->DeleteTextures(1, &gl->luminance);
+        t->DeleteTextures(1, &gl->quanta);
+        t->DeleteTextures(1, &gl->out);
+        t->DeleteTextures(1, &gl->bins);
+        sat__gl_close(t);
+    }
+    sat__release(&allocator, gl, sizeof *gl);
+}
+
+/* ---- the passes of a picture */
+
+static inline void tonemap__gl_measure(tonemap_gl *g, unsigned hdr)
+{
+    sat__gl *gl = &g->gl;
+    int i, width = g->width, height = g->height;
+    sat__gl_pass(gl, g->luminance_program, g->luminance_target, width, height);
+    sat__gl_set_texture(gl, g->luminance_program, "hdr", 0, hdr);
+    sat__gl_draw(gl);
+    for (i = 0; i < g->levels; i++) {
+        unsigned program = i ? g->reduce_program : g->first_program;
+        sat__gl_pass(gl, program, g->level_target[i], (width + 3) / 4, (height + 3) / 4);
+        sat__gl_set_texture(gl, program, "source", 0, i ? g->level[i - 1] : g->luminance);
+        sat__gl_set_int2(gl, program, "size", width, height);
+        sat__gl_draw(gl);
+        width = (width + 3) / 4;
+        height = (height + 3) / 4;
+    }
+}
+
+static inline void tonemap__gl_count(tonemap_gl *g)
+{
+    static const float nothing[4] = {0, 0, 0, 0};
+    sat__gl *gl = &g->gl;
+    sat__gl_pass(gl, g->scatter_program, g->bins_target, 64, TONEMAP__BIN_ROWS);
+    gl->ClearBufferfv(SAT__GL_COLOR, 0, nothing);
+    gl->Enable(SAT__GL_BLEND);
+    gl->BlendEquationSeparate(0x8006u, 0x8006u); /* GL_FUNC_ADD */
+    gl->BlendFuncSeparate(SAT__GL_ONE, SAT__GL_ONE, SAT__GL_ONE, SAT__GL_ONE);
+    sat__gl_set_texture(gl, g->scatter_program, "luminance", 0, g->luminance);
+    sat__gl_set_int(gl, g->scatter_program, "width", g->width);
+    gl->BindVertexArray(gl->vertex_array);
+    gl->DrawArrays(SAT__GL_POINTS, 0, g->width * g->height);
+    gl->Disable(SAT__GL_BLEND);
+}
+
+static inline void tonemap__gl_adapt(tonemap_gl *g, double dt_seconds)
+{
+    sat__gl *gl = &g->gl;
+    const tonemap_options *o = &g->options;
+    double weight = o->adapt_seconds > 0 ? -expm1(-dt_seconds / o->adapt_seconds) : 1;
+    unsigned program = g->state_program;
+    g->current = !g->current;
+    sat__gl_pass(gl, program, g->state_target[g->current], 2, 1);
+    sat__gl_set_texture(gl, program, "sums", 0, g->level[g->levels - 1]);
+    sat__gl_set_texture(gl, program, "old", 1, g->state[!g->current]);
+    sat__gl_set_texture(gl, program, "histogram", 2, g->bins);
+    sat__gl_set_float(gl, program, "weight", (float)weight);
+    sat__gl_set_float(gl, program, "key", o->key > 0 ? (float)log2(o->key) : 0);
+    sat__gl_set_float(gl, program, "white", o->white > 0 && !tonemap__is_infinite(o->white) ? (float)log2(o->white) : 0);
+    sat__gl_set_float(gl, program, "pixels", (float)((double)g->width * g->height));
+    sat__gl_draw(gl);
+}
+
+static inline sat_result tonemap__gl_map(tonemap_gl *g, unsigned ldr, unsigned hdr)
+{
+    sat__gl *gl = &g->gl;
+    unsigned program = g->map_program;
+    sat_result result = SAT_OK;
+    if (g->sat) {
+        sat__gl_pass(gl, g->quantize_program, g->quanta_target, g->width, g->height);
+        sat__gl_set_texture(gl, g->quantize_program, "luminance", 0, g->luminance);
+        sat__gl_set_texture(gl, g->quantize_program, "state", 1, g->state[g->current]);
+        sat__gl_draw(gl);
+        result = sat_gl_build(g->sat, 0, g->quanta, g->width, g->height);
+    }
+    if (result == SAT_OK && ldr) result = sat__gl_attach(gl, gl->framebuffer, &ldr, 1, 0);
+    if (result != SAT_OK) return result;
+    sat__gl_pass(gl, program, ldr ? gl->framebuffer : g->out_target, g->width, g->height);
+    sat__gl_set_texture(gl, program, "hdr", 0, hdr);
+    sat__gl_set_texture(gl, program, "luminance", 1, g->luminance);
+    sat__gl_set_texture(gl, program, "state", 2, g->state[g->current]);
+    if (g->sat) sat__gl_set_texture(gl, program, "table", 3, sat_gl_table(g->sat));
+    sat__gl_set_float(gl, program, "cd_per_unit", (float)g->options.cd_per_unit);
+    sat__gl_set_float(gl, program, "lux_per_cd", (float)g->options.lux_per_cd);
+    sat__gl_draw(gl);
+    if (ldr) gl->FramebufferTexture2D(SAT__GL_FRAMEBUFFER, SAT__GL_COLOR_ATTACHMENT0, SAT__GL_TEXTURE_2D, 0, 0);
+    return SAT_OK;
+}
+
+TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned hdr, double dt_seconds)
+{
+    sat__gl_state state;
+    sat_result result;
+    if (!gl || !gl->map_program || !hdr) return SAT_ERR_ARGUMENT;
+    if (!tonemap__in_range(dt_seconds, 0, 1e300) && !tonemap__is_infinite(dt_seconds)) return SAT_ERR_ARGUMENT;
+    sat__gl_begin(&gl->gl, &state, TONEMAP__GL_UNITS);
+    tonemap__gl_measure(gl, hdr);
+    if (gl->histogram) tonemap__gl_count(gl);
+    tonemap__gl_adapt(gl, dt_seconds);
+    result = tonemap__gl_map(gl, ldr, hdr);
+    sat__gl_end(&gl->gl, &state);
+    return result;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TONEMAP_GL */

@@ -1,0 +1,315 @@
+/* tonemap.h on OpenGL against the CPU. */
+
+#include "support.h"
+#include "metrics.h"
+#include "gl_context.h"
+
+typedef struct screen { gl_context context; sat__gl gl; } screen;
+
+static int screen_open(screen *s)
+{
+    if (!gl_context_open(&s->context, 3, 3)) {
+        expect_skip(s->context.message);
+        return 0;
+    }
+    return EXPECT_EQ(sat__gl_open(&s->gl, s->context.get_proc), SAT_OK);
+}
+
+static void screen_close(screen *s)
+{
+    sat__gl_close(&s->gl);
+    gl_context_close(&s->context);
+}
+
+static unsigned screen_texture(screen *s, unsigned internal, int width, int height, const void *pixels)
+{
+    sat__gl_state state;
+    unsigned texture = 0;
+    sat__gl_begin(&s->gl, &state, 1);
+    EXPECT_EQ(sat__gl_texture(&s->gl, &texture, internal, width, height, pixels), SAT_OK);
+    sat__gl_end(&s->gl, &state);
+    return texture;
+}
+
+static void screen_read(screen *s, unsigned char *rgba, unsigned texture, int width, int height)
+{
+    sat__gl_state state;
+    sat__gl_begin(&s->gl, &state, 1);
+    EXPECT_EQ(sat__gl_read(&s->gl, rgba, texture, SAT__GL_RGBA8, width, height), SAT_OK);
+    sat__gl_end(&s->gl, &state);
+}
+
+/* Light and shadow, even and busy places, bad pixels: RGBA. */
+static float *lit_pixels(int width, int height, int bad)
+{
+    float *p = (float *)malloc((size_t)width * (size_t)height * 4 * sizeof(float));
+    uint64_t seed = 3;
+    int x, y, c;
+    for (y = 0; y < height; ++y)
+        for (x = 0; x < width; ++x) {
+            float *q = p + 4 * ((size_t)y * (size_t)width + (size_t)x);
+            double u = (double)x / width, v = (double)y / height, light = 0.05 + 0.4 * u;
+            if (u > 0.6 && v < 0.5) light = 40 + 30 * sin(12 * v);
+            if (u < 0.3 && v > 0.6) light = 0.01 * (1 + (x / 3 + y / 3) % 2 * 2);
+            light *= 1 + 0.1 * (support_uniform(&seed) - 0.5);
+            for (c = 0; c < 3; ++c) q[c] = (float)(light * (1 + 0.6 * sin(5 * u + 2 * c + 3 * v)));
+            q[3] = 0.5f;
+        }
+    if (bad) {
+        p[4 * (5 * width + 7)] = NAN;
+        p[4 * (15 * width + 17)] = p[4 * (15 * width + 17) + 1] = p[4 * (15 * width + 17) + 2] = INFINITY;
+        p[4 * (25 * width + 37) + 1] = -4;
+        p[4 * (26 * width + 37)] = 1e9f;
+    }
+    return p;
+}
+
+/* Shares of codes that differ by more than one, and the largest difference. */
+static void compare(screen *s, const tonemap_options *options, int width, int height, int bad, double most, const char *name)
+{
+    float *pixels = lit_pixels(width, height, bad);
+    sat_image view = sat_image_f32(pixels, width, height, 4);
+    size_t n = (size_t)width * (size_t)height * 4, i;
+    unsigned char *cpu = (unsigned char *)malloc(n), *gpu = (unsigned char *)malloc(n);
+    unsigned hdr = screen_texture(s, SAT__GL_RGBA32F, width, height, pixels), ldr = screen_texture(s, SAT__GL_RGBA8, width, height, NULL);
+    tonemap *map = NULL;
+    tonemap_gl *gl = NULL;
+    size_t over = 0, alpha = 0, any = 0;
+    int largest = 0;
+    EXPECT_EQ(tonemap_create(&map, width, height, options), SAT_OK);
+    EXPECT_EQ(tonemap_apply_u8(map, cpu, (ptrdiff_t)width * 4, &view, 0, NULL), SAT_OK);
+    if (!EXPECT_EQ(tonemap_gl_create(&gl, s->context.get_proc, width, height, options), SAT_OK)) puts(tonemap_gl_message(gl));
+    EXPECT_EQ(tonemap_gl_apply(gl, ldr, hdr, 0), SAT_OK);
+    screen_read(s, gpu, ldr, width, height);
+    for (i = 0; i < n; ++i) {
+        int d = abs((int)cpu[i] - (int)gpu[i]);
+        if (i % 4 == 3) {
+            alpha += gpu[i] != 255;
+            continue;
+        }
+        over += d > 1;
+        any += d > 0;
+        if (d > largest) largest = d;
+    }
+    if (name) {
+        printf("report GL against CPU, %-32s %.3f %% of codes differ, %.4f %% by more than 1, largest %d\n", name,
+               100 * (double)any / (double)(n / 4 * 3), 100 * (double)over / (double)(n / 4 * 3), largest);
+    }
+    EXPECT((double)over <= most * (double)n);
+    EXPECT_EQ(alpha, 0);
+    EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, 0), SAT_OK); /* into its own texture: the same */
+    screen_read(s, cpu, tonemap_gl_texture(gl), width, height);
+    EXPECT(memcmp(cpu, gpu, n) == 0);
+    s->gl.DeleteTextures(1, &hdr);
+    s->gl.DeleteTextures(1, &ldr);
+    tonemap_destroy(map);
+    tonemap_gl_destroy(gl);
+    free(pixels);
+    free(cpu);
+    free(gpu);
+}
+
+TEST(gl_gives_the_cpus_picture)
+{
+    screen s;
+    tonemap_options o = tonemap_defaults();
+    if (!screen_open(&s)) return;
+    compare(&s, &o, 200, 150, 0, 0.0005, "local");
+    compare(&s, &o, 123, 77, 1, 0.001, "local, bad pixels");
+    o.scales = 5;
+    compare(&s, &o, 100, 90, 0, 0.001, NULL);
+    o = tonemap_defaults(), o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL, o.white = 4;
+    compare(&s, &o, 100, 90, 0, 0, "global with burn-out");
+    o = tonemap_defaults(), o.key = o.white = 0;
+    compare(&s, &o, 100, 90, 0, 0.001, "estimated key and white");
+    o = tonemap_defaults(), o.soft = 0.8;
+    compare(&s, &o, 100, 90, 0, 0, "soft scales");
+    o = tonemap_defaults(), o.selective = 0.1;
+    compare(&s, &o, 100, 90, 0, 0.001, "selective");
+    o = tonemap_defaults(), o.mesopic = TONEMAP_MESOPIC_LOCAL, o.cd_per_unit = 2;
+    compare(&s, &o, 100, 90, 1, 0.001, "mesopic, local");
+    o.mesopic = TONEMAP_MESOPIC_UNIFORM, o.cd_per_unit = 0;
+    compare(&s, &o, 100, 90, 0, 0.001, "mesopic, uniform");
+    o = tonemap_defaults(), o.operation = TONEMAP_ASHIKHMIN;
+    compare(&s, &o, 160, 120, 0, 0.005, "Ashikhmin");
+    o.operation = TONEMAP_ASHIKHMIN_GLOBAL;
+    compare(&s, &o, 100, 90, 0, 0.001, "Ashikhmin global");
+    o = tonemap_defaults(), o.operation = TONEMAP_LINEAR, o.white = 2;
+    compare(&s, &o, 100, 90, 0, 0, "linear");
+    screen_close(&s);
+}
+
+TEST(gl_takes_thin_pictures)
+{
+    int sizes[][2] = {{64, 40}, {40, 27}, {38, 130}, {257, 31}}, i;
+    screen s;
+    if (!screen_open(&s)) return;
+    for (i = 0; i < 4; ++i) compare(&s, NULL, sizes[i][0], sizes[i][1], 0, 0.001, NULL);
+    screen_close(&s);
+}
+
+/* The rounded luminances and their sums are the CPU's integers. */
+TEST(gl_sums_are_the_cpus_integers)
+{
+    enum { W = 90, H = 70 };
+    screen s;
+    float *pixels = lit_pixels(W, H, 0);
+    sat_image view = sat_image_f32(pixels, W, H, 4);
+    unsigned char *out = (unsigned char *)malloc(W * H * 4);
+    uint32_t *quanta = (uint32_t *)malloc(W * H * 4);
+    int32_t row[W], sums[4];
+    tonemap *map = NULL;
+    tonemap_gl *gl = NULL;
+    sat__gl_state state;
+    unsigned hdr;
+    int x, y, off = 0;
+    int64_t log_sum;
+    if (!screen_open(&s)) { free(pixels); free(out); free(quanta); return; }
+    hdr = screen_texture(&s, SAT__GL_RGBA32F, W, H, pixels);
+    EXPECT_EQ(tonemap_create(&map, W, H, NULL), SAT_OK);
+    EXPECT_EQ(tonemap_apply_u8(map, out, W * 4, &view, 0, NULL), SAT_OK);
+    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, NULL), SAT_OK);
+    EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, 0), SAT_OK);
+    sat__gl_begin(&s.gl, &state, 1);
+    EXPECT_EQ(sat__gl_read(&s.gl, quanta, gl->quanta, SAT__GL_R32UI, W, H), SAT_OK);
+    EXPECT_EQ(sat__gl_read(&s.gl, sums, gl->level[gl->levels - 1], SAT__GL_RGBA32I, 1, 1), SAT_OK);
+    sat__gl_end(&s.gl, &state);
+    log_sum = (int64_t)sums[0] * 65536 + sums[1];
+    EXPECT_NEAR((double)(log_sum - map->worker[0].log_sum) / 65536 / (W * H), 0, 1e-6);
+    EXPECT_EQ(sums[2], W * H);
+    for (y = 0; y < H; ++y) {
+        tonemap__quantize(row, map->luminance + y * map->row, W, &map->frame);
+        for (x = 0; x < W; ++x) off += abs(row[x] - (int32_t)quanta[y * W + x]) > (row[x] >> 20) + 1;
+    }
+    EXPECT_EQ(off, 0);
+    tonemap_destroy(map);
+    tonemap_gl_destroy(gl);
+    s.gl.DeleteTextures(1, &hdr);
+    screen_close(&s);
+    free(pixels);
+    free(out);
+    free(quanta);
+}
+
+TEST(gl_state_comes_back)
+{
+    enum { W = 33, H = 20 };
+    screen s;
+    float *pixels = lit_pixels(W, H, 0);
+    tonemap_options o = tonemap_defaults();
+    sat__gl_state before, after;
+    tonemap_gl *gl = NULL;
+    unsigned hdr, other;
+    if (!screen_open(&s)) { free(pixels); return; }
+    o.key = 0;
+    hdr = screen_texture(&s, SAT__GL_RGBA32F, W, H, pixels);
+    other = screen_texture(&s, SAT__GL_RGBA8, W, H, NULL);
+    s.gl.ActiveTexture(SAT__GL_TEXTURE0 + 2);
+    s.gl.BindTexture(SAT__GL_TEXTURE_2D, other);
+    s.gl.ActiveTexture(SAT__GL_TEXTURE0 + 1);
+    s.gl.BindTexture(SAT__GL_TEXTURE_2D, hdr);
+    s.gl.Enable(SAT__GL_BLEND);
+    s.gl.Enable(SAT__GL_SCISSOR_TEST);
+    s.gl.Enable(SAT__GL_CULL_FACE);
+    s.gl.BlendFuncSeparate(SAT__GL_SRC_ALPHA, SAT__GL_ONE_MINUS_SRC_ALPHA, SAT__GL_ONE, SAT__GL_ZERO);
+    s.gl.Viewport(1, 2, 3, 4);
+    s.gl.ColorMask(1, 0, 1, 0);
+    s.gl.PixelStorei(SAT__GL_UNPACK_ALIGNMENT, 8);
+    s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s.gl.framebuffer);
+    sat__gl_begin(&s.gl, &before, 8);
+    sat__gl_end(&s.gl, &before);
+    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
+    EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, 0), SAT_OK);
+    EXPECT_EQ(tonemap_gl_apply(gl, other, hdr, 1), SAT_OK);
+    EXPECT_EQ(s.gl.GetError(), SAT__GL_NO_ERROR);
+    sat__gl_begin(&s.gl, &after, 8);
+    sat__gl_end(&s.gl, &after);
+    EXPECT(memcmp(&before, &after, sizeof before) == 0);
+    EXPECT_EQ(after.viewport[2], 3);
+    tonemap_gl_destroy(gl);
+    s.gl.DeleteTextures(1, &hdr);
+    s.gl.DeleteTextures(1, &other);
+    screen_close(&s);
+    free(pixels);
+}
+
+/* The brightness of the middle of a picture whose light changes by a factor, over time. */
+TEST(gl_adapts_as_the_cpu_does)
+{
+    enum { W = 24, H = 18 };
+    const double dt[5] = {0, 0.1, 0.3, 0, 2}, light[5] = {1, 100, 100, 0, 0.1};
+    screen s;
+    float *pixels = lit_pixels(W, H, 0), *scaled = (float *)malloc(W * H * 16);
+    unsigned char cpu[W * H * 4], gpu[W * H * 4];
+    sat_image view = sat_image_f32(scaled, W, H, 4);
+    tonemap_options o = tonemap_defaults();
+    tonemap *map = NULL;
+    tonemap_gl *gl = NULL;
+    unsigned hdr;
+    int i, k, worst = 0;
+    o.adapt_seconds = 0.5;
+    if (!screen_open(&s)) { free(pixels); free(scaled); return; }
+    hdr = screen_texture(&s, SAT__GL_RGBA32F, W, H, pixels);
+    EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
+    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
+    for (k = 0; k < 5; ++k) {
+        sat__gl_state state;
+        for (i = 0; i < W * H * 4; ++i) scaled[i] = (float)((double)pixels[i] * light[k]);
+        sat__gl_begin(&s.gl, &state, 1);
+        sat__gl_upload(&s.gl, hdr, SAT__GL_RGBA32F, W, H, scaled);
+        sat__gl_end(&s.gl, &state);
+        EXPECT_EQ(tonemap_apply_u8(map, cpu, W * 4, &view, dt[k], NULL), SAT_OK);
+        EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, dt[k]), SAT_OK);
+        screen_read(&s, gpu, tonemap_gl_texture(gl), W, H);
+        for (i = 0; i < W * H * 4; ++i)
+            if (i % 4 != 3 && abs((int)cpu[i] - (int)gpu[i]) > worst) worst = abs((int)cpu[i] - (int)gpu[i]);
+    }
+    EXPECT(worst <= 1);
+    tonemap_destroy(map);
+    tonemap_gl_destroy(gl);
+    s.gl.DeleteTextures(1, &hdr);
+    screen_close(&s);
+    free(pixels);
+    free(scaled);
+}
+
+static sat_gl_proc no_proc(const char *name)
+{
+    (void)name;
+    return NULL;
+}
+
+TEST(gl_failures_have_a_message)
+{
+    tonemap_gl *gl = NULL;
+    support_memory memory;
+    tonemap_options o = tonemap_defaults();
+    screen s;
+    EXPECT_EQ(tonemap_gl_create(&gl, NULL, 8, 8, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(tonemap_gl_create(&gl, no_proc, 0, 8, NULL), SAT_ERR_ARGUMENT);
+    EXPECT(gl == NULL);
+    EXPECT_EQ(tonemap_gl_create(&gl, no_proc, 8, 8, NULL), SAT_ERR_GL_FUNCTION);
+    EXPECT(strstr(tonemap_gl_message(gl), "gl") != NULL);
+    EXPECT_EQ(tonemap_gl_apply(gl, 0, 1, 0), SAT_ERR_ARGUMENT);
+    tonemap_gl_destroy(gl);
+    tonemap_gl_destroy(NULL);
+    EXPECT(tonemap_gl_message(NULL)[0] != 0);
+    if (!screen_open(&s)) return;
+    o.allocator = support_allocator(&memory);
+    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, 8, 8, &o), SAT_OK);
+    EXPECT_EQ(tonemap_gl_apply(gl, 0, 0, 0), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(tonemap_gl_apply(gl, 0, 1, -1), SAT_ERR_ARGUMENT);
+    tonemap_gl_destroy(gl);
+    EXPECT(support_memory_clean(&memory));
+    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, 1 << 22, 8, &o), SAT_ERR_SIZE);
+    tonemap_gl_destroy(gl);
+    EXPECT(support_memory_clean(&memory));
+    memory.fail_at = memory.calls + 1;
+    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, 8, 8, &o), SAT_ERR_MEMORY);
+    EXPECT(gl == NULL);
+    memory.fail_at = memory.calls + 2;
+    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, 8, 8, &o), SAT_ERR_MEMORY);
+    tonemap_gl_destroy(gl);
+    EXPECT(support_memory_clean(&memory));
+    screen_close(&s);
+}
