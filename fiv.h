@@ -1,0 +1,3219 @@
+/* fiv.h - 0.1.0 - fullsphere irradiance vectors: soft shadows from any environment - SPDX-License-Identifier: MIT-0 OR Unlicense
+
+   Soft shadows of moving, turning meshes under any environment map, at a fixed cost an occluder.
+*/
+
+#if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(FIV_IMPLEMENTATION)
+#define FIV_IMPLEMENTATION
+#endif
+
+#ifndef FIV_H
+#define FIV_H
+
+#define FIV_VERSION_MAJOR 0
+#define FIV_VERSION_MINOR 1
+#define FIV_VERSION_PATCH 0
+#define FIV_VERSION (FIV_VERSION_MAJOR * 10000 + FIV_VERSION_MINOR * 100 + FIV_VERSION_PATCH)
+
+#if defined(FIV_IMPLEMENT) || defined(FIV_IMPL)
+#error "fiv.h: the macro is called FIV_IMPLEMENTATION"
+#endif
+
+#if defined(FIV_GL) && !defined(SAT_GL)
+#define SAT_GL
+#endif
+#include "sat.h"
+#if SAT_VERSION < 100
+#error "fiv.h needs sat.h 0.1.0 or newer"
+#endif
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifndef FIV_DEF
+#ifdef FIV_STATIC
+#define FIV_DEF static inline
+#else
+#define FIV_DEF extern
+#endif
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Environments: the light
+   ------------------------------------------------------------------------------------------------ */
+
+enum {
+    FIV_MAX_LIGHTS = 8,     /* directional lights split off an environment */
+    FIV_MAX_INSTANCES = 256 /* occluders of one fiv_irradiance call */
+};
+
+typedef struct fiv_environment_options {
+    int face;              /* 32; 8..64: texels along an edge of the light's cube and of every mask */
+    float delta_ratio;     /* 400; a patch this many times brighter than the mean, and half a texel wide, becomes a
+                              directional light; 0: none does */
+    int max_lights;        /* 8; 0..FIV_MAX_LIGHTS: the strongest ones are kept, the rest stays in the cube */
+    float max_radiance;    /* 1e10; > 0: larger values, infinity included, count as this much */
+    sat_allocator allocator; /* malloc; used by create and destroy only */
+    sat_threads threads;     /* serial; used by create and update; same bits for any worker count */
+} fiv_environment_options;
+FIV_DEF fiv_environment_options fiv_environment_defaults(void);
+
+typedef struct fiv_environment_stats {
+    size_t nan, negative, clamped; /* channel values that counted as 0, as 0 and as max_radiance */
+    int lights;                    /* directional lights split off */
+    float light_share;             /* their part of all light, 0..1 */
+    size_t bytes;                  /* memory the environment holds */
+} fiv_environment_stats;
+
+typedef struct fiv_environment fiv_environment;
+
+/* From an equirectangular image of 1 (grey), 3 or 4 channels, W/(m2 sr) or any other unit of radiance: x right, y up,
+   the middle looks along -z, row 0 at the top. One allocation. stats may be NULL. */
+FIV_DEF sat_result fiv_environment_create(fiv_environment **out, const sat_image *equirect_rgb,
+                                          const fiv_environment_options *options, fiv_environment_stats *stats);
+/* New light (NULL: keep the image) turned by `rotation` (row-major, world = rotation * image direction; NULL: not
+   turned). No allocation. Occluders must be lit again afterwards. */
+FIV_DEF sat_result fiv_environment_update(fiv_environment *environment, const sat_image *equirect_rgb,
+                                          const float rotation[9]);
+FIV_DEF fiv_environment_stats fiv_environment_get_stats(const fiv_environment *environment);
+FIV_DEF void fiv_environment_destroy(fiv_environment *environment); /* NULL is fine */
+
+/* I_tot (eq 6) of a surface with this normal, without any occluder; W/m2. The normal is normalised; 0 gives 0. */
+FIV_DEF void fiv_environment_irradiance(const fiv_environment *environment, float rgb[3], const float normal[3]);
+/* The vector of the whole environment (eq 10): x, y, z of red, then of green, then of blue. */
+FIV_DEF void fiv_environment_vector(const fiv_environment *environment, float fiv[9]);
+/* The M directional lights that the environment is made of (eq 6): first the split-off ones, then one a cube texel.
+   Fills at most `capacity` directions and powers (3 floats each: unit vector, radiance times solid angle) and
+   returns M. */
+FIV_DEF size_t fiv_environment_lights(const fiv_environment *environment, float *directions, float *powers, size_t capacity);
+
+/* ------------------------------------------------------------------------------------------------
+   Occluders: what casts shadows
+   ------------------------------------------------------------------------------------------------ */
+
+typedef enum fiv_storage {
+    FIV_STORAGE_FLOAT,          /* longitude-latitude samples, 40 bytes each (published: 36) */
+    FIV_STORAGE_HALF_OCTAHEDRAL /* theta / 2 + 1 squared octahedral samples a shell, 20 bytes each */
+} fiv_storage;
+
+/* Called between batches of the precompute with 0..1; anything but 0 cancels it. */
+typedef int fiv_progress_fn(float done, void *user);
+
+typedef struct fiv_occluder_options {
+    int theta, phi, rho;           /* 32, 17, 15; 4..4096 (even), 3..2049, 2..256: azimuths, polar angles with both
+                                      poles, shells at logarithmic distances */
+    float first_shell, last_shell; /* 0.3, 6; bounding radii; 0 < first < last <= 1000 */
+    int face;                      /* 32; 8..64: that of the environments that will light it */
+    fiv_storage storage;           /* FIV_STORAGE_FLOAT */
+    int keep_masks;                /* 1; 0: each fiv_occluder_light rasterises all masks anew; no FIV_MASK, no save */
+    int lazy;                      /* 0; 1 (without keep_masks): only what fiv_occluder_prepare asks for is computed */
+    int max_lights;                /* 8; 0..FIV_MAX_LIGHTS: one byte a sample each */
+    fiv_progress_fn *progress;     /* NULL */
+    void *progress_user;
+    sat_allocator allocator; /* malloc; not used after create */
+    sat_threads threads;     /* serial; same bits for any worker count */
+} fiv_occluder_options;
+FIV_DEF fiv_occluder_options fiv_occluder_defaults(void);
+
+typedef struct fiv_occluder_stats {
+    size_t triangles;              /* in use */
+    size_t skipped_triangles;      /* with a vertex that is not finite, or twice the same one */
+    int closed;                    /* 1: every edge is met once in each direction; half of the triangles are then left out */
+    float centre[3], radius;       /* bounding ball in the mesh's own coordinates */
+    size_t samples, rasterised;    /* positions of the occluder; masks made (shared ones once, stale ones not) */
+    size_t inside;                 /* samples whose receiver lies inside the mesh */
+    size_t spans;                  /* mask words; 2 bytes each */
+    size_t table_bytes, mask_bytes, bytes; /* vectors; masks; everything held */
+} fiv_occluder_stats;
+
+typedef struct fiv_occluder fiv_occluder;
+
+/* Triangles, 3 indices each, counter-clockwise seen from outside or the other way round throughout. Vertices that are
+   shared should share their index: only then is the mesh known to be closed. Makes all masks, which no light
+   enters: this is the slow call. stats may be NULL. */
+FIV_DEF sat_result fiv_occluder_create(fiv_occluder **out, const float *positions, size_t vertex_count,
+                                       const unsigned *indices, size_t triangle_count,
+                                       const fiv_occluder_options *options, fiv_occluder_stats *stats);
+/* Integrates the light over the masks (eq 10); `rotation` of the occluder about its own origin, row-major, NULL: none.
+   No allocation. The environment must stay unchanged and alive until the next fiv_occluder_light. */
+FIV_DEF sat_result fiv_occluder_light(fiv_occluder *occluder, const fiv_environment *environment, const float rotation[9]);
+/* The same mesh in another orientation or light: own vectors, the masks of `masks_of`, which must outlive it. */
+FIV_DEF sat_result fiv_occluder_share(fiv_occluder **out, const fiv_occluder *masks_of);
+FIV_DEF fiv_occluder_stats fiv_occluder_get_stats(const fiv_occluder *occluder);
+FIV_DEF void fiv_occluder_destroy(fiv_occluder *occluder); /* NULL is fine */
+
+#ifndef FIV_NO_MASKS
+/* Bytes that fiv_occluder_save writes; 0 when the occluder has no masks of its own. */
+FIV_DEF size_t fiv_occluder_save_size(const fiv_occluder *occluder);
+/* Masks and geometry, not the light. size is at least fiv_occluder_save_size; the bytes depend on the arguments of
+   create alone. */
+FIV_DEF sat_result fiv_occluder_save(const fiv_occluder *occluder, void *memory, size_t size);
+/* Takes nothing on trust: SAT_ERR_DATA for anything but a complete save of this version. `options` gives storage,
+   max_lights, allocator and threads; the rest comes from the save. Light it before use. */
+FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, size_t size,
+                                     const fiv_occluder_options *options);
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Receivers
+   ------------------------------------------------------------------------------------------------ */
+
+typedef struct fiv_instance {
+    const fiv_occluder *occluder;
+    float position[3]; /* where the mesh's own origin goes, after scale and rotation about it */
+    float scale;       /* >= 0; 0 leaves the instance out */
+} fiv_instance;
+
+typedef enum fiv_accuracy {
+    FIV_NEAREST,   /* the nearest sample; else as FIV_TRILINEAR */
+    FIV_TRILINEAR, /* as published: 8 samples, (d + R) / 2R where the horizon cuts, discs where occluders overlap */
+    FIV_SCALED,    /* rho^2 times the vector is interpolated, without samples inside the mesh; closed-form cap where the horizon cuts */
+    FIV_MASK       /* FIV_SCALED, and the stored masks where the horizon or another occluder cuts */
+} fiv_accuracy;
+
+typedef struct fiv_irradiance_options {
+    fiv_accuracy accuracy; /* FIV_SCALED */
+    int partial;           /* 1; 0: no correction where the horizon cuts an occluder (figure 23, left) */
+    int overlap;           /* 1; 0: no correction where occluders overlap (figure 21, left) */
+    float cutoff;          /* 0.001; 0..1: an occluder that cannot take more than this part of I_tot is left out */
+    sat_threads threads;   /* serial; same bits for any worker count */
+} fiv_irradiance_options;
+FIV_DEF fiv_irradiance_options fiv_irradiance_defaults(void);
+
+/* What a call did; each pair of a receiver and an occluder is counted once in the first four. */
+typedef struct fiv_irradiance_stats {
+    size_t below_horizon, below_cutoff; /* left out */
+    size_t whole, clipped;              /* looked up: entirely above the horizon, cut by it */
+    size_t overlaps;                    /* receivers that see occluders overlap */
+    size_t masks;                       /* masks integrated for the last two */
+    size_t non_finite;                  /* receivers with NaN or infinity: black */
+    size_t missing;                     /* lookups that met stale samples only: no shadow */
+} fiv_irradiance_stats;
+
+/* Irradiance of `count` receivers, 3 floats each, lit by the environment and shadowed by the instances (eq 12): between 0
+   and I_tot, and the same bits for any order of the instances. Points in world coordinates; normals are normalised. The
+   occluders must have been lit by this environment. No allocation. stats may be NULL. */
+FIV_DEF sat_result fiv_irradiance(float *rgb, const float *points, const float *normals, size_t count,
+                                  const fiv_environment *environment, const fiv_instance *instances,
+                                  size_t instance_count, const fiv_irradiance_options *options,
+                                  fiv_irradiance_stats *stats);
+
+#ifndef FIV_NO_SELF
+/* The same for receivers on the surface of the mesh `self` (eq 13), which casts shadows on itself; `others` as above. */
+FIV_DEF sat_result fiv_self_irradiance(float *rgb, const float *points, const float *normals, size_t count,
+                                       const fiv_environment *environment, const fiv_instance *self,
+                                       const fiv_instance *others, size_t other_count,
+                                       const fiv_irradiance_options *options, fiv_irradiance_stats *stats);
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   Deforming occluders (options.lazy)
+   ------------------------------------------------------------------------------------------------ */
+
+/* New vertex positions (as many as at creation, NULL: the same): all samples become stale. No allocation. */
+FIV_DEF sat_result fiv_occluder_invalidate(fiv_occluder *occluder, const float *positions);
+/* Computes the stale samples that these receivers touch through the instances of this occluder. *computed (may be NULL)
+   says how many. Needs a preceding fiv_occluder_light. No allocation. */
+FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *occluder, const fiv_instance *instances, size_t instance_count,
+                                        const float *points, size_t count, size_t *computed);
+
+/* The version the implementation was compiled with: compare with FIV_VERSION. */
+FIV_DEF int fiv_version(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* FIV_H */
+/* ------------------------------------------------------------------------------------------------
+   Stop here if you only want to use the library.
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(FIV_IMPLEMENTATION) && !defined(FIV_IMPLEMENTED)
+#define FIV_IMPLEMENTED
+
+#ifndef SAT_SIBLING
+#define SAT_SIBLING
+#endif
+#if defined(FIV_GL) && !defined(SAT_SIBLING_GL)
+#define SAT_SIBLING_GL
+#endif
+#include "sat.h"
+
+#ifndef FIV_ASSERT
+#define FIV_ASSERT(condition) SAT_ASSERT(condition)
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+FIV_DEF int fiv_version(void) { return FIV_VERSION; }
+
+/* ---- small vectors and matrices */
+
+static inline float fiv__dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static inline void fiv__normalise(float out[3], const float v[3])
+{
+    float largest = fabsf(v[0]) > fabsf(v[1]) ? fabsf(v[0]) : fabsf(v[1]), x[3], length;
+    if (fabsf(v[2]) > largest) largest = fabsf(v[2]);
+    if (!(largest > 0)) {
+        out[0] = out[1] = out[2] = 0;
+        return;
+    }
+    x[0] = v[0] / largest, x[1] = v[1] / largest, x[2] = v[2] / largest;
+    length = sqrtf(fiv__dot(x, x));
+    out[0] = x[0] / length, out[1] = x[1] / length, out[2] = x[2] / length;
+}
+
+/* out = m v, and out = transpose(m) v */
+static inline void fiv__turn(float out[3], const float m[9], const float v[3])
+{
+    float x = v[0], y = v[1], z = v[2];
+    out[0] = m[0] * x + m[1] * y + m[2] * z;
+    out[1] = m[3] * x + m[4] * y + m[5] * z;
+    out[2] = m[6] * x + m[7] * y + m[8] * z;
+}
+
+static inline void fiv__turn_back(float out[3], const float m[9], const float v[3])
+{
+    float x = v[0], y = v[1], z = v[2];
+    out[0] = m[0] * x + m[3] * y + m[6] * z;
+    out[1] = m[1] * x + m[4] * y + m[7] * z;
+    out[2] = m[2] * x + m[5] * y + m[8] * z;
+}
+
+/* out = transpose(a) b */
+static inline void fiv__turn_between(float out[9], const float a[9], const float b[9])
+{
+    int i, j;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) out[3 * i + j] = a[i] * b[j] + a[3 + i] * b[3 + j] + a[6 + i] * b[6 + j];
+}
+
+static const float fiv__identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+/* Copies a rotation; 0 unless its rows are unit and perpendicular to 1e-3, and right-handed. */
+static int fiv__set_rotation(float out[9], const float m[9])
+{
+    int i, j;
+    float det;
+    if (!m) m = fiv__identity;
+    for (i = 0; i < 9; i++)
+        if (!sat__is_finite(m[i])) return 0;
+    for (i = 0; i < 3; i++)
+        for (j = i; j < 3; j++)
+            if (fabsf(fiv__dot(m + 3 * i, m + 3 * j) - (i == j ? 1.0f : 0.0f)) > 1e-3f) return 0;
+    det = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+    if (det < 0) return 0;
+    memcpy(out, m, 9 * sizeof *out);
+    return 1;
+}
+
+/* ---- the cube: face 2k looks along axis k, face 2k + 1 the other way; u and v are the two other axes, in the
+   order that makes u, v, w right-handed on every face. Texel x of row y: direction w + u U + v V with
+   u = (2x + 1) / face - 1. A row is a line of constant v; rows are numbered face * side + y. */
+
+typedef struct fiv__axes {
+    int w, u, v;
+    float sign;
+} fiv__axes;
+
+static inline fiv__axes fiv__face_axes(int face)
+{
+    fiv__axes a;
+    int k = face >> 1, flip = face & 1;
+    a.w = k;
+    a.u = (k + 1 + flip) % 3;
+    a.v = (k + 2 - flip) % 3;
+    a.sign = flip ? -1.0f : 1.0f;
+    return a;
+}
+
+/* The face that a direction meets, and where: u and v in -1..1. The zero vector gives the middle of a face. */
+static inline int fiv__cube_face(const float d[3], float *u, float *v)
+{
+    float ax = fabsf(d[0]), ay = fabsf(d[1]), az = fabsf(d[2]), w;
+    int k = ax >= ay ? (ax >= az ? 0 : 2) : (ay >= az ? 1 : 2), face = 2 * k + (d[k] < 0);
+    fiv__axes a = fiv__face_axes(face);
+    w = fabsf(d[k]);
+    w = w > 0 ? 1 / w : 0;
+    *u = d[a.u] * w;
+    *v = d[a.v] * w;
+    return face;
+}
+
+static inline void fiv__cube_direction(float out[3], int face, float u, float v)
+{
+    fiv__axes a = fiv__face_axes(face);
+    out[a.w] = a.sign;
+    out[a.u] = u;
+    out[a.v] = v;
+}
+
+static inline float fiv__texel_coordinate(int x, int size) { return (float)(2 * x + 1) / (float)size - 1; }
+
+static inline size_t fiv__cube_texel(const float d[3], int size)
+{
+    float u, v;
+    int face = fiv__cube_face(d, &u, &v);
+    int x = sat__clamp_int((int)((u + 1) * 0.5f * (float)size), 0, size - 1);
+    int y = sat__clamp_int((int)((v + 1) * 0.5f * (float)size), 0, size - 1);
+    return (size_t)(face * size + y) * (size_t)size + (size_t)x;
+}
+
+/* Solid angle of the rectangle from (0,0) to (u,v) on a face. */
+static inline double fiv__corner_angle(double u, double v) { return atan2(u * v, sqrt(u * u + v * v + 1)); }
+
+static inline double fiv__texel_angle(int x, int y, int size)
+{
+    double u0 = 2.0 * x / size - 1, u1 = 2.0 * (x + 1) / size - 1, v0 = 2.0 * y / size - 1, v1 = 2.0 * (y + 1) / size - 1;
+    return fiv__corner_angle(u1, v1) - fiv__corner_angle(u0, v1) - fiv__corner_angle(u1, v0) + fiv__corner_angle(u0, v0);
+}
+
+/* ---- environments */
+
+enum {
+    FIV__TERMS = 10,   /* of an integral: x, y, z of r, g, b, and the solid angle */
+    FIV__MAX_FACE = 64,
+    FIV__MAX_ROWS = 6 * FIV__MAX_FACE,
+    FIV__BLOCK = 64    /* columns of the image that are mapped at a time */
+};
+
+typedef struct fiv__light {
+    float direction[3]; /* in the image's frame */
+    float power[3];     /* radiance times solid angle */
+} fiv__light;
+
+/* sums[row * (face + 1) + x]: the integral over texels 0..x-1 of a row, so that a span costs one difference. Doubles: a
+   texel of 1e8 left of a span must cancel. */
+struct fiv_environment {
+    sat_allocator allocator;
+    sat_threads threads;
+    void *block;
+    size_t block_size;
+    int face, patch; /* texels along an edge; of the source cube, 2 * face */
+    float delta_ratio, max_radiance;
+    int max_lights, light_count;
+    fiv__light lights[FIV_MAX_LIGHTS];
+    unsigned stamp;      /* counts updates */
+    float rotation[9];   /* world = rotation * image */
+    float largest[3];    /* radiance of the brightest texel */
+    double vector[9], flux[3];
+    fiv_environment_stats stats;
+    float *source;       /* 4 * 6 patch^2: radiance in the image's frame, without lights; 4th: weight */
+    float *irradiance;   /* 3 * 6 (face + 1)^2: I_tot at the corners of the texels, image's frame, without lights */
+    float *radiance;     /* 3 * 6 face^2: the cube in the world's frame */
+    double *sums;        /* its integrals */
+};
+
+FIV_DEF fiv_environment_options fiv_environment_defaults(void)
+{
+    fiv_environment_options o;
+    memset(&o, 0, sizeof o);
+    o.face = 32;
+    o.delta_ratio = 400;
+    o.max_lights = FIV_MAX_LIGHTS;
+    o.max_radiance = 1e10f;
+    return o;
+}
+
+/* ---- from the image to the source cube: every image texel is cut into `cut` x `cut` points, and a patch of the cube
+   takes the weighted mean of the points that fall into it */
+
+typedef struct fiv__scan {
+    fiv_environment *environment;
+    const sat_image *image;
+    int cut;
+    int x0, count;                  /* a block of columns, in points */
+    float sine[FIV__BLOCK], cosine[FIV__BLOCK];
+} fiv__scan;
+
+static void fiv__scan_columns(fiv__scan *scan, int x0)
+{
+    int i, width = scan->image->width * scan->cut;
+    scan->x0 = x0;
+    scan->count = sat__min_int(FIV__BLOCK, width - x0);
+    for (i = 0; i < scan->count; i++) {
+        double angle = 6.283185307179586 * ((x0 + i + 0.5) / width - 0.5);
+        scan->sine[i] = (float)sin(angle);
+        scan->cosine[i] = (float)cos(angle);
+    }
+}
+
+/* Direction of point i of the block on a row with these sine and cosine of the polar angle. */
+static inline void fiv__scan_direction(float d[3], const fiv__scan *scan, int i, float row_sine, float row_cosine)
+{
+    d[0] = scan->sine[i] * row_sine;
+    d[1] = row_cosine;
+    d[2] = -scan->cosine[i] * row_sine;
+}
+
+static float fiv__sanitise(float v, float limit, fiv_environment_stats *stats)
+{
+    if (v >= 0 && v <= limit) return v;
+    if (sat__is_nan(v)) stats->nan++;
+    else if (v < 0) stats->negative++;
+    else {
+        stats->clamped++;
+        return limit;
+    }
+    return 0;
+}
+
+/* The block's pixels of image row y, three floats each. */
+static void fiv__scan_read(float rgb[3 * FIV__BLOCK], const fiv__scan *scan, int y, fiv_environment_stats *stats)
+{
+    int i, c, n, first = scan->x0 / scan->cut;
+    float channel[FIV__BLOCK];
+    n = (scan->x0 + scan->count - 1) / scan->cut - first + 1;
+    for (c = 0; c < 3; c++) {
+        sat__read_row(channel, scan->image, y, first, first + n, scan->image->channels >= 3 ? c : 0);
+        for (i = 0; i < n; i++) rgb[3 * i + c] = fiv__sanitise(channel[i], scan->environment->max_radiance, stats);
+    }
+}
+
+/* Adds the block's points of one row of points to the source cube. */
+static void fiv__splat(const fiv__scan *scan, const float *rgb, float row_sine, float row_cosine, float weight)
+{
+    fiv_environment *e = scan->environment;
+    int i, first = scan->x0 / scan->cut;
+    for (i = 0; i < scan->count; i++) {
+        const float *p = rgb + 3 * ((scan->x0 + i) / scan->cut - first);
+        float d[3], *cell;
+        fiv__scan_direction(d, scan, i, row_sine, row_cosine);
+        cell = e->source + 4 * fiv__cube_texel(d, e->patch);
+        cell[0] += p[0] * weight;
+        cell[1] += p[1] * weight;
+        cell[2] += p[2] * weight;
+        cell[3] += weight;
+    }
+}
+
+/* Nearest pixel in a direction. */
+static void fiv__fetch(float rgb[3], const fiv_environment *e, const sat_image *image, const float d[3])
+{
+    double length = sqrt((double)d[0] * (double)d[0] + (double)d[1] * (double)d[1] + (double)d[2] * (double)d[2]);
+    double u = atan2((double)d[0], (double)-d[2]) / 6.283185307179586 + 0.5, v = acos((double)d[1] / length) / 3.141592653589793;
+    int c, x = sat__clamp_int((int)(u * image->width), 0, image->width - 1);
+    int y = sat__clamp_int((int)(v * image->height), 0, image->height - 1);
+    fiv_environment_stats ignored;
+    memset(&ignored, 0, sizeof ignored);
+    for (c = 0; c < 3; c++) {
+        sat__read_row(rgb + c, image, y, x, x + 1, image->channels >= 3 ? c : 0);
+        rgb[c] = fiv__sanitise(rgb[c], e->max_radiance, &ignored);
+    }
+}
+
+/* Divides by the weights; patches that no point met take the nearest pixel. */
+static void fiv__finish_source(fiv_environment *e, const sat_image *image)
+{
+    int face, x, y, c;
+    float *cell = e->source;
+    for (face = 0; face < 6; face++)
+        for (y = 0; y < e->patch; y++)
+            for (x = 0; x < e->patch; x++, cell += 4) {
+                if (cell[3] > 0) {
+                    for (c = 0; c < 3; c++) cell[c] /= cell[3];
+                } else {
+                    float d[3];
+                    fiv__cube_direction(d, face, fiv__texel_coordinate(x, e->patch), fiv__texel_coordinate(y, e->patch));
+                    fiv__fetch(cell, e, image, d);
+                }
+                cell[3] = (float)fiv__texel_angle(x, y, e->patch);
+            }
+}
+
+static int fiv__cut(const fiv_environment *e, const sat_image *image)
+{
+    int x = (16 * e->patch + image->width - 1) / image->width, y = (8 * e->patch + image->height - 1) / image->height;
+    return sat__clamp_int(sat__max_int(x, y), 1, 16);
+}
+
+static void fiv__read_image(fiv_environment *e, const sat_image *image)
+{
+    fiv__scan scan;
+    int x, y, height;
+    float rgb[3 * FIV__BLOCK];
+    scan.environment = e;
+    scan.image = image;
+    scan.cut = fiv__cut(e, image);
+    height = image->height * scan.cut;
+    memset(e->source, 0, (size_t)e->patch * (size_t)e->patch * 24 * sizeof *e->source);
+    e->stats.nan = e->stats.negative = e->stats.clamped = 0;
+    for (x = 0; x < image->width * scan.cut; x += FIV__BLOCK) {
+        fiv__scan_columns(&scan, x);
+        for (y = 0; y < height; y++) {
+            double angle = 3.141592653589793 * (y + 0.5) / height;
+            if (y % scan.cut == 0) {
+                fiv_environment_stats *counted = &e->stats, ignored;
+                memset(&ignored, 0, sizeof ignored);
+                fiv__scan_read(rgb, &scan, y / scan.cut, x % scan.cut ? &ignored : counted);
+            }
+            fiv__splat(&scan, rgb, (float)sin(angle), (float)cos(angle), (float)sin(angle));
+        }
+    }
+    fiv__finish_source(e, image);
+}
+
+/* ---- directional lights: patches far above the mean leave the cube, with their exact direction and power */
+
+#ifndef FIV_NO_DELTA
+
+static inline double fiv__patch_light(const float *cell)
+{
+    return ((double)cell[0] + (double)cell[1] + (double)cell[2]) * (double)cell[3];
+}
+
+/* Power and mean direction of what the image holds above `floor` inside one patch. */
+static void fiv__measure_light(double power[3], double direction[3], fiv_environment *e, const sat_image *image,
+                               size_t patch, const float floor_rgb[3])
+{
+    fiv__scan scan;
+    float rgb[3 * FIV__BLOCK], middle[3];
+    int x, y, i, c, size = e->patch, height;
+    fiv_environment_stats ignored;
+    double polar, reach = 3.0 / size, length;
+    memset(&ignored, 0, sizeof ignored);
+    scan.environment = e;
+    scan.image = image;
+    scan.cut = fiv__cut(e, image);
+    height = image->height * scan.cut;
+    fiv__cube_direction(middle, (int)(patch / (size_t)(size * size)), fiv__texel_coordinate((int)(patch % (size_t)size), size),
+                        fiv__texel_coordinate((int)(patch / (size_t)size % (size_t)size), size));
+    length = sqrt((double)fiv__dot(middle, middle));
+    polar = acos((double)middle[1] / length) / 3.141592653589793;
+    for (c = 0; c < 3; c++) power[c] = direction[c] = 0;
+    for (x = 0; x < image->width * scan.cut; x += FIV__BLOCK) {
+        fiv__scan_columns(&scan, x);
+        for (y = sat__max_int(0, (int)((polar - reach) * height)); y < height && y < (polar + reach) * height + 1; y++) {
+            double t = 3.141592653589793 * y / height, step = 3.141592653589793 / height, middle_angle = t + 0.5 * step;
+            double solid = (cos(t) - cos(t + step)) * 6.283185307179586 / (image->width * scan.cut);
+            fiv__scan_read(rgb, &scan, y / scan.cut, &ignored);
+            for (i = 0; i < scan.count; i++) {
+                const float *p = rgb + 3 * ((scan.x0 + i) / scan.cut - scan.x0 / scan.cut);
+                float d[3];
+                double light = 0;
+                fiv__scan_direction(d, &scan, i, (float)sin(middle_angle), (float)cos(middle_angle));
+                if (fiv__cube_texel(d, size) != patch) continue;
+                for (c = 0; c < 3; c++) {
+                    double above = ((double)p[c] - (double)floor_rgb[c]) * solid;
+                    power[c] += above;
+                    light += above;
+                }
+                for (c = 0; c < 3; c++) direction[c] += light * (double)d[c];
+            }
+        }
+    }
+}
+
+/* The brightest patch above the limit; 0 when there is none. */
+static int fiv__brightest_patch(size_t *patch, const fiv_environment *e, double limit)
+{
+    size_t i, n = (size_t)e->patch * (size_t)e->patch * 6;
+    double best = 0;
+    int found = 0;
+    for (i = 0; i < n; i++) {
+        double light = fiv__patch_light(e->source + 4 * i);
+        if (light > best && light > limit * (double)e->source[4 * i + 3]) {
+            best = light;
+            *patch = i;
+            found = 1;
+        }
+    }
+    return found;
+}
+
+/* Adds to a light nearer than one texel of the masks, or starts a new one; 0 when there is no room. */
+static int fiv__add_light(fiv_environment *e, double sums[FIV_MAX_LIGHTS][3], const double power[3], const double direction[3])
+{
+    double length = sqrt(direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
+    double near_cosine = cos(2.0 / e->face);
+    int i, c;
+    for (i = 0; i < e->light_count; i++) {
+        double other = sqrt(sums[i][0] * sums[i][0] + sums[i][1] * sums[i][1] + sums[i][2] * sums[i][2]);
+        double dot = sums[i][0] * direction[0] + sums[i][1] * direction[1] + sums[i][2] * direction[2];
+        if (dot > near_cosine * length * other) break;
+    }
+    if (i == e->max_lights) return 0;
+    if (i == e->light_count) {
+        memset(&e->lights[i], 0, sizeof e->lights[i]);
+        sums[i][0] = sums[i][1] = sums[i][2] = 0;
+        e->light_count++;
+    }
+    for (c = 0; c < 3; c++) {
+        e->lights[i].power[c] = (float)((double)e->lights[i].power[c] + power[c]);
+        sums[i][c] += direction[c];
+    }
+    return 1;
+}
+
+static void fiv__split_lights(fiv_environment *e, const sat_image *image)
+{
+    size_t i, n = (size_t)e->patch * (size_t)e->patch * 6, patch = 0;
+    double total = 0, rest, limit, split = 0, sums[FIV_MAX_LIGHTS][3];
+    float floor_rgb[3];
+    int k, c, tries;
+    e->light_count = 0;
+    for (i = 0; i < n; i++) total += fiv__patch_light(e->source + 4 * i);
+    e->stats.light_share = 0;
+    if (e->delta_ratio > 0 && total > 0) {
+        limit = total / 12.566370614359172 * (double)e->delta_ratio;
+        for (i = 0, rest = 0; i < n; i++) {
+            double light = fiv__patch_light(e->source + 4 * i);
+            if (light <= limit * (double)e->source[4 * i + 3]) rest += light;
+        }
+        rest /= 3 * 12.566370614359172; /* bright patches keep the mean of the others */
+        for (tries = 0; tries < 4 * FIV_MAX_LIGHTS && fiv__brightest_patch(&patch, e, limit); tries++) {
+            double power[3], direction[3];
+            for (c = 0; c < 3; c++) {
+                float *cell = e->source + 4 * patch;
+                floor_rgb[c] = cell[c] < (float)rest ? cell[c] : (float)rest;
+            }
+            fiv__measure_light(power, direction, e, image, patch, floor_rgb);
+            if (!fiv__add_light(e, sums, power, direction)) break;
+            split += power[0] + power[1] + power[2];
+            for (c = 0; c < 3; c++) e->source[4 * patch + (size_t)c] = floor_rgb[c];
+        }
+        e->stats.light_share = (float)(split / total < 1 ? split / total : 1);
+    }
+    for (k = 0; k < e->light_count; k++) {
+        double length = sqrt(sums[k][0] * sums[k][0] + sums[k][1] * sums[k][1] + sums[k][2] * sums[k][2]);
+        for (c = 0; c < 3; c++) e->lights[k].direction[c] = (float)(sums[k][c] / length);
+    }
+    e->stats.lights = e->light_count;
+}
+
+#endif /* FIV_NO_DELTA */
+
+/* ---- from the source cube to the integrals, seen from any frame */
+
+typedef struct fiv__gather {
+    const fiv_environment *environment;
+    float frame[9];  /* image direction = frame * cube direction */
+    double *sums;
+    float *radiance; /* NULL: not wanted */
+} fiv__gather;
+
+/* Mean radiance of a cube texel: 4 x 4 points of the source cube, weighted by solid angle. */
+static void fiv__gather_texel(float rgb[3], const fiv__gather *g, int face, int x, int y)
+{
+    const fiv_environment *e = g->environment;
+    float sum[4] = {0, 0, 0, 0};
+    int i, j, c;
+    for (j = 0; j < 4; j++)
+        for (i = 0; i < 4; i++) {
+            float u = fiv__texel_coordinate(4 * x + i, 4 * e->face), v = fiv__texel_coordinate(4 * y + j, 4 * e->face);
+            float d[3], square = 1 / (1 + u * u + v * v), weight = square * sqrtf(square);
+            const float *cell;
+            fiv__cube_direction(d, face, u, v);
+            fiv__turn(d, g->frame, d);
+            cell = e->source + 4 * fiv__cube_texel(d, e->patch);
+            for (c = 0; c < 3; c++) sum[c] += cell[c] * weight;
+            sum[3] += weight;
+        }
+    for (c = 0; c < 3; c++) rgb[c] = sum[c] / sum[3];
+}
+
+/* One row: the ten integrands of each texel, and their scans. */
+static void fiv__gather_row(const fiv__gather *g, int row)
+{
+    double terms[FIV__TERMS][FIV__MAX_FACE], *out;
+    int x, c, k, size = g->environment->face, face = row / size, y = row % size;
+    for (x = 0; x < size; x++) {
+        float rgb[3], d[3];
+        double angle = fiv__texel_angle(x, y, size);
+        fiv__gather_texel(rgb, g, face, x, y);
+        fiv__cube_direction(d, face, fiv__texel_coordinate(x, size), fiv__texel_coordinate(y, size));
+        fiv__normalise(d, d);
+        for (c = 0; c < 3; c++)
+            for (k = 0; k < 3; k++) terms[3 * c + k][x] = (double)rgb[c] * angle * (double)d[k];
+        terms[9][x] = angle;
+        if (g->radiance) memcpy(g->radiance + 3 * ((size_t)row * (size_t)size + (size_t)x), rgb, sizeof rgb);
+    }
+    out = g->sums + (size_t)row * (size_t)(size + 1) * FIV__TERMS;
+    for (k = 0; k < FIV__TERMS; k++) {
+        sat_scan_f64(terms[k], terms[k], (size_t)size, NULL);
+        out[k] = 0;
+        for (x = 0; x < size; x++) out[(x + 1) * FIV__TERMS + k] = terms[k][x];
+    }
+}
+
+static void fiv__gather_rows(int begin, int end, int worker, void *context)
+{
+    int row;
+    (void)worker;
+    for (row = begin; row < end; row++) fiv__gather_row((const fiv__gather *)context, row);
+}
+
+/* ---- I_tot: a half-space is one span a row, so that the O(n^2) double sum over normals and texels becomes O(n^1.5) */
+
+/* The texels [*begin, *end) of a row whose centre lies above the horizon of N. */
+static inline void fiv__half_space(int *begin, int *end, const float normal[3], int row, int size)
+{
+    fiv__axes a = fiv__face_axes(row / size);
+    float constant = normal[a.w] * a.sign + normal[a.v] * fiv__texel_coordinate(row % size, size), slope = normal[a.u], x;
+    *begin = 0;
+    *end = size;
+    if (slope == 0) {
+        if (!(constant > 0)) *end = 0;
+        return;
+    }
+    x = (1 - constant / slope) * 0.5f * (float)size - 0.5f;
+    x = x < -1 ? -1 : x > (float)size ? (float)size : x;
+    if (slope > 0) *begin = sat__clamp_int((int)(x + 2) - 1, 0, size);
+    else *end = sat__clamp_int(size - (int)((float)size - x), 0, size);
+}
+
+static inline void fiv__add_span(double sum[FIV__TERMS], const double *row_sums, int begin, int end)
+{
+    const double *a = row_sums + begin * FIV__TERMS, *b = row_sums + end * FIV__TERMS;
+    int k;
+    for (k = 0; k < FIV__TERMS; k++) sum[k] += b[k] - a[k];
+}
+
+static void fiv__half_space_integral(double sum[FIV__TERMS], const double *sums, const float normal[3], int size)
+{
+    int row, begin, end;
+    memset(sum, 0, FIV__TERMS * sizeof *sum);
+    for (row = 0; row < 6 * size; row++) {
+        fiv__half_space(&begin, &end, normal, row, size);
+        if (begin < end) fiv__add_span(sum, sums + (size_t)row * (size_t)(size + 1) * FIV__TERMS, begin, end);
+    }
+}
+
+/* I_tot at the corners of one row of texels of faces 0, 2, 4, and of the opposite normals by I(-N) = I(N) - N FIV. */
+static void fiv__irradiance_row(fiv_environment *e, int row)
+{
+    int side = e->face + 1, face = 2 * (row / side), y = row % side, x, c;
+    for (x = 0; x < side; x++) {
+        float corner[3], normal[3], *front, *back;
+        double sum[FIV__TERMS];
+        fiv__cube_direction(corner, face, 2 * (float)x / (float)e->face - 1, 2 * (float)y / (float)e->face - 1);
+        fiv__normalise(normal, corner);
+        fiv__half_space_integral(sum, e->sums, normal, e->face);
+        front = e->irradiance + 3 * ((size_t)(face * side + y) * (size_t)side + (size_t)x);
+        /* -N lies on the opposite face, where u and v change places */
+        back = e->irradiance + 3 * ((size_t)((face + 1) * side + side - 1 - x) * (size_t)side + (size_t)(side - 1 - y));
+        for (c = 0; c < 3; c++) {
+            double all = 0, above = 0;
+            int k;
+            for (k = 0; k < 3; k++) {
+                above += sum[3 * c + k] * (double)normal[k];
+                all += e->vector[3 * c + k] * (double)normal[k];
+            }
+            front[c] = (float)(above > 0 ? above : 0);
+            back[c] = (float)(above - all > 0 ? above - all : 0);
+        }
+    }
+}
+
+static void fiv__irradiance_rows(int begin, int end, int worker, void *context)
+{
+    int row;
+    (void)worker;
+    for (row = begin; row < end; row++) fiv__irradiance_row((fiv_environment *)context, row);
+}
+
+static void fiv__environment_totals(fiv_environment *e)
+{
+    size_t i, n = 6 * (size_t)e->face * (size_t)e->face;
+    int row, c, k;
+    memset(e->vector, 0, sizeof e->vector);
+    e->flux[0] = e->flux[1] = e->flux[2] = 0;
+    e->largest[0] = e->largest[1] = e->largest[2] = 0;
+    for (row = 0; row < 6 * e->face; row++) {
+        const double *end = e->sums + ((size_t)row * (size_t)(e->face + 1) + (size_t)e->face) * FIV__TERMS;
+        for (k = 0; k < 9; k++) e->vector[k] += end[k];
+    }
+    for (i = 0; i < n; i++) {
+        double angle = fiv__texel_angle((int)(i % (size_t)e->face), (int)(i / (size_t)e->face % (size_t)e->face), e->face);
+        for (c = 0; c < 3; c++) {
+            float v = e->radiance[3 * i + (size_t)c];
+            e->flux[c] += (double)v * angle;
+            if (v > e->largest[c]) e->largest[c] = v;
+        }
+    }
+}
+
+static void fiv__environment_gather(fiv_environment *e, const float rotation[9])
+{
+    fiv__gather g;
+    int i, j;
+    g.environment = e;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) g.frame[3 * i + j] = rotation[3 * j + i];
+    g.sums = e->sums;
+    g.radiance = e->radiance;
+    sat__parallel_for(&e->threads, 6 * e->face, fiv__gather_rows, &g);
+    fiv__environment_totals(e);
+}
+
+static void fiv__environment_layout(fiv_environment *e, sat__arena *arena)
+{
+    size_t face = (size_t)e->face, patch = (size_t)e->patch;
+    e->source = (float *)sat__carve(arena, 24 * patch * patch, sizeof(float));
+    e->irradiance = (float *)sat__carve(arena, 18 * (face + 1) * (face + 1), sizeof(float));
+    e->radiance = (float *)sat__carve(arena, 18 * face * face, sizeof(float));
+    e->sums = (double *)sat__carve(arena, 6 * face * (face + 1) * FIV__TERMS, sizeof(double));
+}
+
+static int fiv__environment_options_are_valid(const fiv_environment_options *o)
+{
+    if (o->face < 8 || o->face > FIV__MAX_FACE || o->max_lights < 0 || o->max_lights > FIV_MAX_LIGHTS) return 0;
+    if (!sat__is_finite(o->delta_ratio) || o->delta_ratio < 0) return 0;
+    if (!sat__is_finite(o->max_radiance) || !(o->max_radiance > 0)) return 0;
+    return sat__threads_are_valid(&o->threads);
+}
+
+static int fiv__image_is_valid(const sat_image *image)
+{
+    return sat__image_is_valid(image) && image->channels != 2 && image->width <= 1 << 20 && image->height <= 1 << 20;
+}
+
+FIV_DEF sat_result fiv_environment_create(fiv_environment **out, const sat_image *equirect_rgb,
+                                          const fiv_environment_options *options, fiv_environment_stats *stats)
+{
+    fiv_environment_options o = options ? *options : fiv_environment_defaults();
+    fiv_environment e, *made;
+    sat__arena arena;
+    sat_result result;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (!fiv__image_is_valid(equirect_rgb) || !fiv__environment_options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    memset(&e, 0, sizeof e);
+    if (!sat__resolve_allocator(&e.allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
+    e.threads = o.threads;
+    e.face = o.face;
+    e.patch = 2 * o.face;
+    e.delta_ratio = o.delta_ratio;
+    e.max_lights = o.max_lights;
+    e.max_radiance = o.max_radiance;
+    memset(&arena, 0, sizeof arena);
+    sat__carve(&arena, 1, sizeof e);
+    fiv__environment_layout(&e, &arena);
+    e.block_size = arena.used + 63;
+    e.block = sat__alloc(&e.allocator, e.block_size);
+    if (!e.block) return SAT_ERR_MEMORY;
+    e.stats.bytes = e.block_size;
+    memset(&arena, 0, sizeof arena);
+    arena.base = sat__align64(e.block);
+    made = (fiv_environment *)sat__carve(&arena, 1, sizeof e);
+    fiv__environment_layout(&e, &arena);
+    *made = e;
+    result = fiv_environment_update(made, equirect_rgb, NULL);
+    FIV_ASSERT(result == SAT_OK);
+    *out = made;
+    if (stats) *stats = made->stats;
+    return result;
+}
+
+FIV_DEF sat_result fiv_environment_update(fiv_environment *e, const sat_image *equirect_rgb, const float rotation[9])
+{
+    float turned[9];
+    if (!e || !fiv__set_rotation(turned, rotation)) return SAT_ERR_ARGUMENT;
+    if (equirect_rgb && !fiv__image_is_valid(equirect_rgb)) return SAT_ERR_ARGUMENT;
+    e->stamp++;
+    if (equirect_rgb) {
+        fiv__read_image(e, equirect_rgb);
+#ifndef FIV_NO_DELTA
+        fiv__split_lights(e, equirect_rgb);
+#endif
+        fiv__environment_gather(e, fiv__identity);
+        sat__parallel_for(&e->threads, 3 * (e->face + 1), fiv__irradiance_rows, e);
+    }
+    if (!equirect_rgb || memcmp(turned, fiv__identity, sizeof turned) != 0) fiv__environment_gather(e, turned);
+    memcpy(e->rotation, turned, sizeof turned);
+    return SAT_OK;
+}
+
+FIV_DEF fiv_environment_stats fiv_environment_get_stats(const fiv_environment *e)
+{
+    fiv_environment_stats none;
+    memset(&none, 0, sizeof none);
+    return e ? e->stats : none;
+}
+
+FIV_DEF void fiv_environment_destroy(fiv_environment *e)
+{
+    sat_allocator allocator;
+    if (!e) return;
+    allocator = e->allocator;
+    sat__release(&allocator, e->block, e->block_size);
+}
+
+/* I_tot without the directional lights: bilinear between the corners of the cube's texels. */
+static void fiv__diffuse(float rgb[3], const fiv_environment *e, const float unit_normal[3])
+{
+    float d[3], u, v;
+    int face, x, y, c, side = e->face + 1;
+    const float *p;
+    fiv__turn_back(d, e->rotation, unit_normal);
+    face = fiv__cube_face(d, &u, &v);
+    u = (u + 1) * 0.5f * (float)e->face;
+    v = (v + 1) * 0.5f * (float)e->face;
+    x = sat__clamp_int((int)u, 0, e->face - 1);
+    y = sat__clamp_int((int)v, 0, e->face - 1);
+    u -= (float)x;
+    v -= (float)y;
+    p = e->irradiance + 3 * ((size_t)(face * side + y) * (size_t)side + (size_t)x);
+    for (c = 0; c < 3; c++) {
+        float top = p[c] + (p[c + 3] - p[c]) * u, bottom = p[3 * side + c] + (p[3 * side + c + 3] - p[3 * side + c]) * u;
+        rgb[c] = top + (bottom - top) * v;
+    }
+}
+
+FIV_DEF void fiv_environment_irradiance(const fiv_environment *e, float rgb[3], const float normal[3])
+{
+    float n[3], d[3];
+    int i, c;
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    fiv__normalise(n, normal);
+    if (!e || !(fiv__dot(n, n) > 0.5f)) return;
+    fiv__diffuse(rgb, e, n);
+    fiv__turn_back(d, e->rotation, n);
+    for (i = 0; i < e->light_count; i++) {
+        float cosine = fiv__dot(d, e->lights[i].direction);
+        if (cosine > 0)
+            for (c = 0; c < 3; c++) rgb[c] += e->lights[i].power[c] * cosine;
+    }
+}
+
+FIV_DEF void fiv_environment_vector(const fiv_environment *e, float fiv[9])
+{
+    int i, c, k;
+    for (k = 0; k < 9; k++) fiv[k] = e ? (float)e->vector[k] : 0;
+    for (i = 0; e && i < e->light_count; i++) {
+        float d[3];
+        fiv__turn(d, e->rotation, e->lights[i].direction);
+        for (c = 0; c < 3; c++)
+            for (k = 0; k < 3; k++) fiv[3 * c + k] += e->lights[i].power[c] * d[k];
+    }
+}
+
+FIV_DEF size_t fiv_environment_lights(const fiv_environment *e, float *directions, float *powers, size_t capacity)
+{
+    size_t i, c, texels, split;
+    if (!e) return 0;
+    split = (size_t)e->light_count;
+    texels = 6 * (size_t)e->face * (size_t)e->face;
+    for (i = 0; i < split + texels && i < capacity; i++) {
+        int size = e->face, x, y;
+        size_t t = i - split;
+        if (i < split) {
+            fiv__turn(directions + 3 * i, e->rotation, e->lights[i].direction);
+            memcpy(powers + 3 * i, e->lights[i].power, 3 * sizeof *powers);
+            continue;
+        }
+        x = (int)(t % (size_t)size);
+        y = (int)(t / (size_t)size % (size_t)size);
+        fiv__cube_direction(directions + 3 * i, (int)(t / (size_t)(size * size)), fiv__texel_coordinate(x, size),
+                            fiv__texel_coordinate(y, size));
+        fiv__normalise(directions + 3 * i, directions + 3 * i);
+        for (c = 0; c < 3; c++)
+            powers[3 * i + c] = (float)((double)e->radiance[3 * t + c] * fiv__texel_angle(x, y, size));
+    }
+    return split + texels;
+}
+
+/* ---- meshes: clusters of up to 64 triangles that lie near each other, with their own vertices as three arrays */
+
+enum {
+    FIV__CLUSTER = 64,                    /* triangles */
+    FIV__CLUSTER_VERTICES = 3 * FIV__CLUSTER
+};
+
+typedef struct fiv__cluster {
+    float centre[3], radius;   /* ball around its vertices */
+    float axis[3], cosine;     /* cone around its normals; cosine <= 0: they point everywhere */
+    size_t vertex, triangle;   /* the first of each */
+    int vertices, triangles;   /* vertices is a multiple of 4: the last one repeats */
+} fiv__cluster;
+
+/* Vertices are relative to the bounding ball's centre, in units of its radius. */
+typedef struct fiv__mesh {
+    size_t triangle_count, cluster_count, vertex_count;
+    size_t source_count;       /* vertices of the caller's array */
+    int closed;                /* 1: every edge is met once in each direction */
+    float turn;                /* -1: the triangles are clockwise seen from outside; changes places of u and v */
+    fiv__cluster *clusters;
+    float *x[3];
+    uint32_t *source;          /* index into the caller's positions */
+    unsigned char *corner;     /* 3 a triangle, into the cluster's vertices */
+} fiv__mesh;
+
+/* Radix sort of keys by their bytes [low, high); scratch holds n. Returns whichever of the two arrays is sorted. */
+static uint64_t *fiv__sort(uint64_t *keys, uint64_t *scratch, size_t n, int low, int high)
+{
+    int byte;
+    size_t i;
+    for (byte = low; byte < high; byte++) {
+        size_t count[257];
+        uint64_t *swap = keys;
+        memset(count, 0, sizeof count);
+        for (i = 0; i < n; i++) count[((keys[i] >> (8 * byte)) & 255) + 1]++;
+        for (i = 0; i < 256; i++) count[i + 1] += count[i];
+        for (i = 0; i < n; i++) scratch[count[(keys[i] >> (8 * byte)) & 255]++] = keys[i];
+        keys = scratch;
+        scratch = swap;
+    }
+    return keys;
+}
+
+static int fiv__triangle_is_usable(const float *positions, const unsigned *t)
+{
+    int i, k;
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 3; k++)
+            if (!sat__is_finite(positions[3 * (size_t)t[i] + (size_t)k])) return 0;
+    return t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+}
+
+/* Every edge is met equally often in both directions: rays that enter must leave. keys and scratch: 3 a triangle. */
+static int fiv__is_closed(const uint64_t *triangles, size_t count, const unsigned *indices, uint64_t *keys, uint64_t *scratch)
+{
+    size_t i, n = 0;
+    int k;
+    for (i = 0; i < count; i++)
+        for (k = 0; k < 3; k++) {
+            const unsigned *t = indices + 3 * (size_t)(triangles[i] & 0xffffffffu);
+            uint64_t a = t[k], b = t[(k + 1) % 3];
+            keys[n++] = a < b ? a << 32 | b << 1 : b << 32 | a << 1 | 1;
+        }
+    keys = fiv__sort(keys, scratch, n, 0, 8);
+    for (i = 0; i < n;) {
+        size_t j = i;
+        long balance = 0;
+        for (; j < n && keys[j] >> 1 == keys[i] >> 1; j++) balance += keys[j] & 1 ? -1 : 1;
+        if (balance) return 0;
+        i = j;
+    }
+    return n > 0;
+}
+
+static uint64_t fiv__spread(uint32_t v) /* bit i of 10 goes to bit 3 i */
+{
+    uint64_t x = v & 1023u;
+    x = (x | x << 16) & 0x030000ff;
+    x = (x | x << 8) & 0x0300f00f;
+    x = (x | x << 4) & 0x030c30c3;
+    return (x | x << 2) & 0x09249249;
+}
+
+/* Fills order[] with the usable triangles along a Morton curve, the index in the low half; returns the sorted array. */
+static uint64_t *fiv__order_triangles(uint64_t *order, uint64_t *scratch, size_t *count, const float *positions,
+                                      const unsigned *indices, size_t triangle_count)
+{
+    double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
+    size_t i, n = 0;
+    int k, j;
+    for (i = 0; i < triangle_count; i++) {
+        if (!fiv__triangle_is_usable(positions, indices + 3 * i)) continue;
+        order[n++] = i;
+        for (j = 0; j < 3; j++)
+            for (k = 0; k < 3; k++) {
+                double v = (double)positions[3 * (size_t)indices[3 * i + (size_t)j] + (size_t)k];
+                if (v < low[k]) low[k] = v;
+                if (v > high[k]) high[k] = v;
+            }
+    }
+    for (i = 0; i < n; i++) {
+        const unsigned *t = indices + 3 * (size_t)order[i];
+        uint64_t key = 0;
+        for (k = 0; k < 3; k++) {
+            double mean = 0, range = high[k] - low[k];
+            for (j = 0; j < 3; j++) mean += (double)positions[3 * (size_t)t[j] + (size_t)k] / 3;
+            key |= fiv__spread((uint32_t)(range > 0 ? (mean - low[k]) / range * 1023 : 0)) << k;
+        }
+        order[i] |= key << 32;
+    }
+    *count = n;
+    return fiv__sort(order, scratch, n, 4, 8);
+}
+
+/* Cuts the ordered triangles into clusters, each with its own list of vertices. */
+static void fiv__make_clusters(fiv__mesh *mesh, const uint64_t *order, const unsigned *indices)
+{
+    size_t i, vertex = 0;
+    for (i = 0; i < mesh->triangle_count; i += FIV__CLUSTER) {
+        fiv__cluster *c = &mesh->clusters[i / FIV__CLUSTER];
+        size_t n = mesh->triangle_count - i < FIV__CLUSTER ? mesh->triangle_count - i : FIV__CLUSTER, t;
+        int k, v;
+        c->vertex = vertex;
+        c->triangle = i;
+        c->triangles = (int)n;
+        c->vertices = 0;
+        for (t = 0; t < n; t++)
+            for (k = 0; k < 3; k++) {
+                uint32_t source = indices[3 * (size_t)(order[i + t] & 0xffffffffu) + (size_t)k];
+                for (v = 0; v < c->vertices && mesh->source[vertex + (size_t)v] != source; v++) {}
+                if (v == c->vertices) mesh->source[vertex + (size_t)c->vertices++] = source;
+                mesh->corner[3 * (i + t) + (size_t)k] = (unsigned char)v;
+            }
+        for (; c->vertices & 3; c->vertices++) mesh->source[vertex + (size_t)c->vertices] = mesh->source[vertex];
+        vertex += (size_t)c->vertices;
+    }
+    mesh->vertex_count = vertex;
+}
+
+/* The ball around the vertices in use: the centre walks towards the farthest vertex, by 1/2, 1/3, 1/4 ... of the way
+   (Badoiu and Clarkson 2003); within 1 % of the smallest ball. */
+static void fiv__bounding_ball(double centre[3], double *radius, const fiv__mesh *mesh, const float *positions)
+{
+    size_t i, far = 0;
+    int step, k;
+    double best = 0;
+    centre[0] = centre[1] = centre[2] = *radius = 0;
+    if (mesh->vertex_count == 0) return;
+    for (k = 0; k < 3; k++) centre[k] = (double)positions[3 * (size_t)mesh->source[0] + (size_t)k];
+    for (step = 1; step <= 100; step++) {
+        best = -1;
+        for (i = 0; i < mesh->vertex_count; i++) {
+            const float *p = positions + 3 * (size_t)mesh->source[i];
+            double x = (double)p[0] - centre[0], y = (double)p[1] - centre[1], z = (double)p[2] - centre[2], d = x * x + y * y + z * z;
+            if (d > best) best = d, far = i;
+        }
+        if (step == 100) break;
+        for (k = 0; k < 3; k++) centre[k] += ((double)positions[3 * (size_t)mesh->source[far] + (size_t)k] - centre[k]) / (step + 1);
+    }
+    for (k = 0; k < 3; k++) centre[k] = (double)(float)centre[k];
+    *radius = sqrt(best) * 1.000001;
+}
+
+/* Ball of vertices and cone of normals of a cluster. */
+static void fiv__bound_cluster(fiv__cluster *c, const fiv__mesh *mesh)
+{
+    float low[3] = {2, 2, 2}, high[3] = {-2, -2, -2}, normals[FIV__CLUSTER][3], square = 0;
+    int i, k;
+    for (i = 0; i < c->vertices; i++)
+        for (k = 0; k < 3; k++) {
+            float v = mesh->x[k][c->vertex + (size_t)i];
+            if (v < low[k]) low[k] = v;
+            if (v > high[k]) high[k] = v;
+        }
+    for (k = 0; k < 3; k++) c->centre[k] = 0.5f * (low[k] + high[k]), c->axis[k] = 0;
+    for (i = 0; i < c->vertices; i++) {
+        float d[3];
+        for (k = 0; k < 3; k++) d[k] = mesh->x[k][c->vertex + (size_t)i] - c->centre[k];
+        if (fiv__dot(d, d) > square) square = fiv__dot(d, d);
+    }
+    c->radius = sqrtf(square) * 1.0001f + 1e-6f;
+    for (i = 0; i < c->triangles; i++) {
+        const unsigned char *t = mesh->corner + 3 * (c->triangle + (size_t)i);
+        float a[3], b[3], n[3];
+        for (k = 0; k < 3; k++) {
+            const float *x = mesh->x[k] + c->vertex;
+            a[k] = x[t[1]] - x[t[0]];
+            b[k] = x[t[2]] - x[t[0]];
+        }
+        for (k = 0; k < 3; k++) n[k] = (a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]) * mesh->turn;
+        fiv__normalise(normals[i], n);
+        for (k = 0; k < 3; k++) c->axis[k] += normals[i][k];
+    }
+    fiv__normalise(c->axis, c->axis);
+    c->cosine = 1;
+    for (i = 0; i < c->triangles; i++) {
+        float cosine = fiv__dot(c->axis, normals[i]) - 1e-4f;
+        if (cosine < c->cosine && fiv__dot(normals[i], normals[i]) > 0.5f) c->cosine = cosine;
+    }
+}
+
+/* Takes the caller's positions over: bounding ball, relative vertices, bounds of the clusters. 0: too large for float. */
+static int fiv__place_mesh(fiv__mesh *mesh, float centre[3], float *radius, const float *positions)
+{
+    double middle[3], r, volume = 0;
+    size_t i;
+    int k;
+    fiv__bounding_ball(middle, &r, mesh, positions);
+    for (k = 0; k < 3; k++) centre[k] = (float)middle[k];
+    *radius = (float)r;
+    if (!(r < 1e18) || !sat__is_finite(*radius)) return 0;
+    if (!(r > 0)) mesh->triangle_count = mesh->cluster_count = mesh->vertex_count = 0;
+    for (i = 0; i < mesh->vertex_count; i++)
+        for (k = 0; k < 3; k++)
+            mesh->x[k][i] = (float)(((double)positions[3 * (size_t)mesh->source[i] + (size_t)k] - middle[k]) / r);
+    mesh->turn = 1;
+    for (i = 0; i < mesh->cluster_count; i++) {
+        const fiv__cluster *c = &mesh->clusters[i];
+        int t;
+        for (t = 0; t < c->triangles; t++) {
+            const unsigned char *corner = mesh->corner + 3 * (c->triangle + (size_t)t);
+            double p[3][3];
+            int j;
+            for (j = 0; j < 3; j++)
+                for (k = 0; k < 3; k++) p[j][k] = (double)mesh->x[k][c->vertex + corner[j]];
+            volume += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) + p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+                      p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
+        }
+    }
+    if (volume < 0) mesh->turn = -1;
+    for (i = 0; i < mesh->cluster_count; i++) fiv__bound_cluster(&mesh->clusters[i], mesh);
+    return 1;
+}
+
+static void fiv__mesh_layout(fiv__mesh *mesh, sat__arena *arena)
+{
+    size_t vertices = 3 * mesh->triangle_count + 4 * mesh->cluster_count;
+    int k;
+    mesh->clusters = (fiv__cluster *)sat__carve(arena, mesh->cluster_count, sizeof *mesh->clusters);
+    for (k = 0; k < 3; k++) mesh->x[k] = (float *)sat__carve(arena, vertices, sizeof(float));
+    mesh->source = (uint32_t *)sat__carve(arena, vertices, sizeof(uint32_t));
+    mesh->corner = (unsigned char *)sat__carve(arena, 3 * mesh->triangle_count, 1);
+}
+
+/* ---- masks: which texels a mesh covers, seen from the origin when its centre stands at `offset`. One word a row, a bit a
+   texel, set when the ray through the texel's centre meets a triangle, borders included. The triangle is the cone
+   of its three corners, so that nothing needs to be clipped: on a row it is one interval, and one OR. */
+
+typedef struct fiv__raster {
+    const fiv__mesh *mesh;
+    uint64_t *rows;
+    float offset[3];
+    int size;
+} fiv__raster;
+
+static inline uint64_t fiv__bits(int begin, int end) /* begin < end */
+{
+    return (end - begin >= 64 ? ~(uint64_t)0 : ((uint64_t)1 << (end - begin)) - 1) << begin;
+}
+
+static inline int fiv__first_bit(uint64_t v) /* v != 0 */
+{
+#if defined(__GNUC__) || defined(__clang__)
+    return __builtin_ctzll(v);
+#else
+    int n = 0;
+    for (; !(v & 0xff); v >>= 8) n += 8;
+    for (; !(v & 1); v >>= 1) n++;
+    return n;
+#endif
+}
+
+static inline int fiv__count_bits(uint64_t v)
+{
+    v = v - ((v >> 1) & 0x5555555555555555u);
+    v = (v & 0x3333333333333333u) + ((v >> 2) & 0x3333333333333333u);
+    v = (v + (v >> 4)) & 0x0f0f0f0f0f0f0f0fu;
+    return (int)((v * 0x0101010101010101u) >> 56);
+}
+
+static inline int fiv__floor(float v) { return (int)v - (v < (float)(int)v); }
+static inline int fiv__ceil(float v) { return (int)v + (v > (float)(int)v); }
+
+/* A triangle that may reach behind the eye: its three edge planes, in doubles. */
+static void fiv__raster_cone(const fiv__raster *r, int face, double p[3][3])
+{
+    fiv__axes ax = fiv__face_axes(face);
+    double e[3][3], det;
+    int i, k, y, size = r->size;
+    for (i = 0; i < 3; i++) {
+        const double *a = p[i], *b = p[(i + 1) % 3];
+        for (k = 0; k < 3; k++) e[i][k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+    }
+    det = e[0][0] * p[2][0] + e[0][1] * p[2][1] + e[0][2] * p[2][2];
+    if (r->mesh->closed) det *= (double)r->mesh->turn;
+    if (!(det > 0 || (!r->mesh->closed && det < 0))) return;
+    if (r->mesh->closed) det *= (double)r->mesh->turn;
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 3; k++) e[i][k] = det < 0 ? -e[i][k] : e[i][k];
+    for (y = 0; y < size; y++) {
+        double low = -1, high = 1, v = (2.0 * y + 1) / size - 1;
+        int x0, x1;
+        for (i = 0; i < 3; i++) {
+            double constant = e[i][ax.w] * (double)ax.sign + v * e[i][ax.v], slope = e[i][ax.u];
+            if (slope > 0) low = -constant / slope > low ? -constant / slope : low;
+            else if (slope < 0) high = -constant / slope < high ? -constant / slope : high;
+            else if (constant < 0) high = -2;
+        }
+        if (!(low <= high)) continue;
+        x0 = (int)ceil((low + 1) * 0.5 * size - 0.5);
+        x1 = (int)floor((high + 1) * 0.5 * size - 0.5);
+        if (x0 < 0) x0 = 0;
+        if (x1 > size - 1) x1 = size - 1;
+        if (x0 <= x1) r->rows[face * size + y] |= fiv__bits(x0, x1 + 1);
+    }
+}
+
+/* A triangle in front of the eye, corners in texels: x[i], y[i]. Both triangles at an edge compute the same crossing, lower
+   corner first, so that no crack opens. */
+static void fiv__raster_flat(uint64_t *rows, int size, const float x[3], const float y[3], int y0, int y1)
+{
+    float bottom[3], top[3], start[3], slope[3];
+    int i, row;
+    for (i = 0; i < 3; i++) {
+        int a = i, b = (i + 1) % 3;
+        if (y[a] > y[b] || (y[a] == y[b] && x[a] > x[b])) a = b, b = i;
+        bottom[i] = y[a];
+        top[i] = y[b];
+        start[i] = x[a];
+        slope[i] = y[b] > y[a] ? (x[b] - x[a]) / (y[b] - y[a]) : 0;
+    }
+    for (row = y0; row <= y1; row++) {
+        float low = 1e30f, high = -1e30f, at = (float)row;
+        int x0, x1;
+        for (i = 0; i < 3; i++) {
+            float cross = start[i] + (at - bottom[i]) * slope[i];
+            if (bottom[i] > at || top[i] < at) continue;
+            low = cross < low ? cross : low;
+            high = cross > high ? cross : high;
+        }
+        if (!(low <= high)) continue;
+        x0 = sat__max_int(fiv__ceil(low), 0);
+        x1 = sat__min_int(fiv__floor(high), size - 1);
+        if (x0 <= x1) rows[row] |= fiv__bits(x0, x1 + 1);
+    }
+}
+
+/* Projects a cluster's vertices to texel coordinates of a face; box: least and largest x, then y. */
+static void fiv__project(float *px, float *py, float box[4], const fiv__raster *r, const fiv__cluster *c, int face)
+{
+    fiv__axes ax = fiv__face_axes(face);
+    const float *xu = r->mesh->x[ax.u] + c->vertex, *xv = r->mesh->x[ax.v] + c->vertex, *xw = r->mesh->x[ax.w] + c->vertex;
+    float ou = r->offset[ax.u], ov = r->offset[ax.v], ow = r->offset[ax.w], half = 0.5f * (float)r->size;
+    int i;
+#ifdef SAT__VECTOR
+    sat__f32x4 scale = sat__f32x4_set1(half * ax.sign), shift = sat__f32x4_set1(half - 0.5f);
+    sat__f32x4 low_x = sat__f32x4_set1(1e30f), low_y = low_x, high_x = sat__f32x4_set1(-1e30f), high_y = high_x;
+    float lanes[4][4];
+    for (i = 0; i < c->vertices; i += 4) {
+        sat__f32x4 w = sat__f32x4_add(sat__f32x4_load(xw + i), sat__f32x4_set1(ow)), q = sat__f32x4_div(scale, w);
+        sat__f32x4 x = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_add(sat__f32x4_load(xu + i), sat__f32x4_set1(ou)), q), shift);
+        sat__f32x4 y = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_add(sat__f32x4_load(xv + i), sat__f32x4_set1(ov)), q), shift);
+        sat__f32x4_store(px + i, x);
+        sat__f32x4_store(py + i, y);
+        low_x = sat__f32x4_min(low_x, x), high_x = sat__f32x4_max(high_x, x);
+        low_y = sat__f32x4_min(low_y, y), high_y = sat__f32x4_max(high_y, y);
+    }
+    sat__f32x4_store(lanes[0], low_x), sat__f32x4_store(lanes[1], high_x);
+    sat__f32x4_store(lanes[2], low_y), sat__f32x4_store(lanes[3], high_y);
+    for (i = 0; i < 4; i++) {
+        float *l = lanes[i];
+        int k;
+        box[i] = l[0];
+        for (k = 1; k < 4; k++)
+            if (i & 1 ? l[k] > box[i] : l[k] < box[i]) box[i] = l[k];
+    }
+#else
+    box[0] = box[2] = 1e30f;
+    box[1] = box[3] = -1e30f;
+    for (i = 0; i < c->vertices; i++) {
+        float q = half * ax.sign / (xw[i] + ow);
+        px[i] = (xu[i] + ou) * q + (half - 0.5f);
+        py[i] = (xv[i] + ov) * q + (half - 0.5f);
+        box[0] = px[i] < box[0] ? px[i] : box[0];
+        box[1] = px[i] > box[1] ? px[i] : box[1];
+        box[2] = py[i] < box[2] ? py[i] : box[2];
+        box[3] = py[i] > box[3] ? py[i] : box[3];
+    }
+#endif
+}
+
+/* 1 when all texels of the box are set already; *empty when it holds no texel centre. */
+static inline int fiv__is_covered(const uint64_t *rows, int x0, int x1, int y0, int y1)
+{
+    uint64_t bits = fiv__bits(x0, x1 + 1);
+    int y;
+    for (y = y0; y <= y1; y++)
+        if ((rows[y] & bits) != bits) return 0;
+    return 1;
+}
+
+static inline float fiv__min3(float a, float b, float c) { float m = a < b ? a : b; return m < c ? m : c; }
+static inline float fiv__max3(float a, float b, float c) { float m = a > b ? a : b; return m > c ? m : c; }
+
+/* Leaves out what faces the eye (turn != 0), holds no texel centre, or is covered already. */
+static inline void fiv__raster_triangle(uint64_t *rows, const float x[3], const float y[3], int last, float turn)
+{
+    int x0, x1, y0, y1;
+    if (turn != 0 && !(((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])) * turn > 0)) return;
+    y0 = sat__max_int(fiv__ceil(fiv__min3(y[0], y[1], y[2])), 0);
+    y1 = sat__min_int(fiv__floor(fiv__max3(y[0], y[1], y[2])), last);
+    if (y0 > y1) return;
+    x0 = sat__max_int(fiv__ceil(fiv__min3(x[0], x[1], x[2])), 0);
+    x1 = sat__min_int(fiv__floor(fiv__max3(x[0], x[1], x[2])), last);
+    if (x0 > x1 || fiv__is_covered(rows, x0, x1, y0, y1)) return;
+    fiv__raster_flat(rows, last + 1, x, y, y0, y1);
+}
+
+/* A cluster that reaches behind the eye or far to its side: triangle by triangle. */
+static void fiv__raster_cluster_cones(const fiv__raster *r, const fiv__cluster *c, int face)
+{
+    const fiv__mesh *mesh = r->mesh;
+    fiv__axes ax = fiv__face_axes(face);
+    int t, j, k, last = r->size - 1;
+    double half = 0.5 * r->size;
+    for (t = 0; t < c->triangles; t++) {
+        const unsigned char *corner = mesh->corner + 3 * (c->triangle + (size_t)t);
+        double p[3][3];
+        float x[3], y[3];
+        int near_eye = 0, beside[4] = {1, 1, 1, 1};
+        for (j = 0; j < 3; j++) {
+            double w, u, v, side;
+            for (k = 0; k < 3; k++) p[j][k] = (double)mesh->x[k][c->vertex + corner[j]] + (double)r->offset[k];
+            w = p[j][ax.w] * (double)ax.sign, u = p[j][ax.u], v = p[j][ax.v];
+            side = fabs(u) > fabs(v) ? fabs(u) : fabs(v);
+            near_eye |= !(side <= 4 * w && w > 0);
+            beside[0] &= u > w, beside[1] &= -u > w, beside[2] &= v > w, beside[3] &= -v > w;
+            x[j] = (float)((u / w + 1) * half - 0.5);
+            y[j] = (float)((v / w + 1) * half - 0.5);
+        }
+        if (beside[0] | beside[1] | beside[2] | beside[3]) continue;
+        if (near_eye) fiv__raster_cone(r, face, p);
+        else fiv__raster_triangle(r->rows + (size_t)(face * r->size), x, y, last, mesh->closed ? mesh->turn : 0);
+    }
+}
+
+static void fiv__raster_cluster(const fiv__raster *r, const fiv__cluster *c, int face)
+{
+    const fiv__mesh *mesh = r->mesh;
+    const unsigned char *corner = mesh->corner + 3 * c->triangle;
+    float px[FIV__CLUSTER_VERTICES + 4], py[FIV__CLUSTER_VERTICES + 4], box[4], turn = mesh->closed ? mesh->turn : 0;
+    uint64_t *rows = r->rows + (size_t)(face * r->size);
+    int t, last = r->size - 1, x0, x1, y0, y1;
+    fiv__project(px, py, box, r, c, face);
+    x0 = sat__max_int(fiv__ceil(box[0]), 0), x1 = sat__min_int(fiv__floor(box[1]), last);
+    y0 = sat__max_int(fiv__ceil(box[2]), 0), y1 = sat__min_int(fiv__floor(box[3]), last);
+    if (x0 > x1 || y0 > y1 || fiv__is_covered(rows, x0, x1, y0, y1)) return;
+    for (t = 0; t < c->triangles; t++, corner += 3) {
+        float x[3], y[3];
+        x[0] = px[corner[0]], x[1] = px[corner[1]], x[2] = px[corner[2]];
+        y[0] = py[corner[0]], y[1] = py[corner[1]], y[2] = py[corner[2]];
+        fiv__raster_triangle(rows, x, y, last, turn);
+    }
+}
+
+/* Of a closed mesh only the triangles that are left through are drawn: every ray that meets the mesh leaves it at last, also
+   when it starts inside. A cluster is left out when all of its normals face the eye. */
+static int fiv__cluster_faces_eye(const fiv__cluster *c, const float centre[3])
+{
+    float along = fiv__dot(c->axis, centre), square = fiv__dot(centre, centre) - along * along, sine;
+    if (c->cosine <= 0) return 0;
+    sine = sqrtf(1 - c->cosine * c->cosine);
+    return along * c->cosine + sqrtf(square > 0 ? square : 0) * sine <= -c->radius;
+}
+
+static void fiv__raster_mesh(uint64_t *rows, const fiv__mesh *mesh, const float offset[3], int size)
+{
+    fiv__raster r;
+    size_t i;
+    int face;
+    r.mesh = mesh;
+    r.rows = rows;
+    r.size = size;
+    memcpy(r.offset, offset, sizeof r.offset);
+    memset(rows, 0, (size_t)(6 * size) * sizeof *rows);
+    for (i = 0; i < mesh->cluster_count; i++) {
+        const fiv__cluster *c = &mesh->clusters[i];
+        float centre[3], reach = c->radius * 1.4143f;
+        int k;
+        for (k = 0; k < 3; k++) centre[k] = c->centre[k] + offset[k];
+        if (mesh->closed && fiv__cluster_faces_eye(c, centre)) continue;
+        for (face = 0; face < 6; face++) {
+            fiv__axes ax = fiv__face_axes(face);
+            float w = centre[ax.w] * ax.sign, u = fabsf(centre[ax.u]), v = fabsf(centre[ax.v]), side = u > v ? u : v;
+            if (w - side < -reach) continue;                       /* beside the face's pyramid, or behind it */
+            if (4 * w - side > 4.1232f * c->radius && w > c->radius) fiv__raster_cluster(&r, c, face); /* within four faces */
+            else fiv__raster_cluster_cones(&r, c, face);
+        }
+    }
+}
+
+/* ---- spans: a mask as 16-bit words: first texel (6 bits), length - 1 (6), rows to go down (4). 15 rows: the other bits are
+   the number of the row, and a span follows. */
+
+enum { FIV__MAX_WORDS = FIV__MAX_ROWS * (FIV__MAX_FACE / 2 + 1) };
+
+static size_t fiv__encode(uint16_t *words, const uint64_t *rows, int row_count)
+{
+    size_t n = 0;
+    int row, last = 0;
+    for (row = 0; row < row_count; row++) {
+        uint64_t m = rows[row];
+        if (m && row - last >= 15) {
+            words[n++] = (uint16_t)(0xf000 | row);
+            last = row;
+        }
+        while (m) {
+            int begin = fiv__first_bit(m), end;
+            uint64_t carry = m + ((uint64_t)1 << begin);
+            end = carry ? fiv__first_bit(carry) : 64;
+            words[n++] = (uint16_t)(begin | (end - begin - 1) << 6 | (row - last) << 12);
+            last = row;
+            m = end == 64 ? 0 : m & ~(((uint64_t)1 << end) - 1);
+        }
+    }
+    return n;
+}
+
+static void fiv__decode(uint64_t *rows, const uint16_t *words, size_t count, int row_count)
+{
+    size_t i;
+    int row = 0;
+    memset(rows, 0, (size_t)row_count * sizeof *rows);
+    for (i = 0; i < count; i++) {
+        int word = words[i], begin = word & 63;
+        if (word >> 12 == 15) {
+            row = word & 0xfff;
+            continue;
+        }
+        row += word >> 12;
+        rows[row] |= fiv__bits(begin, begin + (word >> 6 & 63) + 1);
+    }
+}
+
+/* The integral over a mask: one difference a span. */
+static void fiv__integrate(double sum[FIV__TERMS], const double *sums, const uint16_t *words, size_t count, int size)
+{
+    size_t i;
+    const double *row = sums;
+    ptrdiff_t pitch = (ptrdiff_t)(size + 1) * FIV__TERMS;
+    memset(sum, 0, FIV__TERMS * sizeof *sum);
+    for (i = 0; i < count; i++) {
+        int word = words[i], begin = word & 63;
+        if (word >> 12 == 15) {
+            row = sums + (word & 0xfff) * pitch;
+            continue;
+        }
+        row += (word >> 12) * pitch;
+        fiv__add_span(sum, row, begin, begin + (word >> 6 & 63) + 1);
+    }
+}
+
+/* The same for what lies above the horizon of N. */
+static void fiv__integrate_above(double sum[FIV__TERMS], const double *sums, const uint16_t *words, size_t count, int size,
+                                 const float normal[3])
+{
+    size_t i;
+    int row = 0, known = -1, low = 0, high = 0;
+    memset(sum, 0, FIV__TERMS * sizeof *sum);
+    for (i = 0; i < count; i++) {
+        int word = words[i], begin = word & 63, end = begin + (word >> 6 & 63) + 1;
+        if (word >> 12 == 15) {
+            row = word & 0xfff;
+            continue;
+        }
+        row += word >> 12;
+        if (row != known) fiv__half_space(&low, &high, normal, row, size);
+        known = row;
+        begin = sat__max_int(begin, low);
+        end = sat__min_int(end, high);
+        if (begin < end) fiv__add_span(sum, sums + (size_t)row * (size_t)(size + 1) * FIV__TERMS, begin, end);
+    }
+}
+
+/* ---- the positions of the samples: shells of logarithmic radii, on each a grid of directions */
+
+typedef struct fiv__grid {
+    int theta, phi, rho; /* octahedral: theta == phi == the side of the square */
+    int octahedral;
+    float first, last, log_first, per_log; /* shell = (log2 r - log_first) per_log */
+} fiv__grid;
+
+static size_t fiv__grid_samples(const fiv__grid *g) { return (size_t)g->theta * (size_t)g->phi * (size_t)g->rho; }
+
+static float fiv__shell_radius(const fiv__grid *g, int k)
+{
+    return (float)((double)g->first * pow((double)g->last / (double)g->first, (double)k / (g->rho - 1)));
+}
+
+/* Octahedral square (Cigolle et al. 2014): u, v in -1..1; the y axis in the middle, -y at the four corners. */
+static inline void fiv__octahedron_direction(float d[3], float u, float v)
+{
+    float x = u, z = v, y = 1 - fabsf(u) - fabsf(v);
+    if (y < 0) {
+        x = u < 0 ? fabsf(v) - 1 : 1 - fabsf(v);
+        z = v < 0 ? fabsf(u) - 1 : 1 - fabsf(u);
+    }
+    d[0] = x, d[1] = y, d[2] = z;
+    fiv__normalise(d, d);
+}
+
+static inline void fiv__octahedron_square(float *u, float *v, const float d[3])
+{
+    float sum = fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]), x, z;
+    sum = sum > 0 ? 1 / sum : 0;
+    x = d[0] * sum, z = d[2] * sum;
+    *u = d[1] < 0 ? (x < 0 ? fabsf(z) - 1 : 1 - fabsf(z)) : x;
+    *v = d[1] < 0 ? (z < 0 ? fabsf(x) - 1 : 1 - fabsf(x)) : z;
+}
+
+static void fiv__sample_offset(float offset[3], const fiv__grid *g, size_t sample)
+{
+    int i = (int)(sample % (size_t)g->theta), j = (int)(sample / (size_t)g->theta % (size_t)g->phi), k;
+    float radius = fiv__shell_radius(g, (int)(sample / ((size_t)g->theta * (size_t)g->phi)));
+    if (g->octahedral) {
+        fiv__octahedron_direction(offset, 2 * (float)i / (float)(g->theta - 1) - 1, 2 * (float)j / (float)(g->phi - 1) - 1);
+    } else {
+        double azimuth = 6.283185307179586 * i / g->theta, polar = 3.141592653589793 * j / (g->phi - 1);
+        double sine = j == g->phi - 1 ? 0 : sin(polar);
+        offset[0] = (float)(sine * cos(azimuth));
+        offset[1] = (float)cos(polar);
+        offset[2] = (float)(sine * sin(azimuth));
+    }
+    for (k = 0; k < 3; k++) offset[k] *= radius;
+}
+
+/* The first sample at the same position: poles and the folded border of the square are stored more than once. */
+static size_t fiv__first_twin(const fiv__grid *g, size_t sample)
+{
+    int n = g->theta, i = (int)(sample % (size_t)n), j = (int)(sample / (size_t)n % (size_t)g->phi);
+    size_t shell = sample - (size_t)(j * n + i);
+    if (!g->octahedral) return j == 0 || j == g->phi - 1 ? sample - (size_t)i : sample;
+    if ((i == 0 || i == n - 1) && (j == 0 || j == n - 1)) return shell;
+    if (i == 0 || i == n - 1) j = sat__min_int(j, n - 1 - j);
+    else if (j == 0 || j == n - 1) i = sat__min_int(i, n - 1 - i);
+    return shell + (size_t)(j * n + i);
+}
+
+/* log2 to 3e-6, arc tangent to 1e-5 (Abramowitz and Stegun 4.4.49): enough to place a point in a cell. */
+static inline float fiv__log2(float v)
+{
+    uint32_t bits = sat__float_bits(v);
+    float exponent = (float)((int)(bits >> 23) - 127), m = sat__float_from_bits((bits & 0x7fffffu) | 0x3f800000u);
+    float t = (m - 1.41421356f) / (m + 1.41421356f), s = t * t;
+    return exponent + 0.5f + t * (2.88539008f + s * (0.96179669f + s * (0.57707802f + s * 0.4121f)));
+}
+
+static inline float fiv__atan2(float y, float x)
+{
+    float ax = fabsf(x), ay = fabsf(y), big = ax > ay ? ax : ay, small = ax > ay ? ay : ax;
+    float t = big > 0 ? small / big : 0, s = t * t;
+    float a = t * (0.9998660f + s * (-0.3302995f + s * (0.1801410f + s * (-0.0851330f + s * 0.0208351f))));
+    if (ay > ax) a = 1.57079633f - a;
+    if (x < 0) a = 3.14159265f - a;
+    return y < 0 ? -a : a;
+}
+
+/* The eight samples around an offset (in radii, the occluder's frame) and their weights. */
+typedef struct fiv__cell {
+    size_t index[8];
+    float weight[8];
+    float radius;     /* |offset|, but at least that of the first shell */
+    int shell;        /* of index[0..3]; index[4..7] lie on the next */
+} fiv__cell;
+
+static void fiv__locate(fiv__cell *cell, const fiv__grid *g, const float c[3])
+{
+    float r = sqrtf(fiv__dot(c, c)), a, b, f;
+    int i, j, k, q, right, n = g->theta;
+    size_t base;
+    if (!(r > g->first)) r = g->first;
+    cell->radius = r;
+    f = (fiv__log2(r) - g->log_first) * g->per_log;
+    f = f < 0 ? 0 : f > (float)(g->rho - 1) ? (float)(g->rho - 1) : f;
+    if (g->octahedral) {
+        fiv__octahedron_square(&a, &b, c);
+        a = (a + 1) * 0.5f * (float)(n - 1);
+        b = (b + 1) * 0.5f * (float)(n - 1);
+    } else {
+        a = fiv__atan2(c[2], c[0]) * (0.159154943f * (float)n);
+        b = fiv__atan2(sqrtf(c[0] * c[0] + c[2] * c[2]), c[1]) * (0.318309886f * (float)(g->phi - 1));
+        if (a < 0) a += (float)n;
+    }
+    i = sat__clamp_int((int)a, 0, g->octahedral ? n - 2 : n - 1);
+    j = sat__clamp_int((int)b, 0, g->phi - 2);
+    k = sat__min_int((int)f, g->rho - 2);
+    a -= (float)i, b -= (float)j, f -= (float)k;
+    a = a > 1 ? 1 : a, b = b > 1 ? 1 : b;
+    right = i + 1 == n ? -i : 1;
+    base = ((size_t)k * (size_t)g->phi + (size_t)j) * (size_t)n + (size_t)i;
+    for (q = 0; q < 8; q++) {
+        cell->index[q] = base + (q & 4 ? (size_t)n * (size_t)g->phi : 0) + (q & 2 ? (size_t)n : 0);
+        if (q & 1) cell->index[q] = (size_t)((ptrdiff_t)cell->index[q] + right);
+        cell->weight[q] = (q & 1 ? a : 1 - a) * (q & 2 ? b : 1 - b) * (q & 4 ? f : 1 - f);
+    }
+    cell->shell = k;
+}
+
+/* ---- occluders */
+
+enum {
+    FIV__SUPPORT = 33,  /* side of the octahedral table of the support function */
+    FIV__BATCH = 256,   /* masks between two calls of the progress function */
+    FIV__NEAR = 768,    /* texels around a light whose distance is measured */
+    FIV__NEAR_ROWS = 128
+};
+enum { FIV__VALID, FIV__INSIDE, FIV__STALE, FIV__WANTED };
+
+struct fiv_occluder {
+    sat_allocator allocator;
+    sat_threads threads;
+    void *block, *mesh_block, *words_block;
+    size_t block_size, mesh_size, words_size;
+    int share;             /* masks belong to another occluder */
+    fiv__grid grid;
+    int face, keep_masks, lazy, max_lights, half_floats;
+    float centre[3], radius;
+    fiv_occluder_stats stats;
+    const fiv_environment *environment; /* that lit it; NULL: none yet */
+    unsigned stamp;
+    int light_count;
+    float rotation[9], table_scale;     /* stored vector = table_scale rho^2 vector */
+    fiv__mesh mesh;
+    float *table;          /* FIV__TERMS a sample: rho^2 times vector and solid angle, the latter < 0 where not valid */
+    uint16_t *half_table;  /* the same as half floats */
+    signed char *distance; /* max_lights a sample: from the silhouette to the light, + covered; 21 = one mask texel */
+    double *sums;          /* integrals of the environment in the occluder's frame */
+    unsigned char *state;  /* FIV__VALID ... a sample */
+    float *support;        /* largest extent along a direction, in radii */
+    uint32_t *first;       /* sample + 1: where its words begin and end */
+    uint16_t *words;
+};
+
+FIV_DEF fiv_occluder_options fiv_occluder_defaults(void)
+{
+    fiv_occluder_options o;
+    memset(&o, 0, sizeof o);
+    o.theta = 32;
+    o.phi = 17;
+    o.rho = 15;
+    o.first_shell = 0.3f;
+    o.last_shell = 6;
+    o.face = 32;
+    o.keep_masks = 1;
+    o.max_lights = FIV_MAX_LIGHTS;
+    return o;
+}
+
+static int fiv__occluder_options_are_valid(const fiv_occluder_options *o)
+{
+    if (o->theta < 4 || o->theta > 4096 || o->theta & 1 || o->phi < 3 || o->phi > 2049 || o->rho < 2 || o->rho > 256) return 0;
+    if (!(o->first_shell > 1e-6f) || !(o->last_shell <= 1000) || !(o->first_shell < o->last_shell)) return 0;
+    if (o->face < 8 || o->face > FIV__MAX_FACE || o->max_lights < 0 || o->max_lights > FIV_MAX_LIGHTS) return 0;
+    if (o->storage != FIV_STORAGE_FLOAT && o->storage != FIV_STORAGE_HALF_OCTAHEDRAL) return 0;
+#ifdef FIV_NO_MASKS
+    if (o->keep_masks) return 0;
+#endif
+    if (o->keep_masks && o->lazy) return 0;
+    return sat__threads_are_valid(&o->threads);
+}
+
+static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
+{
+    fiv__grid *g = &o->grid;
+    g->octahedral = options->storage == FIV_STORAGE_HALF_OCTAHEDRAL;
+    g->theta = g->octahedral ? options->theta / 2 + 1 : options->theta;
+    g->phi = g->octahedral ? g->theta : options->phi;
+    g->rho = options->rho;
+    g->first = options->first_shell;
+    g->last = options->last_shell;
+    g->log_first = (float)(log((double)g->first) / log(2.0));
+    g->per_log = (float)((g->rho - 1) * log(2.0) / log((double)g->last / (double)g->first));
+    o->half_floats = g->octahedral;
+    o->face = options->face;
+    o->keep_masks = options->keep_masks != 0;
+    o->lazy = options->lazy != 0;
+    o->max_lights = options->max_lights;
+}
+
+/* Arrays of its own; those of a share's masks are set by the caller. */
+static void fiv__occluder_layout(fiv_occluder *o, sat__arena *arena)
+{
+    size_t n = fiv__grid_samples(&o->grid), face = (size_t)o->face;
+    o->sums = (double *)sat__carve(arena, 6 * face * (face + 1) * FIV__TERMS, sizeof(double));
+    o->table = (float *)sat__carve(arena, o->half_floats ? 0 : n, FIV__TERMS * sizeof(float));
+    o->half_table = (uint16_t *)sat__carve(arena, o->half_floats ? n : 0, FIV__TERMS * sizeof(uint16_t));
+    o->distance = (signed char *)sat__carve(arena, n, (size_t)o->max_lights);
+    if (o->share) return;
+    o->state = (unsigned char *)sat__carve(arena, n, 1);
+    o->support = (float *)sat__carve(arena, FIV__SUPPORT * FIV__SUPPORT, sizeof(float));
+    o->first = (uint32_t *)sat__carve(arena, o->keep_masks ? n + 1 : 0, sizeof(uint32_t));
+}
+
+/* The occluder in one block, from a struct whose options are set. */
+static sat_result fiv__allocate_occluder(fiv_occluder **out, const fiv_occluder *from)
+{
+    fiv_occluder o = *from, *made;
+    sat__arena arena;
+    memset(&arena, 0, sizeof arena);
+    sat__carve(&arena, 1, sizeof o);
+    fiv__occluder_layout(&o, &arena);
+    if (arena.overflow || fiv__grid_samples(&o.grid) > 0x7fffffff) return SAT_ERR_SIZE;
+    o.block_size = arena.used + 63;
+    o.block = sat__alloc(&o.allocator, o.block_size);
+    if (!o.block) return SAT_ERR_MEMORY;
+    memset(&arena, 0, sizeof arena);
+    arena.base = sat__align64(o.block);
+    made = (fiv_occluder *)sat__carve(&arena, 1, sizeof o);
+    fiv__occluder_layout(&o, &arena);
+    o.stats.samples = fiv__grid_samples(&o.grid);
+    o.stats.table_bytes = o.stats.samples * (FIV__TERMS * (o.half_floats ? 2u : 4u) + (size_t)o.max_lights);
+    *made = o;
+    *out = made;
+    return SAT_OK;
+}
+
+FIV_DEF void fiv_occluder_destroy(fiv_occluder *o)
+{
+    fiv_occluder copy;
+    if (!o) return;
+    copy = *o;
+    sat__release(&copy.allocator, copy.mesh_block, copy.mesh_size);
+    if (!copy.share) sat__release(&copy.allocator, copy.words_block, copy.words_size);
+    sat__release(&copy.allocator, copy.block, copy.block_size);
+}
+
+FIV_DEF fiv_occluder_stats fiv_occluder_get_stats(const fiv_occluder *o)
+{
+    fiv_occluder_stats none;
+    memset(&none, 0, sizeof none);
+    return o ? o->stats : none;
+}
+
+static void fiv__count_bytes(fiv_occluder *o)
+{
+    size_t n = o->stats.samples, counts = o->keep_masks && !o->share ? (n + 1) * sizeof(uint32_t) : 0;
+    o->stats.mask_bytes = (o->share ? 0 : o->words_size) + counts;
+    o->stats.bytes = o->block_size + o->mesh_size + (o->share ? 0 : o->words_size);
+}
+
+/* ---- support function: how far the mesh reaches along a direction, so that "cut by the horizon" means the mesh and not its
+   ball. What rests on a floor is then whole. */
+
+static void fiv__support_row(fiv_occluder *o, int j)
+{
+    int i;
+    size_t v;
+    for (i = 0; i < FIV__SUPPORT; i++) {
+        float d[3], best = o->mesh.vertex_count ? -2.0f : 0.0f;
+        fiv__octahedron_direction(d, 2 * (float)i / (FIV__SUPPORT - 1) - 1, 2 * (float)j / (FIV__SUPPORT - 1) - 1);
+        for (v = 0; v < o->mesh.vertex_count; v++) {
+            float reach = o->mesh.x[0][v] * d[0] + o->mesh.x[1][v] * d[1] + o->mesh.x[2][v] * d[2];
+            best = reach > best ? reach : best;
+        }
+        o->support[j * FIV__SUPPORT + i] = best;
+    }
+}
+
+static void fiv__support_rows(int begin, int end, int worker, void *context)
+{
+    (void)worker;
+    for (; begin < end; begin++) fiv__support_row((fiv_occluder *)context, begin);
+}
+
+static float fiv__reach(const fiv_occluder *o, const float d[3])
+{
+    float u, v;
+    int x, y;
+    const float *p;
+    fiv__octahedron_square(&u, &v, d);
+    u = (u + 1) * 0.5f * (FIV__SUPPORT - 1);
+    v = (v + 1) * 0.5f * (FIV__SUPPORT - 1);
+    x = sat__clamp_int((int)u, 0, FIV__SUPPORT - 2);
+    y = sat__clamp_int((int)v, 0, FIV__SUPPORT - 2);
+    u -= (float)x;
+    v -= (float)y;
+    p = o->support + y * FIV__SUPPORT + x;
+    return (p[0] * (1 - u) + p[1] * u) * (1 - v) + (p[FIV__SUPPORT] * (1 - u) + p[FIV__SUPPORT + 1] * u) * v;
+}
+
+/* ---- precompute */
+
+/* A receiver sees nothing but the mesh: of a closed one in every direction, of an open one in four of five. */
+static unsigned char fiv__judge_mask(const uint64_t *rows, int size, int closed)
+{
+    int row, count = 0, inside;
+    for (row = 0; row < 6 * size; row++) count += fiv__count_bits(rows[row]);
+    inside = closed ? count == 6 * size * size : count > 6 * size * size * 4 / 5;
+    return (unsigned char)(inside ? FIV__INSIDE : FIV__VALID);
+}
+
+#ifndef FIV_NO_MASKS
+
+typedef struct fiv__batch {
+    fiv_occluder *occluder;
+    size_t first;
+    uint64_t *rows;
+} fiv__batch;
+
+static void fiv__make_masks(int begin, int end, int worker, void *context)
+{
+    const fiv__batch *b = (const fiv__batch *)context;
+    fiv_occluder *o = b->occluder;
+    (void)worker;
+    for (; begin < end; begin++) {
+        size_t sample = b->first + (size_t)begin;
+        uint64_t *rows = b->rows + (size_t)begin * (size_t)(6 * o->face);
+        float offset[3];
+        if (fiv__first_twin(&o->grid, sample) != sample) continue;
+        fiv__sample_offset(offset, &o->grid, sample);
+        fiv__raster_mesh(rows, &o->mesh, offset, o->face);
+        o->state[sample] = fiv__judge_mask(rows, o->face, o->mesh.closed);
+    }
+}
+
+/* Room for `wanted` more words: doubles, so that a mask is copied a few times at most. */
+static sat_result fiv__grow(fiv_occluder *o, size_t used, size_t wanted)
+{
+    size_t bytes = (used + wanted) * sizeof(uint16_t);
+    void *block;
+    if (used + wanted > 0x7fffffffu) return SAT_ERR_SIZE;
+    if (bytes <= o->words_size) return SAT_OK;
+    bytes = bytes > 2 * o->words_size ? bytes : 2 * o->words_size;
+    block = sat__alloc(&o->allocator, bytes);
+    if (!block) return SAT_ERR_MEMORY;
+    if (used) memcpy(block, o->words_block, used * sizeof(uint16_t));
+    sat__release(&o->allocator, o->words_block, o->words_size);
+    o->words_block = block;
+    o->words_size = bytes;
+    o->words = (uint16_t *)block;
+    return SAT_OK;
+}
+
+/* Appends the masks of a batch, in order. */
+static sat_result fiv__store_masks(const fiv__batch *b, size_t count)
+{
+    fiv_occluder *o = b->occluder;
+    size_t i;
+    for (i = 0; i < count; i++) {
+        size_t sample = b->first + i, twin = fiv__first_twin(&o->grid, sample), used = o->first[sample], n;
+        sat_result result = fiv__grow(o, used, FIV__MAX_WORDS);
+        if (result) return result;
+        if (twin == sample) {
+            n = fiv__encode(o->words + used, b->rows + i * (size_t)(6 * o->face), 6 * o->face);
+            o->stats.rasterised++;
+        } else {
+            n = o->first[twin + 1] - o->first[twin];
+            memcpy(o->words + used, o->words + o->first[twin], n * sizeof(uint16_t));
+            o->state[sample] = o->state[twin];
+        }
+        o->stats.inside += o->state[sample] == FIV__INSIDE;
+        o->first[sample + 1] = (uint32_t)(used + n);
+    }
+    return SAT_OK;
+}
+
+static sat_result fiv__precompute(fiv_occluder *o, const fiv_occluder_options *options)
+{
+    fiv__batch b;
+    size_t n = o->stats.samples, size = FIV__BATCH * (size_t)(6 * o->face) * sizeof *b.rows, used;
+    sat_result result = SAT_OK;
+    void *trimmed;
+    b.occluder = o;
+    b.rows = (uint64_t *)sat__alloc(&o->allocator, size);
+    if (!b.rows) return SAT_ERR_MEMORY;
+    o->first[0] = 0;
+    for (b.first = 0; b.first < n && !result; b.first += FIV__BATCH) {
+        size_t count = n - b.first < FIV__BATCH ? n - b.first : FIV__BATCH;
+        if (options->progress && options->progress((float)((double)b.first / (double)n), options->progress_user)) {
+            result = SAT_ERR_CANCELLED;
+            break;
+        }
+        sat__parallel_for(&o->threads, (int)count, fiv__make_masks, &b);
+        result = fiv__store_masks(&b, count);
+    }
+    sat__release(&o->allocator, b.rows, size);
+    if (result) return result;
+    used = o->first[n] * sizeof(uint16_t);
+    trimmed = sat__alloc(&o->allocator, used);
+    if (!trimmed) return SAT_ERR_MEMORY;
+    memcpy(trimmed, o->words_block, used);
+    sat__release(&o->allocator, o->words_block, o->words_size);
+    o->words_block = trimmed;
+    o->words = (uint16_t *)trimmed;
+    o->words_size = used ? used : 1;
+    o->stats.spans = o->first[n];
+    if (options->progress) options->progress(1, options->progress_user);
+    return SAT_OK;
+}
+
+#endif /* FIV_NO_MASKS */
+
+static sat_result fiv__read_mesh(fiv_occluder *o, const float *positions, const unsigned *indices, size_t triangle_count)
+{
+    fiv__mesh *mesh = &o->mesh;
+    sat__arena arena;
+    uint64_t *scratch, *order;
+    size_t size, usable = 0, k;
+    for (k = 0; k < triangle_count; k++) usable += (size_t)fiv__triangle_is_usable(positions, indices + 3 * k);
+    mesh->triangle_count = usable;
+    mesh->cluster_count = (usable + FIV__CLUSTER - 1) / FIV__CLUSTER;
+    memset(&arena, 0, sizeof arena);
+    fiv__mesh_layout(mesh, &arena);
+    if (arena.overflow || !sat__multiply_size(&size, triangle_count, 8 * sizeof *scratch)) return SAT_ERR_SIZE;
+    o->mesh_size = arena.used + 63;
+    o->mesh_block = sat__alloc(&o->allocator, o->mesh_size);
+    if (!o->mesh_block) return SAT_ERR_MEMORY;
+    scratch = (uint64_t *)sat__alloc(&o->allocator, size);
+    if (!scratch) return SAT_ERR_MEMORY;
+    memset(&arena, 0, sizeof arena);
+    arena.base = sat__align64(o->mesh_block);
+    fiv__mesh_layout(mesh, &arena);
+    order = fiv__order_triangles(scratch, scratch + triangle_count, &usable, positions, indices, triangle_count);
+    mesh->closed = fiv__is_closed(order, usable, indices, scratch + 2 * triangle_count, scratch + 5 * triangle_count);
+    fiv__make_clusters(mesh, order, indices);
+    sat__release(&o->allocator, scratch, size);
+    o->stats.skipped_triangles = triangle_count - usable;
+    return SAT_OK;
+}
+
+/* Ball, clusters and support function for these positions. */
+static sat_result fiv__take_positions(fiv_occluder *o, const float *positions)
+{
+    int k;
+    if (!fiv__place_mesh(&o->mesh, o->centre, &o->radius, positions)) return SAT_ERR_ARGUMENT;
+    sat__parallel_for(&o->threads, FIV__SUPPORT, fiv__support_rows, o);
+    o->stats.triangles = o->mesh.triangle_count;
+    o->stats.closed = o->mesh.closed;
+    o->stats.radius = o->radius;
+    for (k = 0; k < 3; k++) o->stats.centre[k] = o->centre[k];
+    return SAT_OK;
+}
+
+FIV_DEF sat_result fiv_occluder_create(fiv_occluder **out, const float *positions, size_t vertex_count,
+                                       const unsigned *indices, size_t triangle_count,
+                                       const fiv_occluder_options *options, fiv_occluder_stats *stats)
+{
+    fiv_occluder_options o = options ? *options : fiv_occluder_defaults();
+    fiv_occluder from, *made = NULL;
+    sat_result result;
+    size_t i;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (!fiv__occluder_options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    if (triangle_count && (!positions || !indices)) return SAT_ERR_ARGUMENT;
+    if (vertex_count > 0x7fffffff || triangle_count > 0x7fffffff / 3) return SAT_ERR_SIZE;
+    for (i = 0; i < 3 * triangle_count; i++)
+        if (indices[i] >= vertex_count) return SAT_ERR_ARGUMENT;
+    memset(&from, 0, sizeof from);
+    if (!sat__resolve_allocator(&from.allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
+    from.threads = o.threads;
+    fiv__set_grid(&from, &o);
+    result = fiv__allocate_occluder(&made, &from);
+    if (result) return result;
+    made->mesh.source_count = vertex_count;
+    result = fiv__read_mesh(made, positions, indices, triangle_count);
+    if (!result) result = fiv__take_positions(made, positions);
+    memset(made->state, FIV__STALE, made->stats.samples);
+#ifndef FIV_NO_MASKS
+    if (!result && made->keep_masks) {
+        result = fiv__precompute(made, &o);
+        sat__release(&made->allocator, made->mesh_block, made->mesh_size);
+        made->mesh_block = NULL;
+        made->mesh_size = 0;
+    }
+#endif
+    if (result) {
+        fiv_occluder_destroy(made);
+        return result;
+    }
+    fiv__count_bytes(made);
+    if (stats) *stats = made->stats;
+    *out = made;
+    return SAT_OK;
+}
+
+FIV_DEF sat_result fiv_occluder_share(fiv_occluder **out, const fiv_occluder *masks_of)
+{
+    fiv_occluder from;
+    sat_result result;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!masks_of || !masks_of->keep_masks) return SAT_ERR_ARGUMENT;
+    from = *masks_of;
+    from.share = 1;
+    from.environment = NULL;
+    result = fiv__allocate_occluder(out, &from);
+    if (!result) fiv__count_bytes(*out);
+    return result;
+}
+
+/* ---- distance from a silhouette to a light. A light's visibility is a step in space; interpolated between samples it would
+   blur over a whole cell. The angle from the light to the mask's border changes smoothly, so that is what is
+   interpolated, and the step is taken afterwards. */
+
+typedef struct fiv__near {
+    int count, row_count;
+    uint64_t texel[FIV__NEAR];     /* by rising distance: distance (21 a texel) << 32 | row << 8 | x */
+    int row[FIV__NEAR_ROWS];       /* the same texels as bits */
+    uint64_t bits[FIV__NEAR_ROWS];
+} fiv__near;
+
+static void fiv__find_near(fiv__near *near_light, const float direction[3], int size)
+{
+    uint64_t scratch[FIV__NEAR], *sorted;
+    float limit = cosf(12.0f / (float)size); /* six texels */
+    int row, x, n = 0;
+    near_light->row_count = 0;
+    for (row = 0; row < 6 * size; row++) {
+        uint64_t bits = 0;
+        for (x = 0; x < size && n < FIV__NEAR; x++) {
+            float d[3], cosine;
+            fiv__cube_direction(d, row / size, fiv__texel_coordinate(x, size), fiv__texel_coordinate(row % size, size));
+            cosine = fiv__dot(d, direction) / sqrtf(fiv__dot(d, d));
+            if (cosine < limit) continue;
+            near_light->texel[n++] = (uint64_t)(acosf(cosine < 1 ? cosine : 1) * (float)size * 10.5f * 65536) << 16 |
+                                     (uint64_t)(row << 6 | x);
+            bits |= (uint64_t)1 << x;
+        }
+        if (bits && near_light->row_count < FIV__NEAR_ROWS) {
+            near_light->row[near_light->row_count] = row;
+            near_light->bits[near_light->row_count++] = bits;
+        }
+    }
+    sorted = fiv__sort(near_light->texel, scratch, (size_t)n, 2, 5);
+    if (sorted != near_light->texel) memcpy(near_light->texel, sorted, (size_t)n * sizeof *sorted);
+    near_light->count = n;
+}
+
+static int fiv__silhouette_distance(const fiv__near *near_light, const uint64_t *rows)
+{
+    int i, covered, any = 0, all = 1;
+    for (i = 0; i < near_light->row_count; i++) {
+        uint64_t bits = rows[near_light->row[i]] & near_light->bits[i];
+        any |= bits != 0;
+        all &= bits == near_light->bits[i];
+    }
+    if (!any || all) return any ? 126 : -126;
+    covered = (int)(rows[near_light->texel[0] >> 6 & 0x3ff] >> (near_light->texel[0] & 63) & 1);
+    for (i = 1; i < near_light->count; i++) {
+        uint64_t t = near_light->texel[i];
+        int distance = (int)(t >> 32);
+        if ((int)(rows[t >> 6 & 0x3ff] >> (t & 63) & 1) == covered) continue;
+        distance = sat__clamp_int(distance - 10, 0, 126);
+        return covered ? distance : -distance;
+    }
+    return covered ? 126 : -126;
+}
+
+/* ---- lighting */
+
+typedef struct fiv__lighting {
+    fiv_occluder *occluder;
+    fiv__near lights[FIV_MAX_LIGHTS];
+} fiv__lighting;
+
+static void fiv__store_vector(fiv_occluder *o, size_t sample, const double sum[FIV__TERMS])
+{
+    double radius = (double)fiv__shell_radius(&o->grid, (int)(sample / ((size_t)o->grid.theta * (size_t)o->grid.phi)));
+    double square = radius * radius, scale = square * (double)o->table_scale;
+    int k, valid = o->state[sample] == FIV__VALID;
+    float v[FIV__TERMS];
+    for (k = 0; k < 9; k++) v[k] = (float)(sum[k] * scale);
+    v[9] = (float)(valid ? sum[9] * square : -sum[9] * square - 1e-6);
+    for (k = 0; k < FIV__TERMS; k++)
+        if (o->half_floats) o->half_table[FIV__TERMS * sample + (size_t)k] = sat__half_from_float(v[k]);
+        else o->table[FIV__TERMS * sample + (size_t)k] = v[k];
+}
+
+static void fiv__light_sample(const fiv__lighting *l, size_t sample, const uint16_t *words, size_t count)
+{
+    fiv_occluder *o = l->occluder;
+    double sum[FIV__TERMS];
+    int i;
+    fiv__integrate(sum, o->sums, words, count, o->face);
+    fiv__store_vector(o, sample, sum);
+    if (o->light_count) {
+        uint64_t rows[FIV__MAX_ROWS];
+        fiv__decode(rows, words, count, 6 * o->face);
+        for (i = 0; i < o->light_count; i++)
+            o->distance[sample * (size_t)o->max_lights + (size_t)i] = (signed char)fiv__silhouette_distance(&l->lights[i], rows);
+    }
+}
+
+#ifndef FIV_NO_MASKS
+static void fiv__light_stored(int begin, int end, int worker, void *context)
+{
+    const fiv__lighting *l = (const fiv__lighting *)context;
+    const fiv_occluder *o = l->occluder;
+    (void)worker;
+    for (; begin < end; begin++) fiv__light_sample(l, (size_t)begin, o->words + o->first[begin], o->first[begin + 1] - o->first[begin]);
+}
+#endif
+
+/* Rasterises and lights the samples that are wanted. */
+static void fiv__light_wanted(int begin, int end, int worker, void *context)
+{
+    const fiv__lighting *l = (const fiv__lighting *)context;
+    fiv_occluder *o = l->occluder;
+    uint64_t rows[FIV__MAX_ROWS];
+    uint16_t words[FIV__MAX_WORDS];
+    (void)worker;
+    for (; begin < end; begin++) {
+        size_t sample = (size_t)begin;
+        float offset[3];
+        if (o->state[sample] != FIV__WANTED || fiv__first_twin(&o->grid, sample) != sample) continue;
+        fiv__sample_offset(offset, &o->grid, sample);
+        fiv__raster_mesh(rows, &o->mesh, offset, o->face);
+        o->state[sample] = fiv__judge_mask(rows, o->face, o->mesh.closed);
+        fiv__light_sample(l, sample, words, fiv__encode(words, rows, 6 * o->face));
+    }
+}
+
+static void fiv__copy_sample(fiv_occluder *o, size_t to, size_t from)
+{
+    size_t n = FIV__TERMS * (o->half_floats ? sizeof *o->half_table : sizeof *o->table), lights = (size_t)o->max_lights;
+    unsigned char *table = o->half_floats ? (unsigned char *)o->half_table : (unsigned char *)o->table;
+    memcpy(table + to * n, table + from * n, n);
+    if (lights) memcpy(o->distance + to * lights, o->distance + from * lights, lights);
+    o->state[to] = o->state[from];
+}
+
+static void fiv__forget_samples(fiv_occluder *o, int state)
+{
+    size_t i, n = o->stats.samples;
+    double none[FIV__TERMS];
+    memset(none, 0, sizeof none);
+    memset(o->state, state, n);
+    for (i = 0; i < n; i++) fiv__store_vector(o, i, none);
+    if (o->max_lights) memset(o->distance, -126, n * (size_t)o->max_lights);
+    o->stats.inside = 0;
+}
+
+/* Makes all wanted samples; twins are copies. Returns how many masks were made. */
+static size_t fiv__make_wanted(fiv_occluder *o, fiv__lighting *l)
+{
+    size_t i, made = 0, n = o->stats.samples;
+    for (i = 0; i < n; i++)
+        if (o->state[i] == FIV__WANTED) {
+            size_t twin = fiv__first_twin(&o->grid, i);
+            if (o->state[twin] == FIV__STALE) o->state[twin] = FIV__WANTED;
+        }
+    for (i = 0; i < n; i++) made += o->state[i] == FIV__WANTED && fiv__first_twin(&o->grid, i) == i;
+    sat__parallel_for(&o->threads, (int)n, fiv__light_wanted, l);
+    for (i = 0; i < n; i++)
+        if (o->state[i] == FIV__WANTED) fiv__copy_sample(o, i, fiv__first_twin(&o->grid, i));
+    o->stats.rasterised += made;
+    for (i = 0, o->stats.inside = 0; i < n; i++) o->stats.inside += o->state[i] == FIV__INSIDE;
+    return made;
+}
+
+static void fiv__prepare_lighting(fiv__lighting *l, fiv_occluder *o)
+{
+    int i;
+    l->occluder = o;
+    for (i = 0; i < o->light_count; i++) {
+        float d[3];
+        fiv__turn(d, o->environment->rotation, o->environment->lights[i].direction);
+        fiv__turn_back(d, o->rotation, d);
+        fiv__find_near(&l->lights[i], d, o->face);
+    }
+}
+
+FIV_DEF sat_result fiv_occluder_light(fiv_occluder *o, const fiv_environment *e, const float rotation[9])
+{
+    fiv__gather g;
+    fiv__lighting l;
+    double flux;
+    if (!o || !e || e->face != o->face) return SAT_ERR_ARGUMENT;
+    if (e->light_count > o->max_lights) return SAT_ERR_LIMIT;
+    if (!fiv__set_rotation(o->rotation, rotation)) return SAT_ERR_ARGUMENT;
+    flux = e->flux[0] > e->flux[1] ? e->flux[0] : e->flux[1];
+    flux = flux > e->flux[2] ? flux : e->flux[2];
+    o->table_scale = (float)(o->half_floats && flux > 0 ? 1 / flux : 1);
+    o->environment = e;
+    o->stamp = e->stamp;
+    o->light_count = e->light_count;
+    g.environment = e;
+    g.sums = o->sums;
+    g.radiance = NULL;
+    fiv__turn_between(g.frame, e->rotation, o->rotation);
+    sat__parallel_for(&o->threads, 6 * o->face, fiv__gather_rows, &g);
+    fiv__prepare_lighting(&l, o);
+#ifndef FIV_NO_MASKS
+    if (o->keep_masks) {
+        sat__parallel_for(&o->threads, (int)o->stats.samples, fiv__light_stored, &l);
+        return SAT_OK;
+    }
+#endif
+    o->stats.rasterised = 0;
+    fiv__forget_samples(o, o->lazy ? FIV__STALE : FIV__WANTED);
+    if (!o->lazy) fiv__make_wanted(o, &l);
+    return SAT_OK;
+}
+
+FIV_DEF sat_result fiv_occluder_invalidate(fiv_occluder *o, const float *positions)
+{
+    sat_result result = SAT_OK;
+    size_t i;
+    if (!o || !o->lazy) return SAT_ERR_ARGUMENT;
+    for (i = 0; positions && i < o->mesh.vertex_count; i++) {
+        const float *p = positions + 3 * (size_t)o->mesh.source[i];
+        if (!sat__is_finite(p[0]) || !sat__is_finite(p[1]) || !sat__is_finite(p[2])) return SAT_ERR_ARGUMENT;
+    }
+    if (positions && o->mesh.vertex_count) result = fiv__take_positions(o, positions);
+    o->stats.rasterised = 0;
+    fiv__forget_samples(o, FIV__STALE);
+    return result;
+}
+
+/* ---- lookups */
+
+FIV_DEF fiv_irradiance_options fiv_irradiance_defaults(void)
+{
+    fiv_irradiance_options o;
+    memset(&o, 0, sizeof o);
+    o.accuracy = FIV_SCALED;
+    o.partial = 1;
+    o.overlap = 1;
+    o.cutoff = 0.001f;
+    return o;
+}
+
+static inline void fiv__read_sample(float v[FIV__TERMS], const fiv_occluder *o, size_t sample)
+{
+    int k;
+    if (o->half_floats) {
+        const uint16_t *h = o->half_table + FIV__TERMS * sample;
+        float scale = 1 / o->table_scale;
+        for (k = 0; k < 9; k++) v[k] = sat__half_to_float(h[k]) * scale;
+        v[9] = sat__half_to_float(h[9]);
+    } else memcpy(v, o->table + FIV__TERMS * sample, FIV__TERMS * sizeof *v);
+}
+
+/* Published: the vectors themselves are interpolated, and fall with the square of the distance beyond the last shell. */
+static void fiv__lookup_published(float out[FIV__TERMS], const fiv_occluder *o, const fiv__cell *cell)
+{
+    float v[FIV__TERMS], near_shell = fiv__shell_radius(&o->grid, cell->shell), far_shell = fiv__shell_radius(&o->grid, cell->shell + 1);
+    int q, k;
+    near_shell = 1 / (near_shell * near_shell);
+    far_shell = 1 / (far_shell * far_shell);
+    if (cell->radius > o->grid.last) far_shell = 1 / (cell->radius * cell->radius);
+    memset(out, 0, FIV__TERMS * sizeof *out);
+    for (q = 0; q < 8; q++) {
+        float weight = cell->weight[q] * (q & 4 ? far_shell : near_shell);
+        if (weight == 0) continue;
+        fiv__read_sample(v, o, cell->index[q]);
+        v[9] = fabsf(v[9]);
+        for (k = 0; k < FIV__TERMS; k++) out[k] += weight * v[k];
+    }
+}
+
+/* rho^2 times the vector changes slowly with the distance; samples inside the mesh see everything dark and are left out.
+   Returns the weight of the valid samples. */
+static float fiv__lookup_scaled(float out[FIV__TERMS], const fiv_occluder *o, const fiv__cell *cell)
+{
+    float v[FIV__TERMS], total = 0, scale;
+    int q, k, pass;
+    for (pass = 0; pass < 2; pass++) { /* the second: all eight lie inside, and so does the receiver */
+        memset(out, 0, FIV__TERMS * sizeof *out);
+        for (q = 0; q < 8; q++) {
+            fiv__read_sample(v, o, cell->index[q]);
+            if (v[9] < 0 && pass == 0) continue;
+            v[9] = fabsf(v[9]);
+            for (k = 0; k < FIV__TERMS; k++) out[k] += cell->weight[q] * v[k];
+            total += cell->weight[q];
+        }
+        if (total > 1e-4f) break;
+        total = 0;
+    }
+    scale = total > 0 ? 1 / (total * cell->radius * cell->radius) : 0;
+    for (k = 0; k < FIV__TERMS; k++) out[k] *= scale;
+    return pass ? 0 : total;
+}
+
+static void fiv__take_nearest(fiv__cell *cell)
+{
+    int q, best = 0;
+    for (q = 1; q < 8; q++)
+        if (cell->weight[q] > cell->weight[best]) best = q;
+    for (q = 0; q < 8; q++) cell->weight[q] = q == best ? 1.0f : 0.0f;
+}
+
+/* How much of each light the occluder takes, 0..1: the interpolated distance of its silhouette, one texel of penumbra. */
+static void fiv__lookup_lights(float covered[FIV_MAX_LIGHTS], const fiv_occluder *o, const fiv__cell *cell)
+{
+    int i, q;
+    for (i = 0; i < o->light_count; i++) {
+        float distance = 0, total = 0;
+        for (q = 0; q < 8; q++) {
+            size_t sample = cell->index[q];
+            if (o->state[sample] == FIV__INSIDE || cell->weight[q] == 0) continue;
+            distance += cell->weight[q] * (float)o->distance[sample * (size_t)o->max_lights + (size_t)i];
+            total += cell->weight[q];
+        }
+        distance = total > 1e-4f ? distance / (21 * total) : 6.0f;
+        distance = 0.5f + distance;
+        covered[i] = distance < 0 ? 0 : distance > 1 ? 1 : distance;
+    }
+}
+
+/* ---- one occluder above the horizon of one receiver */
+
+/* A disc of uniform light with this axis and half angle, cut by the horizon: its irradiance over that of the whole disc
+   seen head on. cosine: of the axis over the horizon; half: of the half angle (formula of the clipped cap, exact for
+   half angles up to 90 degrees). */
+static float fiv__clipped_cap(float cosine, float half)
+{
+    float square = 1 - half * half, sine, x, y, q;
+    if (cosine * cosine >= square) return cosine > 0 ? cosine : 0;
+    sine = sqrtf(1 - cosine * cosine);
+    x = half / sqrtf(square);
+    y = -x * cosine / sine;
+    y = y < -1 ? -1 : y > 1 ? 1 : y;
+    q = sqrtf(1 - y * y);
+    return ((cosine * acosf(y) - x * sine * q) * square + atanf(sine * q / x)) / (3.14159265f * square);
+}
+
+typedef struct fiv__receiver {
+    const fiv_environment *environment;
+    const fiv_instance *instances;
+    size_t instance_count;
+    const fiv_irradiance_options *options;
+    fiv_irradiance_stats *stats;
+    float point[3], normal[3];
+    float diffuse[3];                    /* I_tot without the lights */
+    float light_cosine[FIV_MAX_LIGHTS];  /* over the horizon */
+    float light_direction[FIV_MAX_LIGHTS][3];
+    float total[3];
+} fiv__receiver;
+
+typedef struct fiv__shadow {
+    const fiv_occluder *occluder;
+    float rgb[3];       /* irradiance the occluder takes, without the lights */
+    float direction[3]; /* to its centre, world */
+    float radius, disc; /* sine of the ball's half angle; radius of the disc it stands for on the unit sphere */
+    size_t nearest;     /* sample */
+} fiv__shadow;
+
+/* Where an occluder stands: offset in its own frame and radii; 0 when it cannot matter. */
+static int fiv__place(float offset[3], float world[3], float *distance, const fiv_instance *instance, const float point[3])
+{
+    const fiv_occluder *o = instance->occluder;
+    float centre[3], inverse;
+    int k;
+    if (!(o->radius > 0) || !(instance->scale > 0)) return 0;
+    fiv__turn(centre, o->rotation, o->centre);
+    inverse = 1 / (o->radius * instance->scale);
+    for (k = 0; k < 3; k++) world[k] = (instance->position[k] - point[k] + instance->scale * centre[k]) * inverse;
+    *distance = sqrtf(fiv__dot(world, world));
+    if (!(*distance < 1e9f)) return 0; /* takes less than 1e-18 of the light */
+    fiv__turn_back(offset, o->rotation, world);
+    return 1;
+}
+
+/* 1 when even an occluder that filled its ball could take no more than the cutoff: L_max pi (R / r)^2 <= cutoff I_tot
+   in each channel, and no split-off light within the ball. */
+static int fiv__is_negligible(const fiv__receiver *r, const float world[3], float distance)
+{
+    float sine = distance > 1 ? 1 / distance : 1, reach;
+    int c, i;
+    for (c = 0; c < 3; c++)
+        if (!(r->environment->largest[c] * 3.14159265f * sine * sine <= r->options->cutoff * r->total[c])) return 0;
+    if (sine >= 1) return r->environment->light_count == 0;
+    reach = distance * cosf(asinf(sine) + 4.0f / (float)r->environment->face);
+    for (i = 0; i < r->environment->light_count; i++)
+        if (r->light_cosine[i] > 0 && fiv__dot(world, r->light_direction[i]) > reach) return 0;
+    return 1;
+}
+
+/* Irradiance taken: N vector, or the cap where the horizon cuts. `cut`: part of the occluder's height below the horizon. */
+static void fiv__shade(float rgb[3], const float v[FIV__TERMS], const float normal[3], float cut)
+{
+    int c;
+    for (c = 0; c < 3; c++) {
+        float along = fiv__dot(v + 3 * c, normal);
+        if (cut > 0) {
+            float length = sqrtf(fiv__dot(v + 3 * c, v + 3 * c)), half = 1 - v[9] * 0.159154943f, cap, blend = 4 * cut;
+            half = half < 0.01f ? 0.01f : half > 0.999999f ? 0.999999f : half;
+            cap = length > 0 ? length * fiv__clipped_cap(along / length, half) : 0;
+            along += (cap - along) * (blend < 1 ? blend : 1);
+        }
+        rgb[c] = along > 0 ? along : 0;
+    }
+}
+
+#ifndef FIV_NO_MASKS
+/* The eight masks, each cut by the horizon. */
+static void fiv__shade_masks(float rgb[3], const fiv_occluder *o, const fiv__cell *cell, const float normal[3], size_t *masks)
+{
+    double sum[FIV__TERMS], out[3] = {0, 0, 0}, total = 0;
+    int q, c, k;
+    for (q = 0; q < 8; q++) {
+        size_t s = cell->index[q];
+        double radius = (double)fiv__shell_radius(&o->grid, cell->shell + (q >> 2)), weight = (double)cell->weight[q];
+        if (weight < 1e-4 || o->state[s] != FIV__VALID) continue;
+        fiv__integrate_above(sum, o->sums, o->words + o->first[s], o->first[s + 1] - o->first[s], o->face, normal);
+        ++*masks;
+        total += weight;
+        for (c = 0; c < 3; c++)
+            for (k = 0; k < 3; k++) out[c] += weight * radius * radius * sum[3 * c + k] * (double)normal[k];
+    }
+    total *= (double)cell->radius * (double)cell->radius;
+    for (c = 0; c < 3; c++) rgb[c] = total > 0 && out[c] > 0 ? (float)(out[c] / total) : 0;
+}
+#endif
+
+/* Fills in a shadow; 0 when the occluder takes nothing. */
+static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], const fiv__receiver *r, const fiv_instance *instance)
+{
+    const fiv_occluder *o = instance->occluder;
+    float offset[3], world[3], distance, height, normal[3], v[FIV__TERMS], below = 1, above = 1, cut = 0, back[3];
+    int k, published = r->options->accuracy <= FIV_TRILINEAR, masks = 0;
+    fiv__cell cell;
+    if (!fiv__place(offset, world, &distance, instance, r->point)) return 0;
+    height = fiv__dot(world, r->normal);
+    if (height <= -1) return r->stats->below_horizon++, 0;
+    if (fiv__is_negligible(r, world, distance)) return r->stats->below_cutoff++, 0;
+    fiv__turn_back(normal, o->rotation, r->normal);
+    if (height < 1 && !published) {
+        for (k = 0; k < 3; k++) back[k] = -normal[k];
+        below = fiv__reach(o, back);
+        above = fiv__reach(o, normal);
+        if (height <= -above) return r->stats->below_horizon++, 0;
+    }
+    if (height < below - 1e-4f) cut = (below - height) / (below + above);
+    r->stats->clipped += cut > 0;
+    r->stats->whole += !(cut > 0);
+    fiv__locate(&cell, &o->grid, offset);
+    if (r->options->accuracy == FIV_NEAREST) fiv__take_nearest(&cell);
+    if (published) {
+        fiv__lookup_published(v, o, &cell);
+        for (k = 0; k < 9 && cut > 0 && r->options->partial; k++) v[k] *= 1 - cut; /* (d + R) / 2R */
+    } else if (fiv__lookup_scaled(v, o, &cell) == 0 && o->state[cell.index[0]] == FIV__STALE) r->stats->missing++;
+#ifndef FIV_NO_MASKS
+    masks = r->options->accuracy == FIV_MASK && cut > 0 && o->keep_masks;
+    if (masks) fiv__shade_masks(shadow->rgb, o, &cell, normal, &r->stats->masks);
+#endif
+    if (!masks) fiv__shade(shadow->rgb, v, normal, published || !r->options->partial ? 0 : cut);
+    fiv__lookup_lights(covered, o, &cell);
+    shadow->occluder = o;
+    shadow->radius = distance > 1 ? 1 / distance : 1;
+    shadow->disc = published ? shadow->radius : sqrtf(v[9] * 0.318309886f);
+    for (k = 0; k < 3; k++) {
+        shadow->direction[k] = world[k] / (distance > 0 ? distance : 1);
+        shadow->rgb[k] = shadow->rgb[k] < r->diffuse[k] ? shadow->rgb[k] : r->diffuse[k];
+    }
+    fiv__take_nearest(&cell);
+    for (k = 0; k < 8; k++)
+        if (cell.weight[k] > 0) shadow->nearest = cell.index[k];
+    return 1;
+}
+
+/* ---- several occluders. Sums are taken in fixed point, as parts of I_tot, so that their order does not matter. */
+
+#define FIV__ONE 1099511627776.0 /* 2^40 */
+
+static inline int64_t fiv__fixed(float part, float whole)
+{
+    return whole > 0 ? (int64_t)((double)part / (double)whole * FIV__ONE + 0.5) : 0;
+}
+
+/* Common area of two discs, d apart. */
+static float fiv__lens(float r1, float r2, float d)
+{
+    float a, b;
+    if (d >= r1 + r2) return 0;
+    if (d <= fabsf(r1 - r2)) return 3.14159265f * (r1 < r2 ? r1 * r1 : r2 * r2);
+    a = (d * d + r1 * r1 - r2 * r2) / (2 * d * r1);
+    b = (d * d + r2 * r2 - r1 * r1) / (2 * d * r2);
+    a = acosf(a < -1 ? -1 : a > 1 ? 1 : a);
+    b = acosf(b < -1 ? -1 : b > 1 ? 1 : b);
+    return r1 * r1 * (a - 0.5f * sinf(2 * a)) + r2 * r2 * (b - 0.5f * sinf(2 * b));
+}
+
+/* Published (eq 14 and 15): the part of the summed areas that two discs share, of the summed irradiances. FIV_SCALED: the
+   discs have the solid angle of the silhouettes, and the smaller irradiance bounds what is shared. */
+static int fiv__discs_overlap(float shared[3], const fiv__shadow *a, const fiv__shadow *b, int published)
+{
+    float d[3], area, smaller;
+    int k;
+    for (k = 0; k < 3; k++) d[k] = a->direction[k] - b->direction[k];
+    area = fiv__lens(a->disc > b->disc ? a->disc : b->disc, a->disc > b->disc ? b->disc : a->disc, sqrtf(fiv__dot(d, d)));
+    if (!(area > 0)) return 0;
+    smaller = a->disc < b->disc ? a->disc : b->disc;
+    for (k = 0; k < 3; k++) {
+        float low = a->rgb[k] < b->rgb[k] ? a->rgb[k] : b->rgb[k];
+        if (published) shared[k] = area / (3.14159265f * (a->disc * a->disc + b->disc * b->disc)) * (a->rgb[k] + b->rgb[k]);
+        else shared[k] = area / (3.14159265f * smaller * smaller) * low;
+    }
+    return 1;
+}
+
+static void fiv__subtract_discs(int64_t taken[3], const fiv__receiver *r, const fiv__shadow *shadows, int count)
+{
+    int i, j, k, met = 0, published = r->options->accuracy <= FIV_TRILINEAR;
+    int64_t largest[3] = {0, 0, 0}, shared_sum[3] = {0, 0, 0};
+    for (i = 0; i < count; i++) {
+        for (k = 0; k < 3; k++) {
+            int64_t v = fiv__fixed(shadows[i].rgb[k], r->diffuse[k]);
+            if (v > largest[k]) largest[k] = v;
+        }
+        for (j = 0; j < i; j++) {
+            float shared[3];
+            if (!fiv__discs_overlap(shared, &shadows[i], &shadows[j], published)) continue;
+            met = 1;
+            for (k = 0; k < 3; k++) shared_sum[k] += fiv__fixed(shared[k], r->diffuse[k]);
+        }
+    }
+    r->stats->overlaps += (size_t)met;
+    for (k = 0; k < 3; k++) {
+        taken[k] -= shared_sum[k];
+        if (!published && taken[k] < largest[k]) taken[k] = largest[k];
+    }
+}
+
+#ifndef FIV_NO_MASKS
+
+/* The mask of a sample in the world's frame. */
+static void fiv__world_mask(uint64_t *rows, const fiv_occluder *o, size_t sample, const float direction[3], float radius)
+{
+    uint64_t own[FIV__MAX_ROWS];
+    const uint16_t *words = o->words + o->first[sample];
+    size_t count = o->first[sample + 1] - o->first[sample];
+    float limit = cosf(asinf(radius) * 1.5f + 8.0f / (float)o->face);
+    int row, x, size = o->face;
+    if (memcmp(o->rotation, fiv__identity, sizeof fiv__identity) == 0) {
+        fiv__decode(rows, words, count, 6 * size);
+        return;
+    }
+    if (radius >= 0.7f) limit = -2;
+    fiv__decode(own, words, count, 6 * size);
+    for (row = 0; row < 6 * size; row++) {
+        rows[row] = 0;
+        for (x = 0; x < size; x++) {
+            float d[3];
+            size_t texel;
+            fiv__cube_direction(d, row / size, fiv__texel_coordinate(x, size), fiv__texel_coordinate(row % size, size));
+            if (limit > -1 && fiv__dot(d, direction) < limit * sqrtf(fiv__dot(d, d))) continue;
+            fiv__turn_back(d, o->rotation, d);
+            texel = fiv__cube_texel(d, size);
+            rows[row] |= (own[texel / (size_t)size] >> (texel % (size_t)size) & 1) << x;
+        }
+    }
+}
+
+/* Irradiance that the texels above the horizon give. */
+static void fiv__integrate_rows(float rgb[3], const uint64_t *rows, const fiv__receiver *r)
+{
+    const fiv_environment *e = r->environment;
+    double sum[FIV__TERMS];
+    int row, c, k, low, high;
+    memset(sum, 0, sizeof sum);
+    for (row = 0; row < 6 * e->face; row++) {
+        uint64_t m = rows[row];
+        if (!m) continue;
+        fiv__half_space(&low, &high, r->normal, row, e->face);
+        if (low >= high) continue;
+        m &= fiv__bits(low, high);
+        while (m) {
+            int begin = fiv__first_bit(m), end;
+            uint64_t carry = m + ((uint64_t)1 << begin);
+            end = carry ? fiv__first_bit(carry) : 64;
+            fiv__add_span(sum, e->sums + (size_t)row * (size_t)(e->face + 1) * FIV__TERMS, begin, end);
+            m = end == 64 ? 0 : m & ~(((uint64_t)1 << end) - 1);
+        }
+    }
+    for (c = 0; c < 3; c++) {
+        double v = 0;
+        for (k = 0; k < 3; k++) v += sum[3 * c + k] * (double)r->normal[k];
+        rgb[c] = v > 0 ? (float)v : 0;
+    }
+}
+
+static int fiv__balls_overlap(const fiv__shadow *a, const fiv__shadow *b)
+{
+    float cosine = sqrtf(1 - a->radius * a->radius) * sqrtf(1 - b->radius * b->radius) - a->radius * b->radius;
+    if (a->radius >= 1 || b->radius >= 1) return 1;
+    return fiv__dot(a->direction, b->direction) > cosine - 1e-3f;
+}
+
+/* Exact union: the nearest masks of the occluders that may overlap are ORed; what the union takes, over what they take one by
+   one, scales their interpolated sum. */
+static void fiv__unite_masks(int64_t taken[3], const fiv__receiver *r, const fiv__shadow *shadows, int count)
+{
+    uint64_t all[FIV__MAX_ROWS], one[FIV__MAX_ROWS], twice = 0;
+    int64_t group[3] = {0, 0, 0}, alone[3] = {0, 0, 0};
+    float rgb[3];
+    int i, j, k, row, members = 0;
+    memset(all, 0, sizeof all);
+    for (i = 0; i < count; i++) {
+        for (j = 0; j < count; j++)
+            if (i != j && fiv__balls_overlap(&shadows[i], &shadows[j])) break;
+        if (j == count || !shadows[i].occluder->keep_masks) continue;
+        fiv__world_mask(one, shadows[i].occluder, shadows[i].nearest, shadows[i].direction, shadows[i].radius);
+        for (row = 0; row < 6 * r->environment->face; row++) {
+            twice |= all[row] & one[row];
+            all[row] |= one[row];
+        }
+        fiv__integrate_rows(rgb, one, r);
+        members++;
+        for (k = 0; k < 3; k++) {
+            alone[k] += fiv__fixed(rgb[k], r->diffuse[k]);
+            group[k] += fiv__fixed(shadows[i].rgb[k], r->diffuse[k]);
+        }
+    }
+    r->stats->masks += (size_t)members;
+    if (!twice) return;
+    r->stats->overlaps++;
+    fiv__integrate_rows(rgb, all, r);
+    for (k = 0; k < 3; k++) {
+        int64_t together = fiv__fixed(rgb[k], r->diffuse[k]);
+        if (alone[k] <= 0 || together >= alone[k]) continue;
+        taken[k] -= group[k] - (int64_t)((double)group[k] * ((double)together / (double)alone[k]));
+    }
+}
+
+#endif /* FIV_NO_MASKS */
+
+/* What all instances take of the diffuse light (fixed point) and of each split-off light. */
+static void fiv__gather_shadows(int64_t taken[3], float covered[FIV_MAX_LIGHTS], const fiv__receiver *r)
+{
+    fiv__shadow shadows[FIV_MAX_INSTANCES];
+    float one[FIV_MAX_LIGHTS];
+    size_t i;
+    int k, count = 0;
+    taken[0] = taken[1] = taken[2] = 0;
+    for (k = 0; k < FIV_MAX_LIGHTS; k++) covered[k] = 0;
+    for (i = 0; i < r->instance_count; i++) {
+        if (!fiv__cast(&shadows[count], one, r, &r->instances[i])) continue;
+        for (k = 0; k < 3; k++) taken[k] += fiv__fixed(shadows[count].rgb[k], r->diffuse[k]);
+        for (k = 0; k < r->environment->light_count; k++) covered[k] = one[k] > covered[k] ? one[k] : covered[k];
+        count++;
+    }
+    if (count < 2 || !r->options->overlap) return;
+#ifndef FIV_NO_MASKS
+    if (r->options->accuracy == FIV_MASK) {
+        fiv__unite_masks(taken, r, shadows, count);
+        return;
+    }
+#endif
+    fiv__subtract_discs(taken, r, shadows, count);
+}
+
+/* Normal, I_tot and lights of a receiver; 0 when it is not finite. */
+static int fiv__start_receiver(fiv__receiver *r, const float *point, const float *normal)
+{
+    const fiv_environment *e = r->environment;
+    int i, k;
+    for (k = 0; k < 3; k++)
+        if (!sat__is_finite(point[k]) || !sat__is_finite(normal[k])) return r->stats->non_finite++, 0;
+    memcpy(r->point, point, sizeof r->point);
+    fiv__normalise(r->normal, normal);
+    r->total[0] = r->total[1] = r->total[2] = 0;
+    if (!(fiv__dot(r->normal, r->normal) > 0.5f)) return 0;
+    fiv__diffuse(r->diffuse, e, r->normal);
+    memcpy(r->total, r->diffuse, sizeof r->total);
+    for (i = 0; i < e->light_count; i++) {
+        fiv__turn(r->light_direction[i], e->rotation, e->lights[i].direction);
+        r->light_cosine[i] = fiv__dot(r->normal, r->light_direction[i]);
+        if (!(r->light_cosine[i] > 0)) r->light_cosine[i] = 0;
+        for (k = 0; k < 3; k++) r->total[k] += e->lights[i].power[k] * r->light_cosine[i];
+    }
+    return 1;
+}
+
+static void fiv__finish_receiver(float rgb[3], const fiv__receiver *r, const int64_t taken[3], const float covered[FIV_MAX_LIGHTS])
+{
+    int i, k;
+    for (k = 0; k < 3; k++) {
+        double part = 1 - (double)taken[k] / FIV__ONE;
+        rgb[k] = part <= 0 ? 0 : part >= 1 ? r->diffuse[k] : (float)((double)r->diffuse[k] * part);
+        for (i = 0; i < r->environment->light_count; i++)
+            rgb[k] += r->environment->lights[i].power[k] * r->light_cosine[i] * (1 - covered[i]);
+    }
+}
+
+static void fiv__receive(float rgb[3], fiv__receiver *r, const float *point, const float *normal)
+{
+    int64_t taken[3];
+    float covered[FIV_MAX_LIGHTS];
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    if (!fiv__start_receiver(r, point, normal)) return;
+    fiv__gather_shadows(taken, covered, r);
+    fiv__finish_receiver(rgb, r, taken, covered);
+}
+
+/* ---- many receivers, in tiles of fixed size */
+
+enum { FIV__TILE = 64 };
+
+typedef struct fiv__job {
+    float *rgb;
+    const float *points, *normals;
+    size_t count;
+    const fiv_environment *environment;
+    const fiv_instance *self, *instances;
+    size_t instance_count;
+    const fiv_irradiance_options *options;
+    fiv_irradiance_stats *stats; /* one a worker */
+} fiv__job;
+
+#ifndef FIV_NO_SELF
+static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance *self, const float *point, const float *normal);
+#endif
+
+static void fiv__run_tiles(int begin, int end, int worker, void *context)
+{
+    const fiv__job *job = (const fiv__job *)context;
+    fiv__receiver r;
+    size_t i, last = (size_t)end * FIV__TILE < job->count ? (size_t)end * FIV__TILE : job->count;
+    r.environment = job->environment;
+    r.instances = job->instances;
+    r.instance_count = job->instance_count;
+    r.options = job->options;
+    r.stats = &job->stats[worker];
+    for (i = (size_t)begin * FIV__TILE; i < last; i++) {
+#ifndef FIV_NO_SELF
+        if (job->self) {
+            fiv__receive_self(job->rgb + 3 * i, &r, job->self, job->points + 3 * i, job->normals + 3 * i);
+            continue;
+        }
+#endif
+        fiv__receive(job->rgb + 3 * i, &r, job->points + 3 * i, job->normals + 3 * i);
+    }
+}
+
+static int fiv__instance_is_valid(const fiv_instance *instance, const fiv_environment *e, const fiv_irradiance_options *o)
+{
+    int k;
+    const fiv_occluder *occluder = instance->occluder;
+    if (!occluder || occluder->environment != e || occluder->stamp != e->stamp) return 0;
+    if (!sat__is_finite(instance->scale) || !(instance->scale >= 0)) return 0;
+    for (k = 0; k < 3; k++)
+        if (!sat__is_finite(instance->position[k])) return 0;
+    return o->accuracy != FIV_MASK || occluder->keep_masks;
+}
+
+static void fiv__add_stats(fiv_irradiance_stats *sum, const fiv_irradiance_stats *s)
+{
+    sum->below_horizon += s->below_horizon;
+    sum->below_cutoff += s->below_cutoff;
+    sum->whole += s->whole;
+    sum->clipped += s->clipped;
+    sum->overlaps += s->overlaps;
+    sum->masks += s->masks;
+    sum->non_finite += s->non_finite;
+    sum->missing += s->missing;
+}
+
+static sat_result fiv__run(fiv__job *job, const fiv_irradiance_options *options, fiv_irradiance_stats *stats)
+{
+    fiv_irradiance_options o = options ? *options : fiv_irradiance_defaults();
+    fiv_irradiance_stats workers[1024], sum;
+    size_t i, tiles;
+    int used;
+    if (job->count && (!job->rgb || !job->points || !job->normals)) return SAT_ERR_ARGUMENT;
+    if (!job->environment || (job->instance_count && !job->instances)) return SAT_ERR_ARGUMENT;
+    if ((unsigned)o.accuracy > (unsigned)FIV_MASK || !(o.cutoff >= 0 && o.cutoff <= 1)) return SAT_ERR_ARGUMENT;
+    if (!sat__threads_are_valid(&o.threads)) return SAT_ERR_ARGUMENT;
+    if (job->instance_count > FIV_MAX_INSTANCES) return SAT_ERR_LIMIT;
+    for (i = 0; i < job->instance_count; i++)
+        if (!fiv__instance_is_valid(&job->instances[i], job->environment, &o)) return SAT_ERR_ARGUMENT;
+    if (job->self && !fiv__instance_is_valid(job->self, job->environment, &o)) return SAT_ERR_ARGUMENT;
+    tiles = job->count / FIV__TILE + (job->count % FIV__TILE != 0);
+    if (tiles > 0x7fffffff) return SAT_ERR_SIZE;
+    used = sat__worker_count(&o.threads);
+    memset(workers, 0, (size_t)used * sizeof *workers);
+    memset(&sum, 0, sizeof sum);
+    job->options = &o;
+    job->stats = workers;
+    sat__parallel_for(&o.threads, (int)tiles, fiv__run_tiles, job);
+    for (i = 0; i < (size_t)used; i++) fiv__add_stats(&sum, &workers[i]);
+    if (stats) *stats = sum;
+    return SAT_OK;
+}
+
+FIV_DEF sat_result fiv_irradiance(float *rgb, const float *points, const float *normals, size_t count,
+                                  const fiv_environment *environment, const fiv_instance *instances,
+                                  size_t instance_count, const fiv_irradiance_options *options,
+                                  fiv_irradiance_stats *stats)
+{
+    fiv__job job;
+    memset(&job, 0, sizeof job);
+    job.rgb = rgb;
+    job.points = points;
+    job.normals = normals;
+    job.count = count;
+    job.environment = environment;
+    job.instances = instances;
+    job.instance_count = instance_count;
+    return fiv__run(&job, options, stats);
+}
+
+/* ---- self-shadows: all that is not covered lies above the horizon (eq 13), so that what remains is N (FIV - FIV_occ). That holds
+   on the surface, and no longer at the nearest sample above it; FIV_SCALED therefore cuts the open part at the
+   horizon as a cap, and FIV_MASK cuts the masks themselves. */
+
+#ifndef FIV_NO_SELF
+
+static void fiv__self_diffuse(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const fiv__cell *cell, const float normal[3])
+{
+    float v[FIV__TERMS], open[FIV__TERMS], world[3], total = 0;
+    int c, k, q;
+    memset(v, 0, sizeof v);
+    for (q = 0; q < 8; q++) { /* whole vectors, not rho^2 times them: what is open does not fall with the distance */
+        float s[FIV__TERMS], radius = fiv__shell_radius(&o->grid, cell->shell + (q >> 2)), weight;
+        if (o->state[cell->index[q]] != FIV__VALID) continue;
+        fiv__read_sample(s, o, cell->index[q]);
+        weight = cell->weight[q] / (radius * radius);
+        for (k = 0; k < FIV__TERMS; k++) v[k] += weight * s[k];
+        total += cell->weight[q];
+    }
+    for (c = 0; c < 3; c++) {
+        for (k = 0; k < 3; k++) world[k] = (float)r->environment->vector[3 * c + k];
+        fiv__turn_back(open + 3 * c, o->rotation, world);
+        for (k = 0; k < 3; k++) open[3 * c + k] -= total > 1e-4f ? v[3 * c + k] / total : open[3 * c + k];
+    }
+    open[9] = total > 1e-4f ? 12.5663706f - v[9] / total : 0;
+    fiv__shade(rgb, open, normal, r->options->accuracy >= FIV_SCALED && r->options->partial ? 1.0f : 0.0f);
+}
+
+#ifndef FIV_NO_MASKS
+static void fiv__self_masks(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const fiv__cell *cell, const float normal[3])
+{
+    double sum[FIV__TERMS], taken[3] = {0, 0, 0}, total = 0;
+    int q, c, k;
+    for (q = 0; q < 8; q++) {
+        size_t s = cell->index[q];
+        double weight = (double)cell->weight[q];
+        if (weight < 1e-4 || o->state[s] != FIV__VALID) continue;
+        fiv__integrate_above(sum, o->sums, o->words + o->first[s], o->first[s + 1] - o->first[s], o->face, normal);
+        r->stats->masks++;
+        total += weight;
+        for (c = 0; c < 3; c++)
+            for (k = 0; k < 3; k++) taken[c] += weight * sum[3 * c + k] * (double)normal[k];
+    }
+    for (c = 0; c < 3; c++) {
+        double v = total > 0 ? (double)r->diffuse[c] - taken[c] / total : 0;
+        rgb[c] = v > 0 ? (float)v : 0;
+    }
+}
+#endif
+
+/* What the others take is taken of what the mesh itself leaves. */
+static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance *self, const float *point, const float *normal)
+{
+    const fiv_occluder *o = self->occluder;
+    float offset[3], world[3], distance, own_normal[3], covered[FIV_MAX_LIGHTS], own[FIV_MAX_LIGHTS], open[3];
+    int64_t taken[3];
+    fiv__cell cell;
+    int k;
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    if (!fiv__start_receiver(r, point, normal)) return;
+    fiv__gather_shadows(taken, covered, r);
+    if (fiv__place(offset, world, &distance, self, point)) {
+        fiv__turn_back(own_normal, o->rotation, r->normal);
+        fiv__locate(&cell, &o->grid, offset);
+        if (r->options->accuracy == FIV_NEAREST) fiv__take_nearest(&cell);
+        fiv__lookup_lights(own, o, &cell);
+#ifndef FIV_NO_MASKS
+        if (r->options->accuracy == FIV_MASK) fiv__self_masks(open, r, o, &cell, own_normal);
+        else
+#endif
+            fiv__self_diffuse(open, r, o, &cell, own_normal);
+        for (k = 0; k < 3; k++) r->diffuse[k] = open[k] < r->diffuse[k] ? open[k] : r->diffuse[k];
+        for (k = 0; k < r->environment->light_count; k++) covered[k] = own[k] > covered[k] ? own[k] : covered[k];
+    }
+    fiv__finish_receiver(rgb, r, taken, covered);
+}
+
+FIV_DEF sat_result fiv_self_irradiance(float *rgb, const float *points, const float *normals, size_t count,
+                                       const fiv_environment *environment, const fiv_instance *self,
+                                       const fiv_instance *others, size_t other_count,
+                                       const fiv_irradiance_options *options, fiv_irradiance_stats *stats)
+{
+    fiv__job job;
+    if (!self) return SAT_ERR_ARGUMENT;
+    memset(&job, 0, sizeof job);
+    job.rgb = rgb;
+    job.points = points;
+    job.normals = normals;
+    job.count = count;
+    job.environment = environment;
+    job.self = self;
+    job.instances = others;
+    job.instance_count = other_count;
+    return fiv__run(&job, options, stats);
+}
+
+#endif /* FIV_NO_SELF */
+
+/* ---- lazy occluders */
+
+FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *o, const fiv_instance *instances, size_t instance_count,
+                                        const float *points, size_t count, size_t *computed)
+{
+    fiv__lighting l;
+    fiv__cell cell;
+    size_t i, j, made;
+    int q, k;
+    if (!o || !o->lazy || !o->environment || o->stamp != o->environment->stamp) return SAT_ERR_ARGUMENT;
+    if ((instance_count && !instances) || (count && !points)) return SAT_ERR_ARGUMENT;
+    for (j = 0; j < instance_count; j++) {
+        if (instances[j].occluder != o) continue;
+        for (k = 0; k < 3; k++)
+            if (!sat__is_finite(instances[j].position[k]) || !sat__is_finite(instances[j].scale)) return SAT_ERR_ARGUMENT;
+        for (i = 0; i < count; i++) {
+            const float *p = points + 3 * i;
+            float offset[3], world[3], distance;
+            if (!sat__is_finite(p[0]) || !sat__is_finite(p[1]) || !sat__is_finite(p[2])) continue;
+            if (!fiv__place(offset, world, &distance, &instances[j], p)) continue;
+            fiv__locate(&cell, &o->grid, offset);
+            for (q = 0; q < 8; q++)
+                if (cell.weight[q] > 0 && o->state[cell.index[q]] == FIV__STALE) o->state[cell.index[q]] = FIV__WANTED;
+        }
+    }
+    fiv__prepare_lighting(&l, o);
+    made = fiv__make_wanted(o, &l);
+    if (computed) *computed = made;
+    return SAT_OK;
+}
+
+/* ---- saves: a header of fixed-width little-endian fields, the states, the support function, the counts of words, the words */
+
+#ifndef FIV_NO_MASKS
+
+typedef struct fiv__save {
+    uint64_t magic, hash;    /* of all bytes after this field */
+    uint64_t words;
+    int32_t octahedral, theta, phi, rho, face, closed;
+    float first, last, centre[3], radius;
+    uint64_t triangles, skipped, rasterised, inside;
+} fiv__save;
+
+#define FIV__MAGIC UINT64_C(0x3130307669667473) /* reads "stfiv001" in memory where bytes are in this order */
+
+/* FNV-1a over 64-bit words and the bytes that remain. */
+static uint64_t fiv__hash(const unsigned char *p, size_t size)
+{
+    uint64_t h = UINT64_C(0xcbf29ce484222325), word;
+    size_t i;
+    for (i = 0; i + 8 <= size; i += 8) {
+        memcpy(&word, p + i, 8);
+        h = (h ^ word) * UINT64_C(0x100000001b3);
+        h ^= h >> 29;
+    }
+    for (; i < size; i++) h = (h ^ p[i]) * UINT64_C(0x100000001b3);
+    return h;
+}
+
+static size_t fiv__save_size(size_t samples, size_t words)
+{
+    return sizeof(fiv__save) + samples + FIV__SUPPORT * FIV__SUPPORT * sizeof(float) + (samples + 1) * sizeof(uint32_t) +
+           words * sizeof(uint16_t);
+}
+
+FIV_DEF size_t fiv_occluder_save_size(const fiv_occluder *o)
+{
+    return o && o->keep_masks ? fiv__save_size(o->stats.samples, o->first[o->stats.samples]) : 0;
+}
+
+FIV_DEF sat_result fiv_occluder_save(const fiv_occluder *o, void *memory, size_t size)
+{
+    fiv__save s;
+    unsigned char *p = (unsigned char *)memory;
+    size_t needed = fiv_occluder_save_size(o), n;
+    if (!needed || !memory || size < needed) return SAT_ERR_ARGUMENT;
+    n = o->stats.samples;
+    memset(&s, 0, sizeof s);
+    s.magic = FIV__MAGIC;
+    s.words = o->first[n];
+    s.octahedral = o->grid.octahedral, s.theta = o->grid.theta, s.phi = o->grid.phi, s.rho = o->grid.rho;
+    s.face = o->face;
+    s.closed = o->stats.closed;
+    s.first = o->grid.first, s.last = o->grid.last;
+    memcpy(s.centre, o->centre, sizeof s.centre);
+    s.radius = o->radius;
+    s.triangles = o->stats.triangles, s.skipped = o->stats.skipped_triangles;
+    s.rasterised = o->stats.rasterised, s.inside = o->stats.inside;
+    memcpy(p, &s, sizeof s);
+    p += sizeof s;
+    memcpy(p, o->state, n);
+    memcpy(p += n, o->support, FIV__SUPPORT * FIV__SUPPORT * sizeof(float));
+    memcpy(p += FIV__SUPPORT * FIV__SUPPORT * sizeof(float), o->first, (n + 1) * sizeof(uint32_t));
+    memcpy(p += (n + 1) * sizeof(uint32_t), o->words, s.words * sizeof(uint16_t));
+    p = (unsigned char *)memory;
+    s.hash = fiv__hash(p + 16, needed - 16);
+    memcpy(p, &s, sizeof s);
+    return SAT_OK;
+}
+
+/* Every word of every sample stays within the mask's rows and texels. */
+static int fiv__words_are_valid(const fiv_occluder *o)
+{
+    size_t sample, i;
+    for (sample = 0; sample < o->stats.samples; sample++) {
+        int row = 0;
+        if (o->first[sample] > o->first[sample + 1] || o->state[sample] > FIV__INSIDE) return 0;
+        for (i = o->first[sample]; i < o->first[sample + 1]; i++) {
+            int word = o->words[i];
+            row = word >> 12 == 15 ? word & 0xfff : row + (word >> 12);
+            if (row >= 6 * o->face) return 0;
+            if (word >> 12 != 15 && (word & 63) + (word >> 6 & 63) + 1 > o->face) return 0;
+        }
+    }
+    return 1;
+}
+
+/* The header's fields as an occluder without memory; 0 when one is out of range or the size differs. */
+static int fiv__read_header(fiv_occluder *from, fiv__save *s, const unsigned char *p, size_t size)
+{
+    fiv_occluder_options o = fiv_occluder_defaults();
+    size_t samples;
+    if (size < sizeof *s) return 0;
+    memcpy(s, p, sizeof *s);
+    if (s->magic != FIV__MAGIC || s->hash != fiv__hash(p + 16, size - 16)) return 0;
+    o.storage = s->octahedral ? FIV_STORAGE_HALF_OCTAHEDRAL : FIV_STORAGE_FLOAT;
+    o.theta = s->octahedral ? (s->theta > 0 && s->theta <= 2049 ? 2 * (s->theta - 1) : 0) : s->theta;
+    o.phi = s->octahedral ? 3 : s->phi;
+    o.rho = s->rho, o.face = s->face;
+    o.first_shell = s->first, o.last_shell = s->last;
+    if (!fiv__occluder_options_are_valid(&o) || !sat__is_finite(s->radius) || s->radius < 0) return 0;
+    if (!sat__is_finite(s->centre[0]) || !sat__is_finite(s->centre[1]) || !sat__is_finite(s->centre[2])) return 0;
+    o.max_lights = from->max_lights;
+    fiv__set_grid(from, &o);
+    samples = fiv__grid_samples(&from->grid);
+    return s->phi == from->grid.phi && samples <= 0x7fffffff && s->words <= 0x7fffffff && size == fiv__save_size(samples, (size_t)s->words);
+}
+
+FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, size_t size, const fiv_occluder_options *options)
+{
+    fiv_occluder_options options_used = options ? *options : fiv_occluder_defaults();
+    fiv_occluder from, *o = NULL;
+    fiv__save s;
+    const unsigned char *p = (const unsigned char *)memory;
+    sat_result result;
+    size_t n;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    memset(&from, 0, sizeof from);
+    if (!p || !fiv__occluder_options_are_valid(&options_used)) return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(&from.allocator, &options_used.allocator)) return SAT_ERR_ARGUMENT;
+    from.threads = options_used.threads;
+    from.max_lights = options_used.max_lights;
+    if (!fiv__read_header(&from, &s, p, size)) return SAT_ERR_DATA;
+    result = fiv__allocate_occluder(&o, &from);
+    if (result) return result;
+    n = o->stats.samples;
+    o->words_size = s.words ? (size_t)s.words * sizeof(uint16_t) : 1;
+    o->words_block = sat__alloc(&o->allocator, o->words_size);
+    if (!o->words_block) {
+        fiv_occluder_destroy(o);
+        return SAT_ERR_MEMORY;
+    }
+    o->words = (uint16_t *)o->words_block;
+    memcpy(o->centre, s.centre, sizeof s.centre);
+    memcpy(o->stats.centre, s.centre, sizeof s.centre);
+    o->radius = o->stats.radius = s.radius;
+    o->stats.closed = s.closed;
+    o->stats.triangles = (size_t)s.triangles, o->stats.skipped_triangles = (size_t)s.skipped;
+    o->stats.rasterised = (size_t)s.rasterised, o->stats.inside = (size_t)s.inside;
+    o->stats.spans = (size_t)s.words;
+    p += sizeof s;
+    memcpy(o->state, p, n);
+    memcpy(o->support, p += n, FIV__SUPPORT * FIV__SUPPORT * sizeof(float));
+    memcpy(o->first, p += FIV__SUPPORT * FIV__SUPPORT * sizeof(float), (n + 1) * sizeof(uint32_t));
+    memcpy(o->words, p += (n + 1) * sizeof(uint32_t), (size_t)s.words * sizeof(uint16_t));
+    if (o->first[0] != 0 || o->first[n] != s.words || !fiv__words_are_valid(o)) {
+        fiv_occluder_destroy(o);
+        return SAT_ERR_DATA;
+    }
+    fiv__count_bytes(o);
+    *out = o;
+    return SAT_OK;
+}
+
+#endif /* FIV_NO_MASKS */
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* FIV_IMPLEMENTATION */

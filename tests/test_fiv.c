@@ -1,0 +1,4 @@
+/* The tests of fiv.h as C99. */
+#define LIGHTSCAN_IMPLEMENTATION
+#include "test_fiv.h"
+EXPECT_MAIN()

@@ -1,0 +1,1451 @@
+/* test_fiv.h - tests of fiv.h against rays through every light (reference_fiv.h). */
+
+#include "fiv.h"
+#include "expect.h"
+#include "support.h"
+#include "reference_fiv.h"
+
+/* ---- scenes ---- */
+
+enum { SKY_WIDTH = 128, SKY_HEIGHT = 64 };
+
+/* A sky with a bright side, a coloured horizon and a dark ground; `sun` in W/(m2 sr) on one texel (0: none). */
+static sat_image test_sky(float *pixels, float sun)
+{
+    int x, y, c;
+    for (y = 0; y < SKY_HEIGHT; y++)
+        for (x = 0; x < SKY_WIDTH; x++) {
+            double v = (y + 0.5) / SKY_HEIGHT, u = (x + 0.5) / SKY_WIDTH;
+            for (c = 0; c < 3; c++) {
+                double light = v < 0.5 ? 1 + 4 * exp(-30 * ((u - 0.3) * (u - 0.3) + (v - 0.25) * (v - 0.25)) * (1 + 0.5 * c)) : 0.2;
+                pixels[3 * (y * SKY_WIDTH + x) + c] = (float)(light * (1 + 0.3 * sin(9 * u + c)) * (0.6 + 0.2 * c));
+            }
+        }
+    if (sun > 0)
+        for (c = 0; c < 3; c++) pixels[3 * (12 * SKY_WIDTH + 50) + c] = sun;
+    return sat_image_f32(pixels, SKY_WIDTH, SKY_HEIGHT, 3);
+}
+
+static fiv_environment *test_environment(float sun, float delta_ratio)
+{
+    static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    sat_image sky = test_sky(pixels, sun);
+    fiv_environment_options o = fiv_environment_defaults();
+    fiv_environment *e = NULL;
+    o.delta_ratio = delta_ratio;
+    EXPECT_EQ(fiv_environment_create(&e, &sky, &o, NULL), SAT_OK);
+    return e;
+}
+
+/* A closed knot of 640 triangles. */
+static reference_mesh test_knot(void) { return reference_knot(2, 3, 40, 8, 0.25); }
+
+static fiv_occluder *test_occluder(const reference_mesh *m, const fiv_occluder_options *options, fiv_occluder_stats *stats)
+{
+    fiv_occluder *o = NULL;
+    EXPECT_EQ(fiv_occluder_create(&o, m->positions, m->vertices, m->indices, m->triangles, options, stats), SAT_OK);
+    return o;
+}
+
+static fiv_occluder_options test_small_set(void)
+{
+    fiv_occluder_options o = fiv_occluder_defaults();
+    o.theta = 16;
+    o.phi = 9;
+    o.rho = 8;
+    return o;
+}
+
+static fiv_instance test_instance(const fiv_occluder *o, float x, float y, float z)
+{
+    fiv_instance i;
+    i.occluder = o;
+    i.position[0] = x, i.position[1] = y, i.position[2] = z;
+    i.scale = 1;
+    return i;
+}
+
+/* A square of side * side receivers that look up, at height y. */
+static void test_plane(float *points, float *normals, int side, float width, float y)
+{
+    int i, j;
+    for (j = 0; j < side; j++)
+        for (i = 0; i < side; i++) {
+            float *p = points + 3 * (j * side + i), *n = normals + 3 * (j * side + i);
+            p[0] = width * (((float)i + 0.5f) / (float)side - 0.5f), p[1] = y;
+            p[2] = width * (((float)j + 0.5f) / (float)side - 0.5f);
+            n[0] = n[2] = 0, n[1] = 1;
+        }
+}
+
+typedef struct test_lights { float *directions, *powers; size_t count; } test_lights;
+
+static test_lights test_get_lights(const fiv_environment *e)
+{
+    test_lights l;
+    l.count = fiv_environment_lights(e, NULL, NULL, 0);
+    l.directions = (float *)malloc(3 * l.count * sizeof(float));
+    l.powers = (float *)malloc(3 * l.count * sizeof(float));
+    EXPECT_EQ(fiv_environment_lights(e, l.directions, l.powers, l.count), l.count);
+    return l;
+}
+
+static void test_free_lights(test_lights *l)
+{
+    free(l->directions);
+    free(l->powers);
+}
+
+static void test_truth(float *rgb, const reference_scene *s, const fiv_environment *e, const float *points, const float *normals, size_t count)
+{
+    test_lights l = test_get_lights(e);
+    size_t i;
+    for (i = 0; i < count; i++) {
+        double v[3];
+        reference_irradiance(v, s, l.directions, l.powers, l.count, points + 3 * i, normals + 3 * i);
+        rgb[3 * i] = (float)v[0], rgb[3 * i + 1] = (float)v[1], rgb[3 * i + 2] = (float)v[2];
+    }
+    test_free_lights(&l);
+}
+
+static double test_nrmse(const float *truth, const float *points, const float *normals, size_t count, const fiv_environment *e,
+                         const fiv_instance *instances, size_t n, fiv_accuracy accuracy)
+{
+    fiv_irradiance_options o = fiv_irradiance_defaults();
+    float *rgb = (float *)malloc(3 * count * sizeof(float));
+    double error;
+    o.accuracy = accuracy;
+    EXPECT_EQ(fiv_irradiance(rgb, points, normals, count, e, instances, n, &o, NULL), SAT_OK);
+    error = reference_nrmse(truth, rgb, count);
+    free(rgb);
+    return error;
+}
+
+static void test_random_unit(float n[3], uint64_t *seed)
+{
+    double z = 2 * support_uniform(seed) - 1, a = 6.283185307 * support_uniform(seed), r = sqrt(1 - z * z);
+    n[0] = (float)(r * cos(a)), n[1] = (float)z, n[2] = (float)(r * sin(a));
+}
+
+/* Rotation by `angle` about an axis. */
+static void test_rotation(float m[9], const float axis[3], double angle)
+{
+    double c = cos(angle), s = sin(angle), x = (double)axis[0], y = (double)axis[1], z = (double)axis[2];
+    m[0] = (float)(c + x * x * (1 - c)), m[1] = (float)(x * y * (1 - c) - z * s), m[2] = (float)(x * z * (1 - c) + y * s);
+    m[3] = (float)(y * x * (1 - c) + z * s), m[4] = (float)(c + y * y * (1 - c)), m[5] = (float)(y * z * (1 - c) - x * s);
+    m[6] = (float)(z * x * (1 - c) - y * s), m[7] = (float)(z * y * (1 - c) + x * s), m[8] = (float)(c + z * z * (1 - c));
+}
+
+/* ---- environments ---- */
+
+TEST(uniform_light)
+{
+    float white[2] = {1, 1}, normal[3], rgb[3], fiv[9];
+    sat_image image = sat_image_f32(white, 2, 1, 1);
+    fiv_environment *e = NULL;
+    fiv_environment_stats stats;
+    test_lights l;
+    uint64_t seed = 3;
+    double all = 0;
+    size_t i;
+    int k;
+    if (!EXPECT_EQ(fiv_environment_create(&e, &image, NULL, &stats), SAT_OK)) return;
+    EXPECT_EQ(stats.lights, 0);
+    for (k = 0; k < 50; k++) {
+        test_random_unit(normal, &seed);
+        fiv_environment_irradiance(e, rgb, normal);
+        EXPECT_REL(rgb[0], 3.14159265, 1e-3);
+        EXPECT_REL(rgb[2], 3.14159265, 1e-3);
+    }
+    fiv_environment_vector(e, fiv);
+    for (k = 0; k < 9; k++) EXPECT_NEAR(fiv[k], 0, 1e-5);
+    l = test_get_lights(e);
+    for (i = 0; i < l.count; i++) all += (double)l.powers[3 * i];
+    EXPECT_REL(all, 12.566370614359172, 1e-6);
+    test_free_lights(&l);
+    fiv_environment_destroy(e);
+}
+
+/* u = atan2(x, -z) / 2 pi + 1/2, v = acos(y) / pi. */
+TEST(orientation_of_the_image)
+{
+    static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    sat_image image = sat_image_f32(pixels, SKY_WIDTH, SKY_HEIGHT, 3);
+    int x = 100, y = 20, k;
+    double u = (x + 0.5) / SKY_WIDTH, v = (y + 0.5) / SKY_HEIGHT, a = 6.283185307179586 * (u - 0.5), b = 3.141592653589793 * v;
+    double d[3], solid = 6.283185307179586 / SKY_WIDTH * (cos(3.141592653589793 * y / SKY_HEIGHT) - cos(3.141592653589793 * (y + 1) / SKY_HEIGHT));
+    fiv_environment *e = NULL;
+    fiv_environment_stats stats;
+    float direction[3], power[3], normal[3], rgb[3];
+    memset(pixels, 0, sizeof pixels);
+    pixels[3 * (y * SKY_WIDTH + x)] = 1e8f, pixels[3 * (y * SKY_WIDTH + x) + 1] = 2e8f;
+    d[0] = sin(a) * sin(b), d[1] = cos(b), d[2] = -cos(a) * sin(b);
+    if (!EXPECT_EQ(fiv_environment_create(&e, &image, NULL, &stats), SAT_OK)) return;
+    EXPECT_EQ(stats.lights, 1);
+    EXPECT_NEAR(stats.light_share, 1, 1e-6);
+    fiv_environment_lights(e, direction, power, 1);
+    for (k = 0; k < 3; k++) EXPECT_NEAR(direction[k], d[k], 1e-3);
+    EXPECT_REL(power[0], 1e8 * solid, 1e-6);
+    EXPECT_REL(power[1], 2e8 * solid, 1e-6);
+    normal[0] = normal[2] = 0, normal[1] = 1;
+    fiv_environment_irradiance(e, rgb, normal);
+    EXPECT_REL(rgb[0], 1e8 * solid * (double)direction[1], 1e-6);
+    fiv_environment_destroy(e);
+}
+
+TEST(irradiance_is_the_sum_over_the_lights)
+{
+    fiv_environment *e = test_environment(300, 400);
+    test_lights l = test_get_lights(e);
+    uint64_t seed = 1;
+    int k, c, turned;
+    double worst = 0, scale = 0, vector[9];
+    float rotation[9], axis[3] = {0.6f, 0.8f, 0}, fiv[9];
+    size_t i;
+    for (turned = 0; turned < 2; turned++) {
+        if (turned) {
+            test_rotation(rotation, axis, 1.1);
+            EXPECT_EQ(fiv_environment_update(e, NULL, rotation), SAT_OK);
+            fiv_environment_lights(e, l.directions, l.powers, l.count);
+        }
+        for (k = 0; k < 100; k++) {
+            static const float origin[3] = {0, 0, 0};
+            float normal[3], rgb[3];
+            double truth[3];
+            test_random_unit(normal, &seed);
+            fiv_environment_irradiance(e, rgb, normal);
+            reference_irradiance(truth, NULL, l.directions, l.powers, l.count, origin, normal);
+            for (c = 0; c < 3; c++) {
+                double off = fabs((double)rgb[c] - truth[c]);
+                worst = off > worst ? off : worst;
+                scale = truth[c] > scale ? truth[c] : scale;
+            }
+        }
+        EXPECT_NEAR(worst / scale, 0, turned ? 4e-3 : 1.5e-3);
+        REPORT(turned ? "I_tot, turned: worst error" : "I_tot: worst error", worst / scale, "of the largest");
+        memset(vector, 0, sizeof vector);
+        for (i = 0; i < l.count; i++)
+            for (c = 0; c < 3; c++)
+                for (k = 0; k < 3; k++) vector[3 * c + k] += (double)l.powers[3 * i + (size_t)c] * (double)l.directions[3 * i + (size_t)k];
+        fiv_environment_vector(e, fiv);
+        for (k = 0; k < 9; k++) EXPECT_NEAR(fiv[k], vector[k], 1e-5 * scale);
+    }
+    test_free_lights(&l);
+    fiv_environment_destroy(e);
+}
+
+TEST(bad_pixels_are_counted)
+{
+    static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    sat_image image = test_sky(pixels, 0);
+    fiv_environment *e = NULL, *clean = NULL;
+    fiv_environment_stats stats;
+    fiv_environment_options o = fiv_environment_defaults();
+    float zero = 0, up[3] = {0, 1, 0}, rgb[3], same[3];
+    o.delta_ratio = 0;
+    o.max_radiance = 50;
+    pixels[10] = pixels[11] = 0, pixels[400] = 0, pixels[3000] = 50;
+    EXPECT_EQ(fiv_environment_create(&clean, &image, &o, NULL), SAT_OK);
+    pixels[10] = zero / zero;
+    pixels[11] = -zero / zero;
+    pixels[400] = -3;
+    pixels[3000] = 1 / zero;
+    if (!EXPECT_EQ(fiv_environment_create(&e, &image, &o, &stats), SAT_OK)) return;
+    EXPECT_EQ(stats.nan, 2);
+    EXPECT_EQ(stats.negative, 1);
+    EXPECT_EQ(stats.clamped, 1);
+    fiv_environment_irradiance(e, rgb, up);
+    fiv_environment_irradiance(clean, same, up);
+    EXPECT(memcmp(rgb, same, sizeof rgb) == 0);
+    fiv_environment_destroy(e);
+    fiv_environment_destroy(clean);
+}
+
+/* A sun of 1e8 on one texel: split off or not, no sum may lose what lies beside it. */
+TEST(sun_of_1e8)
+{
+    reference_mesh m = test_knot();
+    fiv_occluder_options options = test_small_set();
+    fiv_environment *e = test_environment(1e8f, 0);
+    fiv_occluder *o = test_occluder(&m, &options, NULL);
+    size_t i, s;
+    double worst = 0;
+    EXPECT_EQ(fiv_occluder_light(o, e, NULL), SAT_OK);
+    for (s = 0; s < o->stats.samples; s += 13) {
+        uint64_t rows[FIV__MAX_ROWS];
+        double truth[9], sum[FIV__TERMS], largest = 0;
+        int k;
+        memset(truth, 0, sizeof truth);
+        fiv__decode(rows, o->words + o->first[s], o->first[s + 1] - o->first[s], 6 * 32);
+        for (i = 0; i < 6 * 32 * 32; i++) {
+            const double *p = o->sums + (i / 32 * 33 + i % 32) * FIV__TERMS;
+            float d[3];
+            int c;
+            if (!(rows[i / 32] >> (i % 32) & 1)) continue;
+            (void)p;
+            fiv__cube_direction(d, (int)(i / 1024), fiv__texel_coordinate((int)(i % 32), 32), fiv__texel_coordinate((int)(i / 32 % 32), 32));
+            fiv__normalise(d, d);
+            for (c = 0; c < 3; c++)
+                for (k = 0; k < 3; k++)
+                    truth[3 * c + k] += (double)e->radiance[3 * i + (size_t)c] * fiv__texel_angle((int)(i % 32), (int)(i / 32 % 32), 32) * (double)d[k];
+        }
+        fiv__integrate(sum, o->sums, o->words + o->first[s], o->first[s + 1] - o->first[s], 32);
+        for (k = 0; k < 9; k++) largest = fabs(truth[k]) > largest ? fabs(truth[k]) : largest;
+        for (k = 0; k < 9; k++)
+            if (largest > 0 && fabs(sum[k] - truth[k]) / largest > worst) worst = fabs(sum[k] - truth[k]) / largest;
+    }
+    REPORT("sun of 1e8 in the cube: worst relative error of a vector", worst, "");
+    EXPECT_NEAR(worst, 0, 1e-6);
+    fiv_occluder_destroy(o);
+    fiv_environment_destroy(e);
+    reference_mesh_free(&m);
+}
+
+/* ---- masks ---- */
+
+/* Texels of a mask that differ from rays; *set counts those that rays set. */
+static int test_mask_errors(const fiv_occluder *lazy, const reference_scene *s, const float offset[3], int size, int *set)
+{
+    uint64_t rows[FIV__MAX_ROWS];
+    double origin[3], d[3];
+    float direction[3];
+    int row, x, k, wrong = 0;
+    fiv__raster_mesh(rows, &lazy->mesh, offset, size);
+    for (k = 0; k < 3; k++) origin[k] = -(double)offset[k];
+    for (row = 0; row < 6 * size; row++)
+        for (x = 0; x < size; x++) {
+            int hit;
+            fiv__cube_direction(direction, row / size, fiv__texel_coordinate(x, size), fiv__texel_coordinate(row % size, size));
+            for (k = 0; k < 3; k++) d[k] = (double)direction[k];
+            hit = reference_occluded(s, origin, d);
+            wrong += hit != (int)(rows[row] >> x & 1);
+            *set += hit;
+        }
+    return wrong;
+}
+
+/* Masks seen from far, near, inside and within the tube; flip: clockwise triangles; open: every seventh triangle is missing. */
+static void test_masks_of(const reference_mesh *m, int size, int flip, int open, int closed)
+{
+    static const float offsets[][3] = {{0, 0, 3}, {1.1f, 0.4f, -0.3f}, {0.2f, 0.1f, 0.3f}, {0.013f, 0.007f, -0.005f}, {0.5f, -0.7f, 0.1f}, {-40, 3, 20}, {0.62f, 0, 0.02f}};
+    static const float no_move[3] = {0, 0, 0};
+    fiv_occluder_options o = test_small_set();
+    fiv_occluder *lazy;
+    fiv_occluder_stats stats;
+    reference_scene s;
+    unsigned *index = (unsigned *)malloc(3 * m->triangles * sizeof *index);
+    size_t t, n = 0, i;
+    int wrong = 0, set = 0;
+    reference_mesh part = *m, unit = *m;
+    for (t = 0; t < m->triangles; t++) {
+        if (open && t % 7 == 3) continue;
+        index[3 * n] = m->indices[3 * t], index[3 * n + 1] = m->indices[3 * t + (flip ? 2 : 1)];
+        index[3 * n++ + 2] = m->indices[3 * t + (flip ? 1 : 2)];
+    }
+    part.indices = index;
+    part.triangles = n;
+    o.keep_masks = 0;
+    o.lazy = 1;
+    o.face = size;
+    lazy = test_occluder(&part, &o, &stats);
+    EXPECT_EQ(stats.closed, closed);
+    EXPECT_EQ(stats.triangles, n);
+    unit.positions = (float *)malloc(3 * m->vertices * sizeof(float));
+    for (i = 0; i < 3 * m->vertices; i++)
+        unit.positions[i] = (float)(((double)m->positions[i] - (double)stats.centre[i % 3]) / (double)stats.radius);
+    memset(&s, 0, sizeof s);
+    reference_add(&s, unit.positions, index, n, NULL, no_move, 1);
+    reference_build(&s);
+    for (i = 0; i < sizeof offsets / sizeof *offsets; i++) wrong += test_mask_errors(lazy, &s, offsets[i], size, &set);
+    EXPECT(set > 100);
+    EXPECT_NEAR(wrong, 0, set * 1e-5);
+    reference_free(&s);
+    fiv_occluder_destroy(lazy);
+    free(unit.positions);
+    free(index);
+}
+
+TEST(masks_equal_rays)
+{
+    reference_mesh knot = test_knot(), box = reference_box(0.4f, 0.3f, 0.7f), fine = reference_knot(3, 2, 150, 10, 0.2);
+    test_masks_of(&knot, 32, 0, 0, 1);
+    test_masks_of(&knot, 32, 1, 0, 1);
+    test_masks_of(&knot, 32, 0, 1, 0);
+    test_masks_of(&knot, 64, 0, 0, 1);
+    test_masks_of(&knot, 8, 0, 0, 1);
+    test_masks_of(&box, 32, 0, 0, 1);
+    test_masks_of(&box, 27, 1, 1, 0);
+    test_masks_of(&fine, 32, 0, 0, 1);
+    reference_mesh_free(&knot);
+    reference_mesh_free(&box);
+    reference_mesh_free(&fine);
+}
+
+TEST(spans_hold_any_mask)
+{
+    uint64_t seed = 5, rows[FIV__MAX_ROWS], back[FIV__MAX_ROWS];
+    uint16_t words[FIV__MAX_WORDS];
+    int size, kind, row;
+    for (size = 8; size <= 64; size += 8)
+        for (kind = 0; kind < 6; kind++) {
+            uint64_t full = size == 64 ? ~(uint64_t)0 : ((uint64_t)1 << size) - 1;
+            size_t n;
+            for (row = 0; row < 6 * size; row++) {
+                uint64_t noise = support_random(&seed);
+                rows[row] = full & (kind == 0 ? 0 : kind == 1 ? full : kind == 2 ? noise : kind == 3 ? 0x5555555555555555u
+                                    : kind == 4 ? (row % 40 == 39 ? noise : 0) : noise & noise << 1 & noise << 2);
+            }
+            n = fiv__encode(words, rows, 6 * size);
+            EXPECT(n <= FIV__MAX_WORDS);
+            fiv__decode(back, words, n, 6 * size);
+            EXPECT(memcmp(rows, back, (size_t)(6 * size) * sizeof *rows) == 0);
+        }
+}
+
+/* FIV(mask) + FIV(not mask) = FIV(everything). */
+TEST(mask_and_complement_make_the_whole)
+{
+    fiv_environment *e = test_environment(0, 400);
+    uint64_t seed = 9, rows[FIV__MAX_ROWS];
+    uint16_t words[FIV__MAX_WORDS];
+    int round, row, k;
+    for (round = 0; round < 10; round++) {
+        double a[FIV__TERMS], b[FIV__TERMS];
+        for (row = 0; row < 192; row++) rows[row] = support_random(&seed) & 0xffffffffu;
+        fiv__integrate(a, e->sums, words, fiv__encode(words, rows, 192), 32);
+        for (row = 0; row < 192; row++) rows[row] ^= 0xffffffffu;
+        fiv__integrate(b, e->sums, words, fiv__encode(words, rows, 192), 32);
+        for (k = 0; k < 9; k++) EXPECT_NEAR(a[k] + b[k], e->vector[k], 1e-6 * e->flux[0]);
+        EXPECT_REL(a[9] + b[9], 12.566370614359172, 1e-12);
+    }
+    fiv_environment_destroy(e);
+}
+
+/* ---- receivers ---- */
+
+typedef struct test_scene {
+    reference_mesh mesh;
+    fiv_environment *environment;
+    fiv_occluder *occluder;
+    fiv_occluder_stats stats;
+    reference_scene truth;
+} test_scene;
+
+/* The knot at a position, twice when `second` is given, lit and with its ground truth. */
+static void test_open_scene(test_scene *s, float sun, const fiv_occluder_options *options, const float *first, const float *second)
+{
+    memset(s, 0, sizeof *s);
+    s->mesh = test_knot();
+    s->environment = test_environment(sun, 400);
+    s->occluder = test_occluder(&s->mesh, options, &s->stats);
+    EXPECT_EQ(fiv_occluder_light(s->occluder, s->environment, NULL), SAT_OK);
+    reference_add(&s->truth, s->mesh.positions, s->mesh.indices, s->mesh.triangles, NULL, first, 1);
+    if (second) reference_add(&s->truth, s->mesh.positions, s->mesh.indices, s->mesh.triangles, NULL, second, 1);
+    reference_build(&s->truth);
+}
+
+static void test_close_scene(test_scene *s)
+{
+    reference_free(&s->truth);
+    fiv_occluder_destroy(s->occluder);
+    fiv_environment_destroy(s->environment);
+    reference_mesh_free(&s->mesh);
+}
+
+enum { SIDE = 24, COUNT = SIDE * SIDE };
+
+/* The knot stands on the plane, as the bunny in figure 18. */
+TEST(shadow_on_a_plane)
+{
+    static const float where[3] = {0, 0.66f, 0};
+    static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT];
+    static const float suns[2] = {0, 2000};
+    int i;
+    for (i = 0; i < 2; i++) {
+        test_scene s;
+        fiv_instance instance;
+        double error[4];
+        int a;
+        test_open_scene(&s, suns[i], NULL, where, NULL);
+        instance = test_instance(s.occluder, where[0], where[1], where[2]);
+        test_plane(points, normals, SIDE, 6, 0);
+        test_truth(truth, &s.truth, s.environment, points, normals, COUNT);
+        for (a = 0; a < 4; a++) {
+            error[a] = test_nrmse(truth, points, normals, COUNT, s.environment, &instance, 1, (fiv_accuracy)a);
+            REPORT(a == 0 ? "plane: nearest" : a == 1 ? "plane: trilinear" : a == 2 ? "plane: scaled" : "plane: masks", error[a], "NRMSE");
+        }
+        EXPECT(error[2] < (i ? 0.06 : 0.02));
+        EXPECT(error[2] < error[1] && error[1] < error[0]);
+        EXPECT(error[3] < (i ? 0.06 : 0.02));
+        test_close_scene(&s);
+    }
+}
+
+/* One point light: the shadow is a step in space (figure 19, left: 0.1). */
+TEST(point_light)
+{
+    static const float where[3] = {0, 0.9f, 0};
+    static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT], pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    sat_image image = sat_image_f32(pixels, SKY_WIDTH, SKY_HEIGHT, 3);
+    test_scene s;
+    fiv_instance instance;
+    double error;
+    int c;
+    test_open_scene(&s, 0, NULL, where, NULL);
+    memset(pixels, 0, sizeof pixels);
+    for (c = 0; c < 3; c++) pixels[3 * (12 * SKY_WIDTH + 50) + c] = 1000;
+    EXPECT_EQ(fiv_environment_update(s.environment, &image, NULL), SAT_OK);
+    EXPECT_EQ(fiv_environment_get_stats(s.environment).lights, 1);
+    EXPECT_EQ(fiv_occluder_light(s.occluder, s.environment, NULL), SAT_OK);
+    instance = test_instance(s.occluder, where[0], where[1], where[2]);
+    test_plane(points, normals, SIDE, 5, 0);
+    test_truth(truth, &s.truth, s.environment, points, normals, COUNT);
+    error = test_nrmse(truth, points, normals, COUNT, s.environment, &instance, 1, FIV_SCALED);
+    REPORT("point light through a thin knot, 32x17x15", error, "NRMSE");
+    EXPECT(error < 0.16);
+    test_close_scene(&s);
+}
+
+/* What a horizon leaves of an occluder, d above it: against (d + R) / 2R. */
+TEST(partial_occluders)
+{
+    static const float origin[3] = {0, 0, 0}, heights[4] = {0.6f, 0.3f, 0, -0.4f};
+    fiv_occluder_options options = fiv_occluder_defaults();
+    test_scene s;
+    test_lights lights;
+    int h, i, k;
+    test_open_scene(&s, 0, &options, origin, NULL);
+    lights = test_get_lights(s.environment);
+    for (h = 0; h < 4; h++) {
+        double square[4] = {0, 0, 0, 0};
+        uint64_t seed = 17;
+        for (i = 0; i < 150; i++) {
+            float n[3], t[3], p[3], rgb[3], open[3], cosine;
+            double truth[3], r = (double)s.stats.radius * (1.3 + 1.5 * support_uniform(&seed));
+            fiv_instance instance = test_instance(s.occluder, 0, 0, 0);
+            int a;
+            test_random_unit(n, &seed);
+            test_random_unit(t, &seed);
+            cosine = fiv__dot(n, t);
+            for (k = 0; k < 3; k++) t[k] -= cosine * n[k];
+            fiv__normalise(t, t);
+            for (k = 0; k < 3; k++) p[k] = s.stats.centre[k] - (float)r * t[k] - heights[h] * s.stats.radius * n[k];
+            reference_irradiance(truth, &s.truth, lights.directions, lights.powers, lights.count, p, n);
+            fiv_environment_irradiance(s.environment, open, n);
+            for (a = 0; a < 4; a++) {
+                fiv_irradiance_options o = fiv_irradiance_defaults();
+                o.accuracy = (fiv_accuracy)a;
+                o.cutoff = 0;
+                if (a == 0) o.accuracy = FIV_TRILINEAR, o.partial = 0;
+                EXPECT_EQ(fiv_irradiance(rgb, p, n, 1, s.environment, &instance, 1, &o, NULL), SAT_OK);
+                for (k = 0; k < 3; k++) square[a] += pow(((double)rgb[k] - truth[k]) / (double)open[k], 2) / 450;
+            }
+        }
+        printf("partial d = %+.1f R: rmse of the fraction: uncorrected %.4f, (d + R) / 2R %.4f, cap %.4f, masks %.4f\n",
+               (double)heights[h], sqrt(square[0]), sqrt(square[1]), sqrt(square[2]), sqrt(square[3]));
+        if (h < 3) EXPECT(square[2] <= 0.25 * square[1]);
+        EXPECT(square[2] < square[1]);
+        EXPECT(square[3] < square[1]);
+    }
+    test_free_lights(&lights);
+    test_close_scene(&s);
+}
+
+TEST(two_occluders)
+{
+    static const float first[3] = {-0.6f, 0.7f, 0}, second[3] = {0.7f, 1.6f, 0.3f};
+    static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT];
+    fiv_occluder_options options = fiv_occluder_defaults();
+    fiv_instance instances[2];
+    test_scene s;
+    double error[4];
+    int a;
+    options.theta = 48, options.phi = 25, options.rho = 20;
+    test_open_scene(&s, 0, &options, first, second);
+    instances[0] = test_instance(s.occluder, first[0], first[1], first[2]);
+    instances[1] = test_instance(s.occluder, second[0], second[1], second[2]);
+    test_plane(points, normals, SIDE, 6, 0);
+    test_truth(truth, &s.truth, s.environment, points, normals, COUNT);
+    for (a = 0; a < 4; a++) {
+        error[a] = test_nrmse(truth, points, normals, COUNT, s.environment, instances, 2, (fiv_accuracy)a);
+        REPORT(a == 0 ? "two: nearest" : a == 1 ? "two: trilinear, eq 14-15" : a == 2 ? "two: scaled" : "two: masks", error[a], "NRMSE");
+    }
+    EXPECT(error[3] <= 0.5 * error[1]);
+    EXPECT(error[2] < error[1]);
+    test_close_scene(&s);
+}
+
+/* With the light, the occluder or both turned: as near to the truth as without. */
+TEST(turning_light_and_occluder)
+{
+    static const float where[3] = {0, 1.8f, 0};
+    static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT];
+    float axis[3] = {0.48f, 0.6f, 0.64f}, light_turn[9], mesh_turn[9];
+    int which;
+    test_rotation(light_turn, axis, 0.9);
+    test_rotation(mesh_turn, axis, -2.0);
+    test_plane(points, normals, SIDE, 6, 0);
+    for (which = 1; which < 4; which++) {
+        test_scene s;
+        fiv_instance instance;
+        double error;
+        test_open_scene(&s, 0, NULL, where, NULL);
+        reference_free(&s.truth);
+        reference_add(&s.truth, s.mesh.positions, s.mesh.indices, s.mesh.triangles, which & 2 ? mesh_turn : NULL, where, 1);
+        reference_build(&s.truth);
+        EXPECT_EQ(fiv_environment_update(s.environment, NULL, which & 1 ? light_turn : NULL), SAT_OK);
+        EXPECT_EQ(fiv_occluder_light(s.occluder, s.environment, which & 2 ? mesh_turn : NULL), SAT_OK);
+        instance = test_instance(s.occluder, where[0], where[1], where[2]);
+        test_truth(truth, &s.truth, s.environment, points, normals, COUNT);
+        error = test_nrmse(truth, points, normals, COUNT, s.environment, &instance, 1, FIV_SCALED);
+        REPORT(which == 1 ? "light turned" : which == 2 ? "occluder turned" : "both turned", error, "NRMSE");
+        EXPECT(error < 0.02);
+        error = test_nrmse(truth, points, normals, COUNT, s.environment, &instance, 1, FIV_MASK);
+        EXPECT(error < 0.02);
+        test_close_scene(&s);
+    }
+}
+
+/* Light, occluder and receivers turned together: nothing changes but the cube's orientation. */
+TEST(turning_everything)
+{
+    static const float where[3] = {0, 0.8f, 0};
+    static float points[3 * COUNT], normals[3 * COUNT], before[3 * COUNT], after[3 * COUNT];
+    float axis[3] = {0.48f, 0.6f, 0.64f}, turn[9], moved[3];
+    fiv_instance instance;
+    test_scene s;
+    int a, i;
+    test_rotation(turn, axis, 1.3);
+    for (a = 1; a < 4; a++) {
+        fiv_irradiance_options o = fiv_irradiance_defaults();
+        o.accuracy = (fiv_accuracy)a;
+        test_open_scene(&s, 3000, NULL, where, NULL);
+        test_plane(points, normals, SIDE, 6, 0);
+        instance = test_instance(s.occluder, where[0], where[1], where[2]);
+        EXPECT_EQ(fiv_irradiance(before, points, normals, COUNT, s.environment, &instance, 1, &o, NULL), SAT_OK);
+        EXPECT_EQ(fiv_environment_update(s.environment, NULL, turn), SAT_OK);
+        EXPECT_EQ(fiv_occluder_light(s.occluder, s.environment, turn), SAT_OK);
+        for (i = 0; i < COUNT; i++) {
+            fiv__turn(points + 3 * i, turn, points + 3 * i);
+            fiv__turn(normals + 3 * i, turn, normals + 3 * i);
+        }
+        fiv__turn(moved, turn, where);
+        instance = test_instance(s.occluder, moved[0], moved[1], moved[2]);
+        EXPECT_EQ(fiv_irradiance(after, points, normals, COUNT, s.environment, &instance, 1, &o, NULL), SAT_OK);
+        EXPECT(reference_nrmse(before, after, COUNT) < 0.004);
+        REPORT("everything turned: difference", reference_nrmse(before, after, COUNT), "NRMSE");
+        test_close_scene(&s);
+    }
+}
+
+/* Vectors of a turned occluder against those of a turned mesh, as a root mean square over samples. */
+TEST(turned_vectors)
+{
+    static const float suns[2] = {0, 3000};
+    float axis[3] = {0.6f, 0, 0.8f}, turn[9];
+    int i;
+    test_rotation(turn, axis, 0.7);
+    for (i = 0; i < 2; i++) {
+        reference_mesh m = test_knot(), turned = test_knot();
+        fiv_environment *e = test_environment(suns[i], 400);
+        fiv_occluder_options options = test_small_set();
+        fiv_occluder *a, *b;
+        double off = 0, all = 0;
+        size_t v;
+        uint64_t seed = 2;
+        int k, n;
+        for (v = 0; v < m.vertices; v++) fiv__turn(turned.positions + 3 * v, turn, m.positions + 3 * v);
+        options.keep_masks = 0;
+        options.lazy = 1;
+        a = test_occluder(&m, &options, NULL);
+        b = test_occluder(&turned, &options, NULL);
+        fiv_occluder_light(a, e, turn);
+        fiv_occluder_light(b, e, NULL);
+        for (n = 0; n < 100; n++) {
+            uint64_t rows[FIV__MAX_ROWS];
+            uint16_t words[FIV__MAX_WORDS];
+            float offset[3], world[3], got[3];
+            double x[FIV__TERMS], y[FIV__TERMS], part[3];
+            test_random_unit(offset, &seed);
+            for (k = 0; k < 3; k++) offset[k] *= 1.2f + 2 * (float)n / 100;
+            fiv__turn(world, turn, offset);
+            fiv__raster_mesh(rows, &a->mesh, offset, 32);
+            fiv__integrate(x, a->sums, words, fiv__encode(words, rows, 192), 32);
+            fiv__raster_mesh(rows, &b->mesh, world, 32);
+            fiv__integrate(y, b->sums, words, fiv__encode(words, rows, 192), 32);
+            for (k = 0; k < 9; k++) {
+                if (k % 3 == 0) {
+                    int j;
+                    for (j = 0; j < 3; j++) got[j] = (float)x[k + j];
+                    fiv__turn(got, turn, got);
+                    for (j = 0; j < 3; j++) part[j] = (double)got[j];
+                }
+                off += pow(part[k % 3] - y[k], 2);
+                all += y[k] * y[k];
+            }
+        }
+        REPORT(i ? "turned vectors, sun split off" : "turned vectors", sqrt(off / all), "relative rms");
+        EXPECT(sqrt(off / all) < 0.04 + 0.01 * i);
+        fiv_occluder_destroy(a);
+        fiv_occluder_destroy(b);
+        fiv_environment_destroy(e);
+        reference_mesh_free(&m);
+        reference_mesh_free(&turned);
+    }
+}
+
+/* Any order of 2 to 8 occluders: the same bits; in 0 .. I_tot. */
+TEST(order_of_occluders)
+{
+    static float points[3 * COUNT], normals[3 * COUNT], rgb[2][3 * COUNT];
+    static const float origin[3] = {0, 0, 0};
+    fiv_occluder_options options = test_small_set();
+    fiv_instance instances[8], shuffled[8];
+    fiv_occluder *turned = NULL;
+    test_scene s;
+    float axis[3] = {1, 0, 0}, turn[9];
+    uint64_t seed = 11;
+    int n, a, i, k;
+    test_open_scene(&s, 2000, &options, origin, NULL);
+    test_rotation(turn, axis, 0.8);
+    EXPECT_EQ(fiv_occluder_share(&turned, s.occluder), SAT_OK);
+    EXPECT_EQ(fiv_occluder_light(turned, s.environment, turn), SAT_OK);
+    test_plane(points, normals, SIDE, 6, 0);
+    for (i = 0; i < COUNT; i++) test_random_unit(normals + 3 * i, &seed);
+    for (i = 0; i < 8; i++) {
+        instances[i] = test_instance(i % 3 == 1 ? turned : s.occluder, 4 * (float)support_uniform(&seed) - 2,
+                                     2 * (float)support_uniform(&seed), 4 * (float)support_uniform(&seed) - 2);
+        instances[i].scale = 0.5f + (float)support_uniform(&seed);
+    }
+    for (a = 0; a < 4; a++)
+        for (n = 2; n <= 8; n += a == 3 ? 3 : 1) {
+            fiv_irradiance_options o = fiv_irradiance_defaults();
+            fiv_irradiance_stats stats;
+            o.accuracy = (fiv_accuracy)a;
+            EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, a == 3 ? 100 : COUNT, s.environment, instances, (size_t)n, &o, &stats), SAT_OK);
+            EXPECT(stats.overlaps > 0);
+            memcpy(shuffled, instances, sizeof shuffled);
+            for (i = n - 1; i > 0; i--) {
+                fiv_instance swap = shuffled[i];
+                k = support_below(&seed, i + 1);
+                shuffled[i] = shuffled[k];
+                shuffled[k] = swap;
+            }
+            EXPECT_EQ(fiv_irradiance(rgb[1], points, normals, a == 3 ? 100 : COUNT, s.environment, shuffled, (size_t)n, &o, NULL), SAT_OK);
+            EXPECT(memcmp(rgb[0], rgb[1], (a == 3 ? 300 : 3 * COUNT) * sizeof(float)) == 0);
+            for (i = 0; i < (a == 3 ? 100 : COUNT); i++) {
+                float open[3];
+                fiv_environment_irradiance(s.environment, open, normals + 3 * i);
+                for (k = 0; k < 3; k++) EXPECT(rgb[0][3 * i + k] >= 0 && rgb[0][3 * i + k] <= open[k] * 1.00001f);
+            }
+        }
+    fiv_occluder_destroy(turned);
+    test_close_scene(&s);
+}
+
+/* Copies of one occluder in one place darken as much as one. */
+TEST(copies_count_once)
+{
+    static float points[3 * COUNT], normals[3 * COUNT], one[3 * COUNT], three[3 * COUNT];
+    static const float where[3] = {0, 0.9f, 0};
+    fiv_occluder_options options = test_small_set();
+    fiv_instance instances[3];
+    test_scene s;
+    int a, i;
+    test_open_scene(&s, 2000, &options, where, NULL);
+    test_plane(points, normals, SIDE, 6, 0);
+    for (i = 0; i < 3; i++) instances[i] = test_instance(s.occluder, where[0], where[1], where[2]);
+    for (a = 2; a < 4; a++) {
+        fiv_irradiance_options o = fiv_irradiance_defaults();
+        o.accuracy = (fiv_accuracy)a;
+        fiv_irradiance(one, points, normals, COUNT, s.environment, instances, 1, &o, NULL);
+        fiv_irradiance(three, points, normals, COUNT, s.environment, instances, 3, &o, NULL);
+        for (i = 0; i < 3 * COUNT; i++) EXPECT_REL(three[i], one[i], 1e-6);
+    }
+    test_close_scene(&s);
+}
+
+#ifndef FIV_NO_SELF
+/* Points on the mesh itself, against rays that start a hair above it. */
+TEST(self_shadows)
+{
+    static const float origin[3] = {0, 0, 0};
+    static float points[3 * 640], normals[3 * 640], truth[3 * 640], rgb[3 * 640];
+    fiv_occluder_options options = fiv_occluder_defaults();
+    fiv_instance self;
+    test_scene s;
+    size_t t;
+    int a, k, j;
+    test_open_scene(&s, 0, &options, origin, NULL);
+    self = test_instance(s.occluder, 0, 0, 0);
+    for (t = 0; t < s.mesh.triangles; t++) {
+        float *p = points + 3 * t, *n = normals + 3 * t, corner[3][3], e[2][3];
+        for (j = 0; j < 3; j++) memcpy(corner[j], s.mesh.positions + 3 * (size_t)s.mesh.indices[3 * t + (size_t)j], sizeof corner[j]);
+        for (k = 0; k < 3; k++) e[0][k] = corner[1][k] - corner[0][k], e[1][k] = corner[2][k] - corner[0][k];
+        for (k = 0; k < 3; k++) n[k] = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
+        fiv__normalise(n, n);
+        for (k = 0; k < 3; k++) n[k] *= s.occluder->mesh.turn;
+        for (k = 0; k < 3; k++) p[k] = (corner[0][k] + corner[1][k] + corner[2][k]) / 3 + 1e-4f * n[k];
+    }
+    test_truth(truth, &s.truth, s.environment, points, normals, s.mesh.triangles);
+    for (a = 1; a < 4; a++) {
+        fiv_irradiance_options o = fiv_irradiance_defaults();
+        double error, open = 0;
+        static float unshadowed[3 * 640];
+        o.accuracy = (fiv_accuracy)a;
+        EXPECT_EQ(fiv_self_irradiance(rgb, points, normals, s.mesh.triangles, s.environment, &self, NULL, 0, &o, NULL), SAT_OK);
+        for (t = 0; t < s.mesh.triangles; t++) fiv_environment_irradiance(s.environment, unshadowed + 3 * t, normals + 3 * t);
+        error = reference_nrmse(truth, rgb, s.mesh.triangles);
+        open = reference_nrmse(truth, unshadowed, s.mesh.triangles);
+        REPORT("self: without shadows", open, "NRMSE");
+        REPORT(a == 1 ? "self: eq 13" : a == 2 ? "self: scaled" : "self: masks", error, "NRMSE");
+        EXPECT(error < 0.7 * open);
+        for (t = 0; t < 3 * s.mesh.triangles; t++) EXPECT(rgb[t] >= 0 && rgb[t] <= unshadowed[t] * 1.001f);
+    }
+    test_close_scene(&s);
+}
+#endif
+
+/* ---- storage ---- */
+
+/* Of the lights there are; the rest of the memory is not written. */
+static int test_same_distances(const fiv_occluder *a, const fiv_occluder *b)
+{
+    size_t i;
+    for (i = 0; i < a->stats.samples; i++)
+        if (memcmp(a->distance + i * (size_t)a->max_lights, b->distance + i * (size_t)b->max_lights, (size_t)a->light_count)) return 0;
+    return a->light_count > 0 && a->light_count == b->light_count;
+}
+
+
+TEST(half_octahedral_storage)
+{
+    static const float where[3] = {0, 0.8f, 0};
+    static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT];
+    fiv_occluder_options options = fiv_occluder_defaults();
+    fiv_occluder_stats small;
+    fiv_instance instance;
+    test_scene s;
+    double published, error;
+    options.theta = 64, options.phi = 33, options.rho = 15;
+    options.max_lights = 0;
+    test_open_scene(&s, 0, &options, where, NULL);
+    instance = test_instance(s.occluder, where[0], where[1], where[2]);
+    test_plane(points, normals, SIDE, 6, 0);
+    test_truth(truth, &s.truth, s.environment, points, normals, COUNT);
+    published = test_nrmse(truth, points, normals, COUNT, s.environment, &instance, 1, FIV_SCALED);
+    fiv_occluder_destroy(s.occluder);
+    options.storage = FIV_STORAGE_HALF_OCTAHEDRAL;
+    s.occluder = test_occluder(&s.mesh, &options, &small);
+    EXPECT_EQ(fiv_occluder_light(s.occluder, s.environment, NULL), SAT_OK);
+    instance.occluder = s.occluder;
+    error = test_nrmse(truth, points, normals, COUNT, s.environment, &instance, 1, FIV_SCALED);
+    REPORT("longitude-latitude floats", published, "NRMSE");
+    REPORT("octahedral half floats", error, "NRMSE");
+    REPORT("memory of the vectors over the published", (double)small.table_bytes / (36.0 * 64 * 33 * 15), "");
+    EXPECT(error <= 1.1 * published);
+    EXPECT((double)small.table_bytes <= 0.3 * 36.0 * 64 * 33 * 15);
+    test_close_scene(&s);
+}
+
+/* Every direction's cell: weights sum to one, and the eight offsets surround the point; also across seams and poles. */
+TEST(cells_surround_their_point)
+{
+    uint64_t seed = 4;
+    int octahedral, i, k, q;
+    for (octahedral = 0; octahedral < 2; octahedral++) {
+        fiv_occluder o;
+        fiv_occluder_options options = fiv_occluder_defaults();
+        options.storage = octahedral ? FIV_STORAGE_HALF_OCTAHEDRAL : FIV_STORAGE_FLOAT;
+        memset(&o, 0, sizeof o);
+        fiv__set_grid(&o, &options);
+        for (i = 0; i < 2000; i++) {
+            float c[3], sum = 0, mean[3] = {0, 0, 0}, reach = 0.31f + 5.6f * (float)support_uniform(&seed);
+            fiv__cell cell;
+            test_random_unit(c, &seed);
+            if (i % 5 == 0) c[2] = i % 10 ? 1e-7f : -1e-7f;
+            if (i % 7 == 0) c[0] = c[2] = i % 14 ? 0 : 1e-9f;
+            fiv__normalise(c, c);
+            for (k = 0; k < 3; k++) c[k] *= reach;
+            fiv__locate(&cell, &o.grid, c);
+            for (q = 0; q < 8; q++) {
+                float offset[3];
+                EXPECT(cell.index[q] < fiv__grid_samples(&o.grid));
+                EXPECT(cell.weight[q] >= 0 && cell.weight[q] <= 1);
+                fiv__sample_offset(offset, &o.grid, cell.index[q]);
+                sum += cell.weight[q];
+                for (k = 0; k < 3; k++) mean[k] += cell.weight[q] * offset[k];
+            }
+            EXPECT_NEAR(sum, 1, 1e-5);
+            for (k = 0; k < 3; k++) EXPECT_NEAR(mean[k], c[k], 0.035 * (double)reach);
+        }
+        for (i = 0; i < (int)fiv__grid_samples(&o.grid); i += 3) {
+            float a[3], b[3];
+            fiv__sample_offset(a, &o.grid, (size_t)i);
+            fiv__sample_offset(b, &o.grid, fiv__first_twin(&o.grid, (size_t)i));
+            for (k = 0; k < 3; k++) EXPECT_NEAR(a[k], b[k], 1e-6 * (double)o.grid.last);
+            EXPECT(fiv__first_twin(&o.grid, fiv__first_twin(&o.grid, (size_t)i)) == fiv__first_twin(&o.grid, (size_t)i));
+        }
+    }
+}
+
+#ifndef FIV_NO_MASKS
+TEST(save_and_load)
+{
+    reference_mesh m = test_knot();
+    fiv_occluder_options options = test_small_set();
+    fiv_environment *e = test_environment(2000, 400);
+    int storage;
+    options.rho = 4;
+    for (storage = 0; storage < 2; storage++) {
+        fiv_occluder *o, *back = NULL;
+        size_t size, i;
+        unsigned char *bytes;
+        options.storage = (fiv_storage)storage;
+        o = test_occluder(&m, &options, NULL);
+        size = fiv_occluder_save_size(o);
+        bytes = (unsigned char *)malloc(size + 1);
+        EXPECT_EQ(fiv_occluder_save(o, bytes, size - 1), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(fiv_occluder_save(o, bytes, size), SAT_OK);
+        EXPECT_EQ(fiv_occluder_load(&back, bytes, size, NULL), SAT_OK);
+        fiv_occluder_light(o, e, NULL);
+        EXPECT_EQ(fiv_occluder_light(back, e, NULL), SAT_OK);
+        if (storage) EXPECT(memcmp(o->half_table, back->half_table, o->stats.samples * FIV__TERMS * 2) == 0);
+        else EXPECT(memcmp(o->table, back->table, o->stats.samples * FIV__TERMS * 4) == 0);
+        EXPECT(test_same_distances(o, back));
+        EXPECT(memcmp(&o->stats.centre, &back->stats.centre, sizeof o->stats.centre) == 0);
+        fiv_occluder_destroy(back);
+        for (i = 0; i < size; i += i < 200 ? 1 : size / 150) {
+            EXPECT_EQ(fiv_occluder_load(&back, bytes, i, NULL), SAT_ERR_DATA);
+            bytes[i] ^= 0x10;
+            EXPECT_EQ(fiv_occluder_load(&back, bytes, size, NULL), SAT_ERR_DATA);
+            EXPECT(back == NULL);
+            bytes[i] ^= 0x10;
+        }
+        EXPECT_EQ(fiv_occluder_load(&back, bytes, size + 1, NULL), SAT_ERR_DATA);
+        free(bytes);
+        fiv_occluder_destroy(o);
+    }
+    fiv_environment_destroy(e);
+    reference_mesh_free(&m);
+}
+
+/* The hash is no protection against malice: words that pass it are still checked one by one. */
+TEST(forged_saves_are_refused)
+{
+    reference_mesh m = test_knot();
+    fiv_occluder_options options = test_small_set();
+    fiv_occluder *o, *back = NULL;
+    size_t size, i;
+    unsigned char *bytes;
+    uint64_t hash, seed = 1;
+    int refused = 0, k;
+    options.rho = 2;
+    options.face = 16;
+    o = test_occluder(&m, &options, NULL);
+    size = fiv_occluder_save_size(o);
+    bytes = (unsigned char *)malloc(size);
+    for (k = 0; k < 300; k++) {
+        sat_result result;
+        EXPECT_EQ(fiv_occluder_save(o, bytes, size), SAT_OK);
+        i = k < 100 ? 16 + (size_t)support_below(&seed, 100) : 16 + (size_t)support_below(&seed, (int)size - 16);
+        bytes[i] = (unsigned char)support_random(&seed);
+        hash = fiv__hash(bytes + 16, size - 16);
+        memcpy(bytes + 8, &hash, 8);
+        result = fiv_occluder_load(&back, bytes, size, NULL);
+        EXPECT(result == SAT_OK || result == SAT_ERR_DATA);
+        refused += result == SAT_ERR_DATA;
+        if (result == SAT_OK) {
+            fiv_environment *e = NULL;
+            float grey[2] = {1, 1};
+            sat_image image = sat_image_f32(grey, 2, 1, 1);
+            fiv_environment_options eo = fiv_environment_defaults();
+            eo.face = back->face;
+            EXPECT_EQ(fiv_environment_create(&e, &image, &eo, NULL), SAT_OK);
+            EXPECT_EQ(fiv_occluder_light(back, e, NULL), SAT_OK);
+            fiv_environment_destroy(e);
+        }
+        fiv_occluder_destroy(back);
+    }
+    EXPECT(refused > 50);
+    free(bytes);
+    fiv_occluder_destroy(o);
+    reference_mesh_free(&m);
+}
+#endif
+
+/* ---- lazy occluders ---- */
+
+TEST(lazy_samples)
+{
+    static const float where[3] = {0, 0.8f, 0};
+    static float points[3 * COUNT], normals[3 * COUNT], whole[3 * COUNT], lazy_rgb[3 * COUNT];
+    fiv_occluder_options options = fiv_occluder_defaults();
+    fiv_irradiance_stats stats;
+    fiv_instance instance;
+    fiv_occluder *lazy;
+    test_scene s;
+    size_t computed, again, v;
+    float *moved;
+    test_open_scene(&s, 2000, &options, where, NULL);
+    options.keep_masks = 0;
+    options.lazy = 1;
+    lazy = test_occluder(&s.mesh, &options, NULL);
+    EXPECT_EQ(fiv_occluder_light(lazy, s.environment, NULL), SAT_OK);
+    test_plane(points, normals, SIDE, 6, 0);
+    instance = test_instance(s.occluder, where[0], where[1], where[2]);
+    fiv_irradiance(whole, points, normals, COUNT, s.environment, &instance, 1, NULL, NULL);
+    instance.occluder = lazy;
+    fiv_irradiance(lazy_rgb, points, normals, COUNT, s.environment, &instance, 1, NULL, &stats);
+    EXPECT(stats.missing == stats.whole + stats.clipped && stats.missing > 0);
+    EXPECT_EQ(fiv_occluder_prepare(lazy, &instance, 1, points, COUNT, &computed), SAT_OK);
+    EXPECT_EQ(fiv_occluder_prepare(lazy, &instance, 1, points, COUNT, &again), SAT_OK);
+    EXPECT_EQ(again, 0);
+    fiv_irradiance(lazy_rgb, points, normals, COUNT, s.environment, &instance, 1, NULL, &stats);
+    EXPECT_EQ(stats.missing, 0);
+    EXPECT(memcmp(whole, lazy_rgb, sizeof whole) == 0);
+    REPORT("samples that a plane needs", (double)computed / (double)lazy->stats.samples, "of all");
+    EXPECT((double)computed <= 0.15 * (double)lazy->stats.samples);
+    /* the mesh shrinks: as if made so */
+    moved = (float *)malloc(3 * s.mesh.vertices * sizeof *moved);
+    for (v = 0; v < 3 * s.mesh.vertices; v++) moved[v] = s.mesh.positions[v] * (v % 3 == 1 ? 0.5f : 1.0f);
+    EXPECT_EQ(fiv_occluder_invalidate(lazy, moved), SAT_OK);
+    EXPECT_EQ(fiv_occluder_prepare(lazy, &instance, 1, points, COUNT, &computed), SAT_OK);
+    EXPECT(computed > 0);
+    fiv_irradiance(lazy_rgb, points, normals, COUNT, s.environment, &instance, 1, NULL, NULL);
+    fiv_occluder_destroy(s.occluder);
+    memcpy(s.mesh.positions, moved, 3 * s.mesh.vertices * sizeof *moved);
+    s.occluder = test_occluder(&s.mesh, NULL, NULL);
+    fiv_occluder_light(s.occluder, s.environment, NULL);
+    instance.occluder = s.occluder;
+    fiv_irradiance(whole, points, normals, COUNT, s.environment, &instance, 1, NULL, NULL);
+    EXPECT(memcmp(whole, lazy_rgb, sizeof whole) == 0);
+    free(moved);
+    fiv_occluder_destroy(lazy);
+    test_close_scene(&s);
+}
+
+/* keep_masks = 0 gives the same vectors as stored masks, for float and half storage. */
+TEST(without_stored_masks)
+{
+    reference_mesh m = test_knot();
+    fiv_environment *e = test_environment(2000, 400);
+    fiv_occluder_options options = test_small_set();
+    int storage;
+    for (storage = 0; storage < 2; storage++) {
+        fiv_occluder *a, *b;
+        options.storage = (fiv_storage)storage;
+        options.keep_masks = 1;
+        a = test_occluder(&m, &options, NULL);
+        options.keep_masks = 0;
+        b = test_occluder(&m, &options, NULL);
+        EXPECT_EQ(fiv_occluder_light(a, e, NULL), SAT_OK);
+        EXPECT_EQ(fiv_occluder_light(b, e, NULL), SAT_OK);
+        if (storage) EXPECT(memcmp(a->half_table, b->half_table, a->stats.samples * FIV__TERMS * 2) == 0);
+        else EXPECT(memcmp(a->table, b->table, a->stats.samples * FIV__TERMS * 4) == 0);
+        EXPECT(test_same_distances(a, b));
+        EXPECT(memcmp(a->state, b->state, a->stats.samples) == 0);
+        EXPECT_EQ(a->stats.inside, b->stats.inside);
+        fiv_occluder_destroy(a);
+        fiv_occluder_destroy(b);
+    }
+    fiv_environment_destroy(e);
+    reference_mesh_free(&m);
+}
+
+/* ---- extremes ---- */
+
+TEST(empty_and_degenerate_meshes)
+{
+    static const unsigned index[12] = {0, 1, 2, 0, 0, 1, 3, 1, 2, 4, 4, 4};
+    float positions[15] = {0, 0, 0, 1, 0, 0, 2, 0, 0, 0, 0, 0, 1, 1, 1}, zero = 0;
+    float point[3] = {0.5f, -1, 0.1f}, normal[3] = {0, 1, 0}, rgb[3], open[3];
+    fiv_environment *e = test_environment(2000, 400);
+    fiv_occluder_options options = test_small_set();
+    fiv_occluder *o = NULL;
+    fiv_occluder_stats stats;
+    fiv_instance instance;
+    int round;
+    positions[9] = zero / zero;
+    fiv_environment_irradiance(e, open, normal);
+    for (round = 0; round < 3; round++) { /* no triangle; one without area; all at one point */
+        if (round == 2) memset(positions, 0, sizeof positions);
+        EXPECT_EQ(fiv_occluder_create(&o, positions, 5, index, round == 0 ? 0 : 4, &options, &stats), SAT_OK);
+        EXPECT_EQ(stats.skipped_triangles, round == 0 ? 0 : round == 1 ? 3 : 2);
+        EXPECT_EQ(fiv_occluder_light(o, e, NULL), SAT_OK);
+        instance = test_instance(o, 0, 0, 0);
+        EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, e, &instance, 1, NULL, NULL), SAT_OK);
+        EXPECT(memcmp(rgb, open, sizeof rgb) == 0);
+        fiv_occluder_destroy(o);
+    }
+    EXPECT_EQ(fiv_occluder_create(&o, NULL, 0, NULL, 0, &options, &stats), SAT_OK);
+    fiv_occluder_destroy(o);
+    fiv_environment_destroy(e);
+}
+
+TEST(extreme_receivers)
+{
+    static const float origin[3] = {0, 0, 0};
+    fiv_occluder_options options = test_small_set();
+    fiv_irradiance_options io = fiv_irradiance_defaults();
+    fiv_irradiance_stats stats;
+    fiv_instance instance;
+    test_scene s;
+    float point[3], normal[3] = {0, 1, 0}, rgb[3], open[3], zero = 0;
+    int a, k;
+    test_open_scene(&s, 2000, &options, origin, NULL);
+    fiv_environment_irradiance(s.environment, open, normal);
+    for (a = 0; a < 4; a++) {
+        io.accuracy = (fiv_accuracy)a;
+        instance = test_instance(s.occluder, 0, 0, 0);
+        point[0] = 0, point[1] = -1e6f * s.stats.radius, point[2] = 0; /* 1e6 R away */
+        io.cutoff = 0;
+        EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, s.environment, &instance, 1, &io, &stats), SAT_OK);
+        for (k = 0; k < 3; k++) EXPECT_REL(rgb[k], open[k], 1e-6);
+        io.cutoff = 0.001f;
+        EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, s.environment, &instance, 1, &io, &stats), SAT_OK);
+        EXPECT_EQ(stats.below_cutoff, 1);
+        EXPECT(memcmp(rgb, open, sizeof rgb) == 0);
+        point[1] = 1e38f; /* offsets that overflow */
+        EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, s.environment, &instance, 1, &io, NULL), SAT_OK);
+        EXPECT(rgb[0] == open[0]);
+        memcpy(point, s.stats.centre, sizeof point); /* at the centre, on a vertex, inside the tube */
+        EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, s.environment, &instance, 1, &io, NULL), SAT_OK);
+        for (k = 0; k < 3; k++) EXPECT(rgb[k] >= 0 && rgb[k] <= open[k]);
+        memcpy(point, s.mesh.positions + 30, sizeof point);
+        EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, s.environment, &instance, 1, &io, NULL), SAT_OK);
+        for (k = 0; k < 3; k++) EXPECT(rgb[k] >= 0 && rgb[k] <= open[k]);
+        instance.scale = 0;
+        EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, s.environment, &instance, 1, &io, NULL), SAT_OK);
+        EXPECT(memcmp(rgb, open, sizeof rgb) == 0);
+        instance.scale = 1e-30f;
+        EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, s.environment, &instance, 1, &io, NULL), SAT_OK);
+        for (k = 0; k < 3; k++) EXPECT(rgb[k] >= 0 && rgb[k] <= open[k]);
+    }
+    instance = test_instance(s.occluder, 0, 0, 0);
+    normal[1] = 0; /* no normal: no light */
+    EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, s.environment, &instance, 1, NULL, &stats), SAT_OK);
+    EXPECT(rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0);
+    normal[1] = zero / zero;
+    EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, s.environment, &instance, 1, NULL, &stats), SAT_OK);
+    EXPECT_EQ(stats.non_finite, 1);
+    EXPECT(rgb[0] == 0);
+    normal[1] = 3e-30f; /* any length */
+    point[1] = -50;
+    EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, s.environment, NULL, 0, NULL, NULL), SAT_OK);
+    EXPECT_REL(rgb[1], open[1], 1e-6);
+    test_close_scene(&s);
+}
+
+/* All light is taken in a closed box, and inside flags tell. */
+TEST(inside_a_closed_box)
+{
+    reference_mesh box = reference_box(1, 1, 1);
+    fiv_environment *e = test_environment(2000, 400);
+    fiv_occluder_options options = test_small_set();
+    fiv_occluder_stats stats;
+    fiv_occluder *o;
+    fiv_instance instance;
+    float point[3] = {0.05f, 0.02f, 0}, normal[3] = {0.6f, 0.8f, 0}, rgb[3], open[3];
+    int a, k;
+    options.first_shell = 0.1f;
+    o = test_occluder(&box, &options, &stats);
+    EXPECT(stats.inside > 0 && stats.inside < stats.samples);
+    EXPECT_EQ(fiv_occluder_light(o, e, NULL), SAT_OK);
+    instance = test_instance(o, 0, 0, 0);
+    fiv_environment_irradiance(e, open, normal);
+    for (a = 0; a < 3; a++) {
+        fiv_irradiance_options io = fiv_irradiance_defaults();
+        io.accuracy = (fiv_accuracy)a;
+        io.partial = 0;
+        EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, e, &instance, 1, &io, NULL), SAT_OK);
+        for (k = 0; k < 3; k++) EXPECT(rgb[k] <= open[k]);
+    }
+    fiv_occluder_destroy(o);
+    fiv_environment_destroy(e);
+    reference_mesh_free(&box);
+}
+
+/* An occluder that is left out could not have taken more than the cutoff. */
+TEST(cutoff_is_a_bound)
+{
+    static float points[3 * COUNT], normals[3 * COUNT], all[3 * COUNT], some[3 * COUNT];
+    static const float where[3] = {0, 0.8f, 0};
+    fiv_occluder_options options = test_small_set();
+    fiv_irradiance_options io = fiv_irradiance_defaults();
+    fiv_irradiance_stats stats;
+    fiv_instance instance;
+    test_scene s;
+    int i;
+    test_open_scene(&s, 0, &options, where, NULL);
+    instance = test_instance(s.occluder, where[0], where[1], where[2]);
+    test_plane(points, normals, SIDE, 60, 0);
+    io.cutoff = 0;
+    fiv_irradiance(all, points, normals, COUNT, s.environment, &instance, 1, &io, NULL);
+    io.cutoff = 0.02f;
+    fiv_irradiance(some, points, normals, COUNT, s.environment, &instance, 1, &io, &stats);
+    EXPECT(stats.below_cutoff > COUNT / 4);
+    EXPECT_EQ(stats.below_cutoff + stats.whole + stats.clipped + stats.below_horizon, COUNT);
+    for (i = 0; i < 3 * COUNT; i++) {
+        float open[3];
+        fiv_environment_irradiance(s.environment, open, normals + i / 3 * 3);
+        EXPECT_NEAR(some[i], all[i], 0.0201 * (double)open[i % 3]);
+    }
+    test_close_scene(&s);
+}
+
+/* ---- promises ---- */
+
+TEST(same_bits_for_any_workers)
+{
+    static const float where[3] = {0, 0.8f, 0};
+    static const int counts[4] = {1, 2, 3, 7};
+    static float points[3 * COUNT], normals[3 * COUNT], rgb[3 * COUNT], first[3 * COUNT];
+    fiv_occluder_options options = test_small_set();
+    fiv_environment_options eo = fiv_environment_defaults();
+    static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    sat_image sky = test_sky(pixels, 2000);
+    reference_mesh m = test_knot();
+    int i, odd;
+    uint64_t hash = 0, table;
+    test_plane(points, normals, SIDE, 6, 0);
+    for (odd = 0; odd < 2; odd++)
+        for (i = 0; i < 4; i++) {
+            sat_threads threads = odd ? support_odd_threads(counts[i]) : support_threads(counts[i]);
+            fiv_environment *e = NULL;
+            fiv_occluder *o;
+            fiv_instance instance;
+            fiv_irradiance_options io = fiv_irradiance_defaults();
+            fiv_irradiance_stats stats;
+            options.threads = eo.threads = io.threads = threads;
+            io.accuracy = FIV_MASK;
+            EXPECT_EQ(fiv_environment_create(&e, &sky, &eo, NULL), SAT_OK);
+            o = test_occluder(&m, &options, NULL);
+            EXPECT_EQ(fiv_occluder_light(o, e, NULL), SAT_OK);
+            instance = test_instance(o, where[0], where[1], where[2]);
+            EXPECT_EQ(fiv_irradiance(rgb, points, normals, COUNT, e, &instance, 1, &io, &stats), SAT_OK);
+            EXPECT_EQ(stats.whole + stats.clipped + stats.below_horizon + stats.below_cutoff, COUNT);
+            table = support_hash(o->table, o->stats.samples * FIV__TERMS * sizeof(float));
+            table = support_hash_add(table, o->words, o->stats.spans * 2);
+            table = support_hash_add(table, e->irradiance, 18 * 33 * 33 * sizeof(float));
+            if (i == 0 && odd == 0) {
+                hash = table;
+                memcpy(first, rgb, sizeof first);
+            }
+            EXPECT(table == hash);
+            EXPECT(memcmp(first, rgb, sizeof first) == 0);
+            fiv_occluder_destroy(o);
+            fiv_environment_destroy(e);
+        }
+    reference_mesh_free(&m);
+}
+
+TEST(failing_allocators)
+{
+    static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    sat_image sky = test_sky(pixels, 2000);
+    reference_mesh m = test_knot();
+    int fail, kind;
+    for (kind = 0; kind < 2; kind++)
+        for (fail = 1; fail < 14; fail++) {
+            support_memory memory;
+            fiv_occluder_options options = test_small_set();
+            fiv_environment_options eo = fiv_environment_defaults();
+            fiv_environment *e = NULL;
+            fiv_occluder *o = NULL, *share = NULL;
+            options.rho = 2;
+            options.keep_masks = kind == 0;
+            options.allocator = eo.allocator = support_allocator(&memory);
+            memory.fail_at = fail;
+            if (fiv_environment_create(&e, &sky, &eo, NULL) != SAT_OK) EXPECT(e == NULL);
+            if (fiv_occluder_create(&o, m.positions, m.vertices, m.indices, m.triangles, &options, NULL) != SAT_OK) EXPECT(o == NULL);
+            if (o && kind == 0 && fiv_occluder_share(&share, o) != SAT_OK) EXPECT(share == NULL);
+            if (fail == 13) EXPECT(e && o);
+            fiv_occluder_destroy(share);
+            fiv_occluder_destroy(o);
+            fiv_environment_destroy(e);
+            EXPECT(support_memory_clean(&memory));
+        }
+    reference_mesh_free(&m);
+}
+
+TEST(no_allocation_per_frame)
+{
+    static float pixels[SKY_WIDTH * SKY_HEIGHT * 3], points[3 * COUNT], normals[3 * COUNT], rgb[3 * COUNT];
+    sat_image sky = test_sky(pixels, 2000);
+    reference_mesh m = test_knot();
+    support_memory memory;
+    fiv_occluder_options options = test_small_set();
+    fiv_environment_options eo = fiv_environment_defaults();
+    fiv_irradiance_options io = fiv_irradiance_defaults();
+    fiv_environment *e = NULL;
+    fiv_occluder *o = NULL, *lazy = NULL;
+    fiv_instance instance;
+    float turn[9], axis[3] = {0, 1, 0};
+    long calls;
+    int a;
+    options.allocator = eo.allocator = support_allocator(&memory);
+    EXPECT_EQ(fiv_environment_create(&e, &sky, &eo, NULL), SAT_OK);
+    EXPECT_EQ(memory.calls, 1);
+    o = test_occluder(&m, &options, NULL);
+    EXPECT_EQ(memory.live, 3);
+    options.keep_masks = 0, options.lazy = 1;
+    lazy = test_occluder(&m, &options, NULL);
+    calls = memory.calls;
+    test_plane(points, normals, SIDE, 6, -1);
+    test_rotation(turn, axis, 0.3);
+    EXPECT_EQ(fiv_environment_update(e, &sky, turn), SAT_OK);
+    EXPECT_EQ(fiv_occluder_light(o, e, turn), SAT_OK);
+    EXPECT_EQ(fiv_occluder_light(lazy, e, turn), SAT_OK);
+    instance = test_instance(lazy, 0, 0, 0);
+    EXPECT_EQ(fiv_occluder_invalidate(lazy, m.positions), SAT_OK);
+    EXPECT_EQ(fiv_occluder_prepare(lazy, &instance, 1, points, COUNT, NULL), SAT_OK);
+    instance.occluder = o;
+    for (a = 0; a < 4; a++) {
+        io.accuracy = (fiv_accuracy)a;
+        EXPECT_EQ(fiv_irradiance(rgb, points, normals, COUNT, e, &instance, 1, &io, NULL), SAT_OK);
+        EXPECT_EQ(fiv_self_irradiance(rgb, points, normals, COUNT, e, &instance, &instance, 1, &io, NULL), SAT_OK);
+    }
+    EXPECT_EQ(memory.calls, calls);
+    fiv_occluder_destroy(o);
+    fiv_occluder_destroy(lazy);
+    fiv_environment_destroy(e);
+    EXPECT(support_memory_clean(&memory));
+    reference_mesh_free(&m);
+}
+
+static int test_stop_at(float done, void *user)
+{
+    float *last = (float *)user;
+    EXPECT(done >= last[0]);
+    last[0] = done;
+    last[2] += 1;
+    return done >= last[1];
+}
+
+TEST(progress_and_cancelling)
+{
+    reference_mesh m = test_knot();
+    fiv_occluder_options options = fiv_occluder_defaults();
+    fiv_occluder *o = NULL;
+    float state[3] = {0, 2, 0};
+    options.progress = test_stop_at;
+    options.progress_user = state;
+    EXPECT_EQ(fiv_occluder_create(&o, m.positions, m.vertices, m.indices, m.triangles, &options, NULL), SAT_OK);
+    EXPECT_NEAR(state[0], 1, 0);
+    EXPECT(state[2] > 10);
+    fiv_occluder_destroy(o);
+    state[0] = 0, state[1] = 0.5f;
+    EXPECT_EQ(fiv_occluder_create(&o, m.positions, m.vertices, m.indices, m.triangles, &options, NULL), SAT_ERR_CANCELLED);
+    EXPECT(o == NULL);
+    EXPECT(state[0] < 0.6f);
+    reference_mesh_free(&m);
+}
+
+TEST(bad_arguments)
+{
+    static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    sat_image sky = test_sky(pixels, 0), two = sat_image_f32(pixels, 4, 4, 2);
+    reference_mesh m = test_knot();
+    fiv_environment_options eo = fiv_environment_defaults();
+    fiv_occluder_options oo = test_small_set(), bad;
+    fiv_irradiance_options io = fiv_irradiance_defaults();
+    fiv_environment *e = NULL, *other = NULL;
+    fiv_occluder *o = NULL, *none = NULL;
+    fiv_instance instance, many[FIV_MAX_INSTANCES + 1];
+    float p[3] = {0, 0, 0}, n[3] = {0, 1, 0}, rgb[3], skew[9] = {1, 0.1f, 0, 0, 1, 0, 0, 0, 1}, mirror[9] = {-1, 0, 0, 0, 1, 0, 0, 0, 1}, zero = 0;
+    unsigned over[3] = {0, 1, 320};
+    int i;
+    EXPECT_EQ(fiv_environment_create(NULL, &sky, NULL, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_environment_create(&e, NULL, NULL, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_environment_create(&e, &two, NULL, NULL), SAT_ERR_ARGUMENT);
+    for (i = 0; i < 7; i++) {
+        eo = fiv_environment_defaults();
+        if (i == 0) eo.face = 7;
+        if (i == 1) eo.face = 65;
+        if (i == 2) eo.delta_ratio = -1;
+        if (i == 3) eo.max_lights = FIV_MAX_LIGHTS + 1;
+        if (i == 4) eo.max_radiance = 0;
+        if (i == 5) eo.delta_ratio = zero / zero;
+        if (i == 6) eo.threads.workers = 2;
+        EXPECT_EQ(fiv_environment_create(&e, &sky, &eo, NULL), SAT_ERR_ARGUMENT);
+        EXPECT(e == NULL);
+    }
+    EXPECT_EQ(fiv_environment_create(&e, &sky, NULL, NULL), SAT_OK);
+    eo = fiv_environment_defaults();
+    eo.face = 16;
+    EXPECT_EQ(fiv_environment_create(&other, &sky, &eo, NULL), SAT_OK);
+    EXPECT_EQ(fiv_environment_update(e, NULL, skew), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_environment_update(e, NULL, mirror), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_environment_update(NULL, &sky, NULL), SAT_ERR_ARGUMENT);
+    for (i = 0; i < 13; i++) {
+        bad = oo;
+        if (i == 0) bad.theta = 2;
+        if (i == 1) bad.theta = 17;
+        if (i == 2) bad.phi = 2;
+        if (i == 3) bad.rho = 1;
+        if (i == 4) bad.first_shell = 0;
+        if (i == 5) bad.last_shell = 0.2f;
+        if (i == 6) bad.last_shell = zero / zero;
+        if (i == 7) bad.face = 65;
+        if (i == 8) bad.storage = (fiv_storage)2;
+        if (i == 9) bad.lazy = 1;
+        if (i == 10) bad.max_lights = -1;
+        if (i == 11) bad.threads.workers = -1;
+        if (i == 12) bad.first_shell = zero / zero;
+        EXPECT_EQ(fiv_occluder_create(&none, m.positions, m.vertices, m.indices, m.triangles, &bad, NULL), SAT_ERR_ARGUMENT);
+    }
+    EXPECT_EQ(fiv_occluder_create(&none, m.positions, m.vertices, over, 1, &oo, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_occluder_create(&none, NULL, 3, over, 1, &oo, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_occluder_create(NULL, m.positions, m.vertices, m.indices, m.triangles, &oo, NULL), SAT_ERR_ARGUMENT);
+    bad = oo;
+    bad.theta = 4096, bad.phi = 2049, bad.rho = 256;
+    EXPECT_EQ(fiv_occluder_create(&none, m.positions, m.vertices, m.indices, m.triangles, &bad, NULL), SAT_ERR_SIZE);
+    o = test_occluder(&m, &oo, NULL);
+    instance = test_instance(o, 0, 0, 0);
+    EXPECT_EQ(fiv_irradiance(rgb, p, n, 1, e, &instance, 1, NULL, NULL), SAT_ERR_ARGUMENT); /* not lit */
+    EXPECT_EQ(fiv_occluder_light(o, other, NULL), SAT_ERR_ARGUMENT);                       /* another face */
+    EXPECT_EQ(fiv_occluder_light(o, e, skew), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_occluder_light(o, e, NULL), SAT_OK);
+    EXPECT_EQ(fiv_irradiance(rgb, p, n, 1, e, &instance, 1, NULL, NULL), SAT_OK);
+    EXPECT_EQ(fiv_irradiance(NULL, p, n, 1, e, &instance, 1, NULL, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_irradiance(rgb, p, n, 0, e, NULL, 0, NULL, NULL), SAT_OK);
+    instance.scale = -1;
+    EXPECT_EQ(fiv_irradiance(rgb, p, n, 1, e, &instance, 1, NULL, NULL), SAT_ERR_ARGUMENT);
+    instance.scale = 1, instance.position[1] = zero / zero;
+    EXPECT_EQ(fiv_irradiance(rgb, p, n, 1, e, &instance, 1, NULL, NULL), SAT_ERR_ARGUMENT);
+    instance.position[1] = 0;
+    io.cutoff = 2;
+    EXPECT_EQ(fiv_irradiance(rgb, p, n, 1, e, &instance, 1, &io, NULL), SAT_ERR_ARGUMENT);
+    io = fiv_irradiance_defaults();
+    io.accuracy = (fiv_accuracy)4;
+    EXPECT_EQ(fiv_irradiance(rgb, p, n, 1, e, &instance, 1, &io, NULL), SAT_ERR_ARGUMENT);
+    for (i = 0; i <= FIV_MAX_INSTANCES; i++) many[i] = instance;
+    EXPECT_EQ(fiv_irradiance(rgb, p, n, 1, e, many, FIV_MAX_INSTANCES + 1, NULL, NULL), SAT_ERR_LIMIT);
+    EXPECT_EQ(fiv_environment_update(e, NULL, NULL), SAT_OK);
+    EXPECT_EQ(fiv_irradiance(rgb, p, n, 1, e, &instance, 1, NULL, NULL), SAT_ERR_ARGUMENT); /* lit before the update */
+    EXPECT_EQ(fiv_occluder_invalidate(o, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_occluder_share(&none, NULL), SAT_ERR_ARGUMENT);
+    fiv_occluder_destroy(o);
+    fiv_occluder_destroy(NULL);
+    fiv_environment_destroy(NULL);
+    fiv_environment_destroy(e);
+    fiv_environment_destroy(other);
+    reference_mesh_free(&m);
+}
+
+TEST(defaults_are_the_stated_ones)
+{
+    fiv_environment_options e = fiv_environment_defaults();
+    fiv_occluder_options o = fiv_occluder_defaults();
+    fiv_irradiance_options i = fiv_irradiance_defaults();
+    EXPECT_EQ(fiv_version(), FIV_VERSION);
+    EXPECT_EQ(e.face, 32);
+    EXPECT_NEAR(e.delta_ratio, 400, 0);
+    EXPECT_EQ(e.max_lights, 8);
+    EXPECT(o.theta == 32 && o.phi == 17 && o.rho == 15 && o.face == 32 && o.keep_masks == 1 && o.lazy == 0 && o.max_lights == 8);
+    EXPECT_NEAR(o.first_shell, 0.3f, 0);
+    EXPECT_NEAR(o.last_shell, 6, 0);
+    EXPECT(i.accuracy == FIV_SCALED && i.partial == 1 && i.overlap == 1);
+    EXPECT_NEAR(i.cutoff, 0.001f, 0);
+}
