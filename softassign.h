@@ -347,6 +347,7 @@ struct softassign {
     unsigned char *raised; /* per slot: its price rose since the lists were made */
 
     double *distance, *row_distance; /* path search: per slot, per row */
+    double *dense_price, *closed_distance; /* the same on the matrix: prices of open slots, distances of closed ones */
     int *parent, *stamp, *row_stamp, *touched, *closed, *heap, *heap_at;
     float *parent_cost;
     int epoch, heap_size;
@@ -1195,17 +1196,40 @@ static void softassign__finish(softassign *s, int slot)
    slots, which are full in every assignment: any v).
    ------------------------------------------------------------------------------------------------ */
 
-static double softassign__dense_row_bound(const softassign *s, int row)
+/* The smallest and the second smallest cost - price of a row; ties go to the smaller index. Returns the index. */
+static int softassign__two_smallest(const float *cost, const double *price, int n, double *smallest, double *second)
 {
-    const float *cost = s->matrix + (size_t)row * (size_t)s->columns;
-    int j, stay = s->problem.previous ? s->problem.previous[row] : -1;
-    double least = (double)SOFTASSIGN__INFINITY;
-    for (j = 0; j < s->columns; j++) {
-        double value = (double)cost[j] - s->price[j];
-        if (j == stay) value = (double)softassign__pair(&s->problem, row, j) - s->price[j]; /* without the bonus */
-        if (value < least) least = value;
+    double m1 = (double)SOFTASSIGN__INFINITY, m2 = m1;
+    int j = 0, best = -1;
+#ifdef SAT__SSE2
+    double low[2], high[2], index[2];
+    __m128d a = _mm_set1_pd(m1), b = a, at = _mm_set1_pd(-1), here = _mm_set_pd(1, 0), two = _mm_set1_pd(2);
+    for (; j + 2 <= n; j += 2) {
+        __m128d v = _mm_sub_pd(_mm_set_pd((double)cost[j + 1], (double)cost[j]), _mm_loadu_pd(price + j)), less = _mm_cmplt_pd(v, a);
+        b = _mm_min_pd(b, _mm_max_pd(v, a));
+        a = _mm_min_pd(v, a);
+        at = _mm_or_pd(_mm_and_pd(less, here), _mm_andnot_pd(less, at));
+        here = _mm_add_pd(here, two);
     }
-    return least;
+    _mm_storeu_pd(low, a);
+    _mm_storeu_pd(high, b);
+    _mm_storeu_pd(index, at);
+    best = low[1] < low[0] || (!(low[0] < low[1]) && index[1] < index[0]);
+    m1 = low[best];
+    m2 = low[1 - best] < high[best] ? low[1 - best] : high[best];
+    best = (int)index[best];
+#endif
+    for (; j < n; j++) {
+        double value = (double)cost[j] - price[j];
+        if (value < m1) {
+            m2 = m1;
+            m1 = value;
+            best = j;
+        } else if (value < m2) m2 = value;
+    }
+    *smallest = m1;
+    *second = m2;
+    return best;
 }
 
 /* A list that ended below the row's own value is made anew first when the solver is done: the bound is then tight. */
@@ -1214,7 +1238,11 @@ static double softassign__row_bound(softassign *s, int row)
     size_t at = (size_t)row * (size_t)s->list, end;
     int stay = s->problem.previous ? s->problem.previous[row] : -1, own = s->slot_of_row[row];
     double least;
-    if (s->dense_paths) return softassign__dense_row_bound(s, row);
+    if (s->dense_paths) { /* with the switching bonus, which only lowers it */
+        double second;
+        softassign__two_smallest(s->matrix + (size_t)row * (size_t)s->columns, s->price, s->columns, &least, &second);
+        return least;
+    }
     if (s->phase == SOFTASSIGN__DONE && own >= 0 && s->list_limit[row] < (double)s->cost_of_row[row] - s->price[own])
         softassign__relist(s, row);
     least = s->list_limit[row];
@@ -1327,35 +1355,25 @@ static int softassign__reduce_rows(softassign *s, int *rows, int count)
 {
     int next = 0, left = 0, j, budget = 8 * count + 64;
     while (next < count) {
-        int row = rows[next++], best = -1, other = -1, out;
+        int row = rows[next++], best, other = -1, out;
         const float *cost = s->matrix + (size_t)row * (size_t)s->columns;
-        double m1 = (double)SOFTASSIGN__INFINITY, m2 = m1;
-        for (j = 0; j < s->slots; j++) {
-            double value = (double)cost[j] - s->price[j];
-            if (value >= m2) continue;
-            if (value < m1) {
-                m2 = m1;
-                other = best;
-                m1 = value;
-                best = j;
-            } else {
-                m2 = value;
-                other = j;
-            }
-        }
+        double m1, m2;
+        best = softassign__two_smallest(cost, s->price, s->slots, &m1, &m2);
+        for (j = 0; m2 <= m1 && other < 0 && j < s->slots; j++) /* a tie: another slot of that value */
+            if (j != best && (double)cost[j] - s->price[j] <= m1) other = j;
         if (best < 0) {
             rows[left++] = row;
             continue;
         }
         out = s->first_row[best];
-        if (other >= 0 && s->price[best] - (m2 - m1) < s->price[best]) s->price[best] -= m2 - m1;
+        if (!(m2 < (double)SOFTASSIGN__INFINITY) && out >= 0) { /* its only choice is taken: leave it to the paths */
+            rows[left++] = row;
+            continue;
+        }
+        if (m2 > m1 && m2 < (double)SOFTASSIGN__INFINITY) s->price[best] -= m2 - m1;
         else if (out >= 0 && other >= 0) {
             best = other;
             out = s->first_row[best];
-        }
-        if (out >= 0 && other < 0) { /* its only choice is taken: leave it to the paths */
-            rows[left++] = row;
-            continue;
         }
         softassign__dense_swap(s, row, best);
         if (out < 0) continue;
@@ -1365,17 +1383,57 @@ static int softassign__reduce_rows(softassign *s, int *rows, int count)
     return left;
 }
 
-/* The slots that are open stand in `open`; every row visit relaxes them and finds the nearest. */
+/* Relaxes all slots from `row` and returns the nearest open one; free slots win ties. A closed slot has an infinite
+   distance here and a price of minus infinity, so that nothing is below either. */
+static int softassign__relax_dense(const float *cost, int n, double base, double own_cost, double own_price, const double *price,
+                                   double *distance, int *pred, const int *first_row, int row)
+{
+    double nearest = (double)SOFTASSIGN__INFINITY;
+    int j = 0, at = -1;
+#ifdef SAT__SSE2
+    double lanes[2];
+    __m128d c0 = _mm_set1_pd(own_cost), p0 = _mm_set1_pd(own_price), from = _mm_set1_pd(base), least = _mm_set1_pd(nearest);
+    for (; j + 2 <= n; j += 2) {
+        __m128d c = _mm_sub_pd(_mm_set_pd((double)cost[j + 1], (double)cost[j]), c0), d = _mm_loadu_pd(distance + j);
+        __m128d w = _mm_add_pd(from, _mm_sub_pd(c, _mm_sub_pd(_mm_loadu_pd(price + j), p0)));
+        int less = _mm_movemask_pd(_mm_cmplt_pd(w, d));
+        d = _mm_min_pd(w, d);
+        least = _mm_min_pd(d, least);
+        if (!less) continue;
+        _mm_storeu_pd(distance + j, d);
+        if (less & 1) pred[j] = row;
+        if (less & 2) pred[j + 1] = row;
+    }
+    _mm_storeu_pd(lanes, least);
+    nearest = lanes[1] < lanes[0] ? lanes[1] : lanes[0];
+#endif
+    for (; j < n; j++) {
+        double w = base + (((double)cost[j] - own_cost) - (price[j] - own_price));
+        if (w < distance[j]) {
+            distance[j] = w;
+            pred[j] = row;
+        }
+        nearest = distance[j] < nearest ? distance[j] : nearest;
+    }
+    if (!(nearest < (double)SOFTASSIGN__INFINITY)) return -1;
+    for (j = 0; j < n; j++) {
+        if (distance[j] > nearest) continue;
+        if (first_row[j] < 0) return j;
+        if (at < 0) at = j;
+    }
+    return at;
+}
+
 static int softassign__augment_dense(softassign *s, int root)
 {
     const float *cost = s->matrix + (size_t)root * (size_t)s->columns;
-    double *d = s->distance, own_cost = 0, own_price = 0, base = 0, least = (double)SOFTASSIGN__INFINITY;
-    int *open = s->heap, *pred = s->parent, count = s->slots, closed = 0, row = root, j, k, end, at;
+    double *d = s->distance, *open_price = s->dense_price, own_cost = 0, own_price = 0, base = 0, least = (double)SOFTASSIGN__INFINITY;
+    int *pred = s->parent, closed = 0, row = root, j, k, end;
     s->report.paths++;
     for (j = 0; j < s->slots; j++) {
         double value = (double)cost[j] - s->price[j];
-        open[j] = j;
         d[j] = (double)SOFTASSIGN__INFINITY;
+        open_price[j] = s->price[j];
         if (value < least) {
             least = value;
             own_cost = (double)cost[j];
@@ -1383,35 +1441,21 @@ static int softassign__augment_dense(softassign *s, int root)
         }
     }
     for (;;) {
-        double nearest = (double)SOFTASSIGN__INFINITY;
-        at = -1;
         s->report.work++;
-        for (k = 0; k < count; k++) {
-            double w;
-            j = open[k];
-            w = base + (((double)cost[j] - own_cost) - (s->price[j] - own_price));
-            if (w < d[j]) {
-                d[j] = w;
-                pred[j] = row;
-            }
-            if (d[j] < nearest || (d[j] <= nearest && at >= 0 && s->first_row[open[at]] >= 0 && s->first_row[j] < 0)) {
-                nearest = d[j];
-                at = k;
-            }
-        }
-        if (at < 0) return 0;
-        if (nearest < base) nearest = base; /* rounding */
-        end = open[at];
-        base = d[end] = nearest;
+        end = softassign__relax_dense(cost, s->slots, base, own_cost, own_price, open_price, d, pred, s->first_row, row);
+        if (end < 0) return 0;
+        if (d[end] > base) base = d[end]; /* else rounding */
         if (s->first_row[end] < 0) break;
-        open[at] = open[--count];
-        s->closed[closed++] = end;
         row = s->first_row[end];
+        s->closed[closed] = end;
+        s->closed_distance[closed++] = base;
+        d[end] = (double)SOFTASSIGN__INFINITY;
+        open_price[end] = -(double)SOFTASSIGN__INFINITY;
         cost = s->matrix + (size_t)row * (size_t)s->columns;
         own_cost = (double)cost[end];
         own_price = s->price[end];
     }
-    for (k = 0; k < closed; k++) s->price[s->closed[k]] += d[s->closed[k]] - base;
+    for (k = 0; k < closed; k++) s->price[s->closed[k]] += s->closed_distance[k] - base;
     for (j = end;;) {
         int old;
         row = pred[j];
@@ -1585,6 +1629,8 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->top = (double *)sat__carve(a, slots, sizeof(double));
     s->distance = (double *)sat__carve(a, slots > 2 * (size_t)workers ? slots : 2 * (size_t)workers, sizeof(double));
     s->row_distance = (double *)sat__carve(a, rows, sizeof(double));
+    s->dense_price = (double *)sat__carve(a, s->dense ? slots : 0, sizeof(double));
+    s->closed_distance = (double *)sat__carve(a, s->dense ? slots : 0, sizeof(double));
     s->list_limit = (double *)sat__carve(a, rows, sizeof(double));
     s->basis = (double *)sat__carve(a, (size_t)(2 * SOFTASSIGN__DIMS + 1) * (size_t)features, sizeof(double));
     s->price_f = (float *)sat__carve(a, padded, sizeof(float));
@@ -2371,7 +2417,14 @@ static int softassign__problem_is_valid(const softassign_problem *p)
     return 1;
 }
 
-/* What is wrong with a row of costs; also the copy into the matrix. */
+/* What is wrong with a row of costs; also the copy into the matrix. Costs that are finite and small enough pass a
+   comparison of exponents; only a row with others is looked at more closely. */
+static sat_result softassign__check_cost(float cost)
+{
+    if (sat__is_nan(cost) || cost < -3.4e38f) return SAT_ERR_NON_FINITE;
+    return sat__is_finite(cost) && fabsf(cost) > SOFTASSIGN__LARGEST_COST ? SAT_ERR_ARGUMENT : SAT_OK;
+}
+
 static void softassign__check_range(int begin, int end, int worker, void *context)
 {
     softassign *s = (softassign *)context;
@@ -2379,13 +2432,28 @@ static void softassign__check_range(int begin, int end, int worker, void *contex
     int i, j;
     (void)worker;
     for (i = begin; i < end; i++) {
+        float *copy = s->dense ? s->matrix + (size_t)i * (size_t)s->columns : NULL;
+        uint32_t largest = 0;
         int *wrong = &s->list_length[i], stay = p->previous ? p->previous[i] : -1;
         *wrong = SAT_OK;
-        for (j = 0; j < s->columns; j++) {
+        if (p->cost) {
+            const float *cost = p->cost + (ptrdiff_t)i * p->stride;
+            for (j = 0; j < s->columns; j++) {
+                uint32_t size = sat__float_bits(cost[j]) & 0x7fffffffu;
+                largest = size > largest ? size : largest;
+            }
+            if (copy) memcpy(copy, cost, (size_t)s->columns * sizeof(float));
+        }
+        for (j = 0; !p->cost && j < s->columns; j++) {
             float cost = softassign__pair(p, i, j);
-            if (sat__is_nan(cost) || cost < -3.4e38f) *wrong = SAT_ERR_NON_FINITE;
-            else if (sat__is_finite(cost) && fabsf(cost) > SOFTASSIGN__LARGEST_COST && *wrong == SAT_OK) *wrong = SAT_ERR_ARGUMENT;
-            if (s->dense) s->matrix[(size_t)i * (size_t)s->columns + (size_t)j] = j == stay ? cost - s->bonus : cost;
+            uint32_t size = sat__float_bits(cost) & 0x7fffffffu;
+            largest = size > largest ? size : largest;
+            if (copy) copy[j] = cost;
+        }
+        if (copy && stay >= 0) copy[stay] -= s->bonus;
+        for (j = 0; largest > 0x7b000000u && j < s->columns && *wrong != SAT_ERR_NON_FINITE; j++) { /* 6.6e35 */
+            sat_result found = softassign__check_cost(softassign__pair(p, i, j));
+            if (found != SAT_OK) *wrong = found;
         }
     }
 }

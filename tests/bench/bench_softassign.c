@@ -1,0 +1,586 @@
+/* softassign.h: certified gap against time, the tables of Slomp 2012 chapter 3 beside the optimum, memory, video.
+   Real photographs and tiles where they are (../shared/data, libstb-dev), else patches and tiles of the same kind made here.
+   The peers run in the same program: a plain dense solver (Jonker and Volgenant), and scipy's linear_sum_assignment
+   when python3 has it; both get the matrix for free. */
+
+#define SAT_IMPLEMENTATION
+#define SOFTASSIGN_IMPLEMENTATION
+#include "softassign.h"
+#include "bench.h"
+#include "image.h"
+#include "reference_softassign.h"
+
+enum { FEATURES = 48 };
+
+/* ---- instances ---- */
+
+static float *all_tiles;     /* 8192 x 48 */
+static int real_data;
+
+#ifdef HAVE_STB
+static float *load_cells(const char *path, int grid_width, int grid_height)
+{
+    image picture;
+    float *out;
+    size_t i, n;
+    sat_image view;
+    if (!path || !image_load(&picture, path)) return NULL;
+    n = (size_t)picture.width * (size_t)picture.height * 3;
+    for (i = 0; i < n; i++) picture.pixels[i] = 255 * sat__srgb_encode(picture.pixels[i]);
+    out = (float *)malloc((size_t)(grid_width * grid_height) * FEATURES * sizeof *out);
+    view = image_view(&picture);
+    if (softassign_features(out, &view, grid_width, grid_height, 4, 4, NULL) != SAT_OK) exit(1);
+    image_free(&picture);
+    return out;
+}
+#else
+static float *load_cells(const char *path, int grid_width, int grid_height) { (void)path; (void)grid_width; (void)grid_height; return NULL; }
+#endif
+
+/* A stand-in for photographs: slopes and texture around a level; few levels for patches, all for tiles. */
+static float *make_cells(int count, int levels, uint64_t seed)
+{
+    float *out = (float *)malloc((size_t)count * FEATURES * sizeof *out);
+    int i, k;
+    for (i = 0; i < count; i++) {
+        double r = support_uniform(&seed), level = levels ? 255 * floor(r * levels) / levels : 255 * r, x = support_gaussian(&seed), y = support_gaussian(&seed);
+        for (k = 0; k < FEATURES; k++)
+            out[i * FEATURES + k] = (float)(level + 8 * x * (k / 3 % 4) + 8 * y * (k / 12) + 6 * (k % 3) + (levels ? 3 : 12) * support_gaussian(&seed));
+    }
+    return out;
+}
+
+static float *patches_of(const char *photo, int grid_width, int grid_height)
+{
+    char path[128];
+    float *out;
+    snprintf(path, sizeof path, "photos/%s.jpg", photo);
+    out = real_data ? load_cells(support_data(path), grid_width, grid_height) : NULL;
+    return out ? out : make_cells(grid_width * grid_height, 12, (uint64_t)photo[0]);
+}
+
+static void load_tiles(void)
+{
+    float *a = load_cells(support_data("tiles/tiles_0.png"), 64, 64), *b = load_cells(support_data("tiles/tiles_1.png"), 64, 64);
+    real_data = a && b;
+    all_tiles = real_data ? (float *)malloc(8192u * FEATURES * sizeof *a) : make_cells(8192, 0, 7);
+    if (real_data) {
+        memcpy(all_tiles, a, 4096u * FEATURES * sizeof *a);
+        memcpy(all_tiles + 4096 * FEATURES, b, 4096u * FEATURES * sizeof *b);
+    }
+    free(a);
+    free(b);
+}
+
+typedef struct instance {
+    softassign_problem p;
+    float *patches, *cost;
+    double optimum;
+    int *x, *y, *pred, *list, *unassigned;
+    double *v, *d;
+    softassign_options options;
+    softassign_report report;
+} instance;
+
+static void open_instance(instance *q, const char *photo, int grid_width, int grid_height, int columns, int dense)
+{
+    int i, j, rows = grid_width * grid_height;
+    memset(q, 0, sizeof *q);
+    q->patches = patches_of(photo, grid_width, grid_height);
+    q->p.rows = rows;
+    q->p.columns = columns;
+    q->p.row_features = q->patches;
+    q->p.column_features = all_tiles;
+    q->p.feature_count = FEATURES;
+    q->x = (int *)malloc((size_t)rows * sizeof(int));
+    if (!dense) return;
+    q->cost = (float *)malloc((size_t)rows * (size_t)columns * sizeof(float));
+    for (i = 0; i < rows; i++)
+        for (j = 0; j < columns; j++)
+            q->cost[(size_t)i * (size_t)columns + (size_t)j] = softassign__distance(q->patches + i * FEATURES, all_tiles + j * FEATURES, FEATURES);
+    q->y = (int *)malloc((size_t)columns * sizeof(int));
+    q->pred = (int *)malloc((size_t)columns * sizeof(int));
+    q->list = (int *)malloc((size_t)columns * sizeof(int));
+    q->unassigned = (int *)malloc((size_t)rows * sizeof(int));
+    q->v = (double *)malloc((size_t)columns * sizeof(double));
+    q->d = (double *)malloc((size_t)columns * sizeof(double));
+}
+
+static void close_instance(instance *q)
+{
+    free(q->patches);
+    free(q->cost);
+    free(q->x);
+    free(q->y);
+    free(q->pred);
+    free(q->list);
+    free(q->unassigned);
+    free(q->v);
+    free(q->d);
+}
+
+static void run_lapjv(void *user)
+{
+    instance *q = (instance *)user;
+    long double sum = 0;
+    int i;
+    reference_lapjv(q->cost, q->p.rows, q->p.columns, q->x, q->y, q->v, q->d, q->pred, q->list, q->unassigned);
+    for (i = 0; i < q->p.rows; i++) sum += q->cost[(size_t)i * (size_t)q->p.columns + (size_t)q->x[i]];
+    q->optimum = (double)sum;
+}
+
+static void run_solver(void *user)
+{
+    instance *q = (instance *)user;
+    if (softassign_solve(q->x, &q->p, &q->options, &q->report) != SAT_OK) {
+        puts("# the solver failed");
+        exit(1);
+    }
+}
+
+static void set_method(instance *q, softassign_method method)
+{
+    q->options = softassign_method_defaults(method);
+    q->options.certify = 0;
+}
+
+static double excess(const instance *q) { return (q->report.cost - q->optimum) / q->optimum; }
+
+/* Seconds of scipy's solver alone (best of `rounds`), or -1 where there is none. */
+static double scipy_seconds(const instance *q, int rounds)
+{
+    char command[512];
+    FILE *file = fopen("build/bench/cost.bin", "wb");
+    double seconds = -1;
+    size_t n = (size_t)q->p.rows * (size_t)q->p.columns;
+    if (!file) return -1;
+    if (fwrite(q->cost, sizeof(float), n, file) != n) {
+        fclose(file);
+        return -1;
+    }
+    fclose(file);
+    snprintf(command, sizeof command,
+             "/usr/bin/python3 -c \"import numpy,time\nfrom scipy.optimize import linear_sum_assignment as f\n"
+             "c=numpy.fromfile('build/bench/cost.bin',dtype=numpy.float32).reshape(%d,%d).astype(numpy.float64)\nb=[]\n"
+             "for i in range(%d):\n t=time.thread_time();f(c);b.append(time.thread_time()-t)\nprint(sorted(b)[len(b)//2])\" 2>/dev/null",
+             q->p.rows, q->p.columns, rounds);
+    file = popen(command, "r");
+    if (file) {
+        if (fscanf(file, "%lf", &seconds) != 1) seconds = -1;
+        pclose(file);
+    }
+    remove("build/bench/cost.bin");
+    return seconds;
+}
+
+static const char *const method_names[] = {"auto", "exact", "fast", "entropic", "published", "greedy", "greedy + 2-opt", "annealing", "ants"};
+
+/* ---- the figures: exact and fast against the peers ---- */
+
+static void table_peers(void)
+{
+    static const struct { const char *photo; int w, h; } runs[] = {
+        {"fig_bowl", 30, 30}, {"brushes", 30, 30}, {"dandelion", 30, 30}, {"dogs", 30, 30}, {"bird_lamp", 30, 30}, {"stream", 30, 30},
+        {"dogs", 64, 32}, {"fig_bowl", 64, 32}, {"stream", 64, 32}};
+    size_t k;
+    int m;
+    bench_table("Features to proven result, one thread, against a plain LAPJV and scipy (both without the time of the matrix)",
+                "photo\trows\tcolumns\tmethod\ttime_ms\tratio_lapjv\tratio_scipy\tcertified_gap\texcess\tmemory_mb\tmatrix_ratio\tdistances\tdefault");
+    bench_note("ratio_scipy is -1 where python3 has no scipy; memory_mb without the features; distances as a share of all pairs, lists made anew included");
+    for (k = 0; k < sizeof runs / sizeof *runs; k++) {
+        instance q;
+        double scipy;
+        if (bench_quick() && k != 0) continue;
+        open_instance(&q, runs[k].photo, runs[k].w, runs[k].h, 8192, 1);
+        scipy = scipy_seconds(&q, q.p.rows > 1000 || bench_quick() ? 1 : 3);
+        for (m = SOFTASSIGN_EXACT; m <= SOFTASSIGN_FAST; m++) {
+            bench_times t;
+            set_method(&q, (softassign_method)m);
+            t = bench_ratio(run_solver, &q, run_lapjv, &q, q.p.rows > 1000 ? 3 : bench_rounds(5));
+            run_solver(&q);
+            bench_row("%s\t%d\t%d\t%s\t%.4g\t%.3g\t%.3g\t%.3g\t%.3g\t%.3g\t%.3g\t%.3g\t%d", runs[k].photo, q.p.rows, q.p.columns, method_names[m],
+                      t.work * 1e3, t.ratio, scipy > 0 ? t.work / scipy : -1, q.report.gap, excess(&q), (double)q.report.bytes / 1e6,
+                      (double)q.report.bytes / (4.0 * q.p.rows * q.p.columns),
+                      (double)q.report.distances_computed / ((double)q.p.rows * q.p.columns), m == SOFTASSIGN_EXACT);
+        }
+        close_instance(&q);
+    }
+}
+
+/* ---- small dense problems, as in games ---- */
+
+static void run_dense(void *user)
+{
+    instance *q = (instance *)user;
+    softassign_problem p = q->p;
+    p.cost = q->cost;
+    p.stride = p.columns;
+    if (softassign_solve(q->x, &p, &q->options, &q->report) != SAT_OK) exit(1);
+}
+
+static void table_dense(void)
+{
+    static const int sizes[][3] = {{4, 4, 16}, {8, 8, 64}, {10, 10, 100}, {16, 16, 256}, {10, 10, 500}, {10, 10, 1000}};
+    size_t k;
+    bench_table("Small matrices, AUTO against a plain LAPJV without checks or certificate", "rows\tcolumns\ttime_us\tratio_lapjv\tcertified_gap\tdefault");
+    for (k = 0; k < 6; k++) {
+        instance q;
+        bench_times t;
+        open_instance(&q, "fig_bowl", sizes[k][0], sizes[k][1], sizes[k][2], 1);
+        q.options = softassign_defaults();
+        t = bench_ratio(run_dense, &q, run_lapjv, &q, bench_rounds(31));
+        run_dense(&q);
+        bench_row("%d\t%d\t%.4g\t%.3g\t%.3g\t%d", q.p.rows, q.p.columns, t.work * 1e6, t.ratio, q.report.gap, 1);
+        close_instance(&q);
+    }
+}
+
+/* ---- error against time, all methods ---- */
+
+static void table_error_time(void)
+{
+    static const int sizes[][3] = {{10, 10, 100}, {10, 10, 500}, {20, 20, 1500}, {30, 30, 8192}, {64, 32, 8192}};
+    static const double gaps[] = {1e-2, 1e-3, 1e-4};
+    size_t k, g;
+    int m;
+    bench_table("Error against time, fig_bowl", "size\tmethod\tsetting\ttime_ms\tratio_lapjv\texcess\tcertified_gap\tdefault");
+    bench_plot("Excess over the optimum against time; x=time_ms; y=excess; by=method; log=xy");
+    bench_plot("Certified gap against time; x=time_ms; y=certified_gap; by=method; log=xy");
+    bench_note("excess below 1e-7 is shown as 1e-7; the annealing, ants and published runs at 900x8192 and above are shortened as their setting says");
+    for (k = 0; k < 5; k++) {
+        instance q;
+        double lapjv;
+        char size[32];
+        if (bench_quick() && k > 2) break;
+        open_instance(&q, "fig_bowl", sizes[k][0], sizes[k][1], sizes[k][2], 1);
+        snprintf(size, sizeof size, "%dx%d", q.p.rows, q.p.columns);
+        lapjv = bench_time(run_lapjv, &q, k > 2 ? 1 : 5);
+        bench_row("%s\tLAPJV\tdense\t%.4g\t1\t1e-7\t1\t0", size, lapjv * 1e3);
+        for (m = 0; m < 9; m++)
+            for (g = 0; g < (m == SOFTASSIGN_FAST ? 3u : 1u); g++) {
+                double start, seconds;
+                char setting[64] = "";
+                set_method(&q, (softassign_method)m);
+                q.options.gap = gaps[g];
+                if (m == SOFTASSIGN_FAST) snprintf(setting, sizeof setting, "gap %g", gaps[g]);
+                if (m == SOFTASSIGN_PUBLISHED && k > 2) q.options.iterations[0] = 2;
+                if (m == SOFTASSIGN_PUBLISHED) snprintf(setting, sizeof setting, "%d x 10 x 10", q.options.iterations[0]);
+                if (m == SOFTASSIGN_ANTS && k > 2) q.options.iterations[0] = 20;
+                if (m == SOFTASSIGN_ANTS) snprintf(setting, sizeof setting, "%d iterations", q.options.iterations[0]);
+                if (m == SOFTASSIGN_ANNEALING && k > 2) q.options.iterations[1] = 100;
+                if (m == SOFTASSIGN_ANNEALING) snprintf(setting, sizeof setting, "120 x %d moves a row", q.options.iterations[1]);
+                start = support_clock();
+                run_solver(&q);
+                seconds = support_clock() - start;
+                if (seconds < 0.2) seconds = bench_time(run_solver, &q, 5);
+                bench_row("%s\t%s\t%s\t%.4g\t%.3g\t%.3g\t%.3g\t%d", size, method_names[m], setting, seconds * 1e3, seconds / lapjv,
+                          excess(&q) > 1e-7 ? excess(&q) : 1e-7, q.report.gap > 1e-16 ? q.report.gap : 1e-16, m == SOFTASSIGN_AUTO);
+            }
+        close_instance(&q);
+    }
+}
+
+/* ---- table 3.1 ---- */
+
+static void table_3_1(void)
+{
+    static const int sizes[][3] = {{10, 10, 100}, {10, 10, 500}, {20, 20, 1500}};
+    static const double published[][3] = {{44172, 43370, 42713}, {31997, 31282, 31656}, {128817, 123350, 127560}};
+    static const int methods[] = {SOFTASSIGN_GREEDY, SOFTASSIGN_ANNEALING, SOFTASSIGN_PUBLISHED};
+    static const char *const photos[] = {"fig_bowl", "brushes", "dandelion", "dogs", "bird_lamp", "stream"};
+    size_t k, f;
+    int m;
+    bench_table("Table 3.1 re-made: cost of greedy, annealing and softassign, and what the thesis could not know, the optimum",
+                "photo\trows\tcolumns\tbest_match_repeats\tgreedy\tannealing\tsoftassign\toptimum\tgreedy_rel\tannealing_rel\tsoftassign_rel\tthesis_greedy_rel\tthesis_annealing_rel\tthesis_softassign_rel");
+    bench_note("_rel is relative to the optimum here, and in the columns of the thesis to the best of its three methods");
+    for (f = 0; f < 6; f++)
+        for (k = 0; k < 3; k++) {
+            instance q;
+            double cost[3], repeats, best = published[k][0];
+            if (bench_quick() && f > 0) break;
+            open_instance(&q, photos[f], sizes[k][0], sizes[k][1], sizes[k][2], 1);
+            run_lapjv(&q);
+            set_method(&q, SOFTASSIGN_EXACT);
+            q.options.capacity_default = q.p.rows;
+            run_solver(&q);
+            repeats = q.report.cost;
+            for (m = 0; m < 3; m++) {
+                set_method(&q, (softassign_method)methods[m]);
+                run_solver(&q);
+                cost[m] = q.report.cost;
+                if (published[k][m] < best) best = published[k][m];
+            }
+            bench_row("%s\t%d\t%d\t%.0f\t%.0f\t%.0f\t%.0f\t%.0f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f", photos[f], q.p.rows, q.p.columns, repeats,
+                      cost[0], cost[1], cost[2], q.optimum, cost[0] / q.optimum, cost[1] / q.optimum, cost[2] / q.optimum,
+                      published[k][0] / best, published[k][1] / best, published[k][2] / best);
+            close_instance(&q);
+        }
+}
+
+/* ---- table 3.2 ---- */
+
+static void table_3_2(void)
+{
+    static const int sizes[][2] = {{100, 100}, {100, 500}, {400, 1500}, {512, 2048}, {900, 3000}, {1024, 4096}, {1200, 5000}, {1600, 6000}, {1800, 7000}, {2048, 8192}};
+    static const double thesis[][3] = {{.024, .022, .022}, {.114, .062, .023}, {1.506, .780, .035}, {2.572, 1.479, .052}, {6.485, 3.912, .114},
+                                       {10.01, 5.963, .171}, {14.29, 8.532, .239}, {22.73, 13.85, .374}, {29.82, 17.78, .487}, {39.77, 23.62, .643}};
+    size_t k;
+    int w;
+    bench_table("Table 3.2 re-made: seconds for one cooling iteration of 10 x 10 (SOFTASSIGN_PUBLISHED, float)",
+                "rows\tcolumns\tcpu_x1_s\tcpu_x2_s\tthesis_x1_s\tthesis_x4_s\tthesis_gpu_s\tlapjv_s\titeration_ratio_lapjv");
+    bench_note("the thesis: Core2 Quad 2.55 GHz and GeForce GTX 280; the GPU passes of today's machine are in gpu_softassign.c");
+    for (k = 0; k < 10; k++) {
+        instance q;
+        double seconds[2], lapjv, start;
+        if (bench_quick() && k > 2) break;
+        open_instance(&q, "fig_bowl", sizes[k][0], 1, sizes[k][1], 1);
+        start = support_clock();
+        run_lapjv(&q);
+        lapjv = support_clock() - start;
+        for (w = 0; w < 2; w++) {
+            softassign_problem p = q.p;
+            double zero;
+            p.cost = q.cost;
+            p.stride = p.columns;
+            set_method(&q, SOFTASSIGN_PUBLISHED);
+            if (w) q.options.threads = support_threads(2);
+            q.options.iterations[0] = 0; /* everything but the iteration */
+            start = support_clock();
+            if (softassign_solve(q.x, &p, &q.options, &q.report) != SAT_OK) exit(1);
+            zero = support_clock() - start;
+            q.options.iterations[0] = 1;
+            start = support_clock();
+            if (softassign_solve(q.x, &p, &q.options, &q.report) != SAT_OK) exit(1);
+            seconds[w] = support_clock() - start - zero;
+        }
+        bench_row("%d\t%d\t%.4g\t%.4g\t%g\t%g\t%g\t%.4g\t%.3g", q.p.rows, q.p.columns, seconds[0], seconds[1], thesis[k][0], thesis[k][1], thesis[k][2],
+                  lapjv, seconds[0] / lapjv);
+        close_instance(&q);
+    }
+}
+
+/* ---- lists: length, and how often they are made anew ---- */
+
+static void table_lists(void)
+{
+    static const int lengths[] = {8, 16, 32, 48, 64, 96, 128, 256};
+    static const int sizes[][3] = {{30, 30, 8192}, {64, 32, 8192}};
+    size_t k, l;
+    int m;
+    bench_table("Length of the lists", "rows\tmethod\tneighbours\ttime_ms\tlists_made\trows_expanded\tdistances\tmemory_mb\tdefault");
+    bench_plot("Time against the length of the lists; x=neighbours; y=time_ms; by=method; log=xy; style=lines");
+    for (k = 0; k < 2; k++) {
+        instance q;
+        if (bench_quick() && k) break;
+        open_instance(&q, "fig_bowl", sizes[k][0], sizes[k][1], sizes[k][2], 0);
+        for (m = SOFTASSIGN_EXACT; m <= SOFTASSIGN_FAST; m++)
+            for (l = 0; l < 8; l++) {
+                double seconds;
+                set_method(&q, (softassign_method)m);
+                q.options.neighbours = lengths[l];
+                seconds = bench_time(run_solver, &q, k ? 1 : 3);
+                bench_row("%d\t%s\t%d\t%.4g\t%.0f\t%.0f\t%.3g\t%.3g\t%d", q.p.rows, method_names[m], lengths[l], seconds * 1e3, (double)q.report.lists_built,
+                          (double)q.report.rows_expanded, (double)q.report.distances_computed / ((double)q.p.rows * q.p.columns),
+                          (double)q.report.bytes / 1e6, lengths[l] == softassign_defaults().neighbours);
+            }
+        close_instance(&q);
+    }
+}
+
+/* ---- 8192 x 65536 ---- */
+
+/* The eight flips and turns of every tile: 65536 different columns. */
+static float *turned_tiles(void)
+{
+    float *out = (float *)malloc(65536u * FEATURES * sizeof *out);
+    int t, turn, x, y, c;
+    for (t = 0; t < 8192; t++)
+        for (turn = 0; turn < 8; turn++)
+            for (y = 0; y < 4; y++)
+                for (x = 0; x < 4; x++) {
+                    int a = turn & 1 ? 3 - x : x, b = turn & 2 ? 3 - y : y;
+                    for (c = 0; c < 3; c++)
+                        out[((size_t)(t * 8 + turn) * 16 + (size_t)(y * 4 + x)) * 3 + (size_t)c] =
+                            all_tiles[(t * 16 + (turn & 4 ? a * 4 + b : b * 4 + a)) * 3 + c];
+                }
+    return out;
+}
+
+static void table_large(void)
+{
+    instance q;
+    int m;
+    double start, seconds;
+    float *columns;
+    if (bench_quick()) return;
+    columns = turned_tiles();
+    open_instance(&q, "dogs", 64, 128, 8192, 0);
+    q.p.columns = 65536;
+    q.p.column_features = columns;
+    bench_table("8192 x 65536: the matrix would be 2147 MB", "method\tgap_asked\ttime_s\tcertified_gap\tmemory_mb\tmatrix_ratio\tdistances\tlists_made\tpaths\tdefault");
+    for (m = SOFTASSIGN_EXACT; m <= SOFTASSIGN_FAST; m++) {
+        set_method(&q, (softassign_method)m);
+        q.options.threads = support_threads(2);
+        start = support_clock();
+        run_solver(&q);
+        seconds = support_clock() - start;
+        bench_row("%s\t%g\t%.4g\t%.3g\t%.3g\t%.3g\t%.3g\t%.0f\t%.0f\t%d", method_names[m], q.options.gap, seconds, q.report.gap, (double)q.report.bytes / 1e6,
+                  (double)q.report.bytes / (4.0 * 8192 * 65536), (double)q.report.distances_computed / (8192.0 * 65536),
+                  (double)q.report.lists_built, (double)q.report.paths, m == SOFTASSIGN_EXACT);
+    }
+    close_instance(&q);
+    free(columns);
+}
+
+/* ---- video ---- */
+
+/* A pan over the photo: the window of every frame is moved by a third of a cell. */
+static void pan(float *out, const float *fine, int frame, int frames)
+{
+    int cx, cy, u, v, c, dx, dy, shift = 4 * frame / 3 + 0 * frames;
+    for (cy = 0; cy < 30; cy++)
+        for (cx = 0; cx < 30; cx++)
+            for (v = 0; v < 4; v++)
+                for (u = 0; u < 4; u++)
+                    for (c = 0; c < 3; c++) {
+                        double sum = 0;
+                        for (dy = 0; dy < 1; dy++)
+                            for (dx = 0; dx < 1; dx++) {
+                                int x = cx * 4 + u + shift, y = cy * 4 + v;
+                                int cell = (y / 4) * 40 + x / 4, part = (y % 4) * 4 + x % 4;
+                                sum += (double)fine[(cell * 16 + part) * 3 + c];
+                            }
+                        out[((cy * 30 + cx) * 16 + v * 4 + u) * 3 + c] = (float)sum;
+                    }
+}
+
+static void table_video(void)
+{
+    static const double bonuses[] = {0, 0.02, 0.05, 0.1};
+    int frames = bench_quick() ? 4 : 12, frame, i;
+    size_t b;
+    bench_table("Video: 30 x 30 of 8192, the picture pans by a third of a cell a frame",
+                "switching\twarm_ratio_cold\twarm_ratio_lapjv\tchanged\tfree_optimum_changes\texcess\tcertified_gap\tcolumns_finished\tdefault");
+    bench_note("warm_ratio_cold: against the same call without prices; changed: share of the 900 tiles that differ from the frame before");
+    for (b = 0; b < 4; b++) {
+        instance q;
+        float *wide;
+        softassign *warm = NULL;
+        double ratios[16], lapjv[16], changed = 0, unforced = 0, worse = 0, gap = 0, finished = 0;
+        int *previous = (int *)malloc(900 * sizeof(int)), *optimum = (int *)malloc(900 * sizeof(int)), n = 0;
+        open_instance(&q, "dogs", 30, 30, 8192, 1);
+        wide = patches_of("dogs", 40, 30);
+        q.options = softassign_method_defaults(SOFTASSIGN_EXACT);
+        q.options.switching = bonuses[b];
+        if (softassign_create(&warm, 900, 8192, &q.options) != SAT_OK) exit(1);
+        for (frame = 0; frame < frames; frame++) {
+            double start, t_warm, t_cold, t_lapjv, best;
+            int j, differ = 0;
+            pan(q.patches, wide, frame, frames);
+            for (i = 0; i < 900; i++)
+                for (j = 0; j < 8192; j++)
+                    q.cost[(size_t)i * 8192 + (size_t)j] = softassign__distance(q.patches + i * FEATURES, all_tiles + j * FEATURES, FEATURES);
+            q.p.previous = frame ? previous : NULL;
+            start = support_clock();
+            softassign_next_frame(warm);
+            if (softassign_step(warm, q.x, &q.p, (size_t)-1 / 4, &q.report) != SAT_OK) exit(1);
+            t_warm = support_clock() - start;
+            if (frame) {
+                changed += q.report.switched / 900.0;
+                gap += q.report.gap;
+                finished += (double)q.report.columns_finished;
+            }
+            memcpy(previous, q.x, 900 * sizeof(int));
+            best = q.report.cost;
+            q.p.previous = NULL;
+            start = support_clock();
+            run_solver(&q);
+            t_cold = support_clock() - start;
+            for (i = 0; i < 900; i++) differ += q.x[i] != optimum[i];
+            if (frame) unforced += differ / 900.0;
+            memcpy(optimum, q.x, 900 * sizeof(int));
+            start = support_clock();
+            run_lapjv(&q);
+            t_lapjv = support_clock() - start;
+            if (!frame) continue;
+            worse += (best - q.optimum) / q.optimum;
+            ratios[n] = t_warm / t_cold;
+            lapjv[n++] = t_warm / t_lapjv;
+        }
+        bench_row("%g\t%.3g\t%.3g\t%.3g\t%.3g\t%.3g\t%.3g\t%.3g\t%d", bonuses[b], support_median(ratios, n), support_median(lapjv, n), changed / n, unforced / n,
+                  worse / n, gap / n, finished / n, b == 0);
+        softassign_destroy(warm);
+        close_instance(&q);
+        free(wide);
+        free(previous);
+        free(optimum);
+    }
+}
+
+/* ---- stability: temperatures down to 1e-12 ---- */
+
+static void table_temperatures(void)
+{
+    static const double temperatures[] = {1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12};
+    instance q;
+    size_t k;
+    bench_table("Cold softassign: the bound of ENTROPIC at one temperature, 60 sweeps (times the mean row minimum)",
+                "temperature\tbound_below_optimum\texcess\tcolumn_sum_max\tdefault");
+    bench_plot("Bound below the optimum against temperature; x=temperature; y=bound_below_optimum; log=xy; style=lines");
+    open_instance(&q, "fig_bowl", 20, 20, 1500, 1);
+    run_lapjv(&q);
+    for (k = 0; k < 8; k++) {
+        double optimum = q.optimum;
+        set_method(&q, SOFTASSIGN_ENTROPIC);
+        q.options.temperature = temperatures[k];
+        q.options.iterations[0] = 1;
+        q.options.iterations[1] = 60;
+        run_solver(&q);
+        bench_row("%g\t%.3g\t%.3g\t%.3g\t%d", temperatures[k], (optimum - q.report.lower_bound) / optimum, excess(&q), q.report.column_sum_max, 0);
+    }
+    close_instance(&q);
+}
+
+/* ---- the published schedule ---- */
+
+static void table_published(void)
+{
+    static const double outliers[] = {1e-3, 1, 1e3, 1e6, 1e9};
+    static const double alphas[] = {0.3, 1, 1.5};
+    instance q;
+    size_t o, a;
+    int evolves, wide;
+    bench_table("The published method's parameters, 100 x 500", "alpha\toutlier\tevolves\tdouble\texcess\tduplicate_rows\tcolumn_sum_max\tdefault");
+    open_instance(&q, "fig_bowl", 10, 10, 500, 1);
+    run_lapjv(&q);
+    for (a = 0; a < 3; a++)
+        for (o = 0; o < 5; o++)
+            for (evolves = 0; evolves < 2; evolves++)
+                for (wide = 0; wide < 2; wide++) {
+                    if (bench_quick() && (wide || evolves || a != 1)) continue;
+                    set_method(&q, SOFTASSIGN_PUBLISHED);
+                    q.options.alpha = alphas[a];
+                    q.options.outlier = outliers[o];
+                    q.options.outlier_evolves = evolves;
+                    q.options.double_precision = wide;
+                    run_solver(&q);
+                    bench_row("%g\t%g\t%d\t%d\t%.4f\t%d\t%.3g\t%d", alphas[a], outliers[o], evolves, wide, excess(&q), q.report.duplicate_rows,
+                              q.report.column_sum_max, alphas[a] == 1 && outliers[o] == 1e6 && !evolves && !wide);
+                }
+    close_instance(&q);
+}
+
+int main(int argc, char **argv)
+{
+    static void (*const tables[])(void) = {table_peers, table_dense, table_error_time, table_3_1, table_3_2, table_lists, table_large, table_video,
+                                           table_temperatures, table_published};
+    static const char *const names[] = {"peers", "dense", "error", "3_1", "3_2", "lists", "large", "video", "temperatures", "published"};
+    size_t k;
+    bench_start("softassign.h");
+    load_tiles();
+    printf("# input: %s\n", real_data ? "photographs and tiles" : "made here, for want of ../shared/data or libstb-dev");
+    for (k = 0; k < 10; k++)
+        if (argc < 2 || strcmp(argv[1], names[k]) == 0) tables[k]();
+    free(all_tiles);
+    return 0;
+}
