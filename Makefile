@@ -86,14 +86,14 @@ build/%_view: examples/%_view.c
 build/%: examples/%.c
 	$(COMPILE_C) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
 
-# make demo [IN=picture.exr] [ARGS='--gl ...']; without IN the first picture there is, else one that the program makes up
-DEMO    := $(patsubst examples/%.c,%,$(firstword $(wildcard examples/demo.c examples/tonemap.c)))
-FOUND   := $(if $(EXR),$(firstword $(wildcard ../shared/data/hdr/StillLife.exr ../shared/data/hdr/*.exr data/env/*.exr)))
+# make demo [ARGS='--hour night ...'] renders the showcase, make demo IN=picture.exr tone-maps a picture
+DEMO    := $(if $(IN),tonemap,demo)
 demo: deps
 	@$(MAKE) --no-print-directory run-demo
 run-demo: build/$(DEMO)
 	@mkdir -p out
-	build/$(DEMO) --stats --out out/demo.png $(ARGS) $(or $(IN),$(if $(filter tonemap,$(DEMO)),$(FOUND)))
+	build/$(DEMO) --stats --out out/demo.png $(ARGS) $(IN)
+	@echo out/demo.png
 
 # ---- tests -----------------------------------------------------------------------------------------------------
 

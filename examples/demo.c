@@ -1,0 +1,250 @@
+/* demo - a square in the rain, through all six headers.             SPDX-License-Identifier: MIT-0 OR Unlicense
+
+       demo                                           dusk, out/demo.png
+       demo --hour night --rate 20mm --out night.png
+       demo --env forest.exr --mesh bunny.ply         other light, another sculpture
+       demo --no-shadows --no-occlusion               each stage can be left out
+       demo --mosaic                                  the picture again, from tiles cut out of it, each used once
+       demo --frames 60 --out rain.png                rain_0000.png and so on, 30 a second */
+
+#define _POSIX_C_SOURCE 200809L
+#define LIGHTSCAN_IMPLEMENTATION
+#include "pipeline.h"
+#include "reference.h"
+
+/* ---- the table ---- */
+
+static const char *percent(char *text, size_t size, double value, const char *what)
+{
+    if (value < 0) snprintf(text, size, "-");
+    else snprintf(text, size, "%.2f %% %s", 100 * value, what);
+    return text;
+}
+
+static void print_row(const char *stage, double seconds, const char *error, const char *rest)
+{
+    printf("%-10s %9.1f  %-28s %s\n", stage, 1e3 * seconds, error, rest);
+}
+
+/* Times, errors against the slow way, and what was left out. */
+static void print_table(const pipeline *p)
+{
+    const fiv_irradiance_stats *f = &p->shadow_stats;
+    const ssao_sat_stats *a = &p->ao_stats;
+    const raindrop_render_stats *r = &p->rain_stats;
+    const tonemap_stats *t = &p->tone_stats;
+    double pairs = (double)(f->below_horizon + f->below_cutoff + f->whole + f->clipped), drops = (double)r->drops;
+    char error[80], rest[240];
+    printf("%-10s %9s  %-28s %s\n", "stage", "ms", "error (reference)", "what was left out");
+    snprintf(rest, sizeof rest, "%d lights split off with %.0f %% of the light", p->light_stats.lights, 100 * (double)p->light_stats.light_share);
+    print_row("light", p->seconds[PIPELINE_LIGHT], "-", rest);
+    snprintf(rest, sizeof rest, "%zu + %zu masks in %.1f MB, once for a shape", p->mask_stats[0].rasterised, p->mask_stats[1].rasterised,
+             1e-6 * (double)(p->mask_stats[0].bytes + p->mask_stats[1].bytes));
+    print_row("masks", p->seconds[PIPELINE_MASKS], "-", rest);
+    print_row("scene", p->seconds[PIPELINE_SCENE], "-", "");
+    if (p->options.shadows) {
+        snprintf(rest, sizeof rest, "occluders below the horizon %.0f %%, too small %.0f %% of %.3g pairs",
+                 100 * (double)f->below_horizon / pairs, 100 * (double)f->below_cutoff / pairs, pairs);
+        print_row("shadows", p->seconds[PIPELINE_SHADOWS], percent(error, sizeof error, reference_shadow_error(p, 24), "rms (ray casting)"), rest);
+    }
+    if (p->options.occlusion) {
+        snprintf(rest, sizeof rest, "sky %.0f %%, flat %.0f %%, too small %.0f %% of %zu pixels", 100 * (double)a->sky / (double)a->pixels,
+                 100 * (double)a->flat / (double)a->pixels, 100 * (double)a->small / (double)a->pixels, a->pixels);
+        print_row("occlusion", p->seconds[PIPELINE_OCCLUSION], percent(error, sizeof error, reference_occlusion_error(p), "rms (all pixels)"), rest);
+    }
+    print_row("shade", p->seconds[PIPELINE_SHADE], "-", "");
+    if (p->options.rain) {
+        snprintf(rest, sizeof rest, "outside %.0f %%, hidden %.0f %%, too small %.0f %% of %.0f drops; %zu as one lookup, %zu as rays",
+                 100 * (double)(r->outside + r->behind + r->near_plane) / drops, 100 * (double)r->hidden / drops,
+                 100 * (double)r->below_threshold / drops, drops, r->drawn_far, r->drawn_near);
+        print_row("rain", p->seconds[PIPELINE_RAIN], percent(error, sizeof error, reference_rain_error(p), "rms (all rays)"), rest);
+    }
+    snprintf(rest, sizeof rest, "%.1f decades; key %.3g; %.1f %% clipped; neighbourhoods searched %zu, skipped %zu",
+             t->low > 0 ? log10(t->high / t->low) : 0.0, t->key, 100 * (double)t->clamped / (double)(p->hdr.width * p->hdr.height),
+             t->searched, t->skipped);
+    print_row("tone", p->seconds[PIPELINE_TONE], "0 (exact search)", rest);
+}
+
+/* ---- mosaic: tiles cut out of the picture at random, shrunk, and each used at most once ---- */
+
+enum { TILE = 16, TILE_COLUMNS = 96 };
+
+static sat_image view_u8(const unsigned char *pixels, int width, int height)
+{
+    sat_image view = sat_image_f32(NULL, width, height, 3);
+    view.pixels = pixels;
+    view.stride = (ptrdiff_t)width * 3;
+    view.format = SAT_U8;
+    return view;
+}
+
+/* Tile i shows a square of 2 to 6 tiles' side; odd ones are mirrored. */
+static void cut_tile(unsigned char *sheet, int i, const unsigned char *pixels, int width, int height)
+{
+    int step = 2 + (int)(4.999f * scene_hash(i, 1)), side = step * TILE < height ? step * TILE : height, x, y, k, u, v;
+    int left = (int)(scene_hash(i, 2) * (float)(width - side)), top = (int)(scene_hash(i, 3) * (float)(height - side));
+    for (y = 0; y < TILE; ++y)
+        for (x = 0; x < TILE; ++x) {
+            unsigned char *out = sheet + 3 * (((size_t)(i / TILE_COLUMNS * TILE + y)) * TILE * TILE_COLUMNS + (size_t)(i % TILE_COLUMNS * TILE + x));
+            int sum[3] = {0, 0, 0}, from = i & 1 ? TILE - 1 - x : x, n = side / TILE;
+            for (v = 0; v < n; ++v)
+                for (u = 0; u < n; ++u)
+                    for (k = 0; k < 3; ++k)
+                        sum[k] += pixels[3 * ((size_t)(top + y * n + v) * (size_t)width + (size_t)(left + from * n + u)) + (size_t)k];
+            for (k = 0; k < 3; ++k) out[k] = (unsigned char)(sum[k] / (n * n));
+        }
+}
+
+static int make_mosaic(const pipeline *p, const char *path)
+{
+    int columns = p->options.width / TILE, rows = p->options.height / TILE, patches = columns * rows, i;
+    int tile_rows = patches * 3 / 2 / TILE_COLUMNS + 1, tiles = tile_rows * TILE_COLUMNS;
+    unsigned char *sheet = (unsigned char *)malloc((size_t)tiles * TILE * TILE * 3), *out = (unsigned char *)malloc((size_t)patches * TILE * TILE * 3);
+    float *wanted = (float *)malloc((size_t)patches * 48 * sizeof(float)), *offered = (float *)malloc((size_t)tiles * 48 * sizeof(float));
+    int *tile_of = (int *)malloc((size_t)patches * sizeof(int)), ok = sheet && out && wanted && offered && tile_of && patches > 0;
+    sat_image picture = view_u8(p->pixels, p->options.width, p->options.height), tile_view = view_u8(sheet, TILE * TILE_COLUMNS, TILE * tile_rows);
+    softassign_options so = softassign_defaults();
+    softassign_problem problem;
+    softassign_report report;
+    double start = common_clock();
+    char rest[160], error[80];
+    so.threads = p->options.threads;
+    memset(&problem, 0, sizeof problem);
+    picture.width = columns * TILE, picture.height = rows * TILE;
+    problem.rows = patches, problem.columns = tiles, problem.feature_count = 48;
+    problem.row_features = wanted, problem.column_features = offered;
+    for (i = 0; ok && i < tiles; ++i) cut_tile(sheet, i, p->pixels, p->options.width, p->options.height);
+    ok = ok && softassign_features(wanted, &picture, columns, rows, 4, 4, &so) == SAT_OK &&
+         softassign_features(offered, &tile_view, TILE_COLUMNS, tile_rows, 4, 4, &so) == SAT_OK &&
+         softassign_solve(tile_of, &problem, &so, &report) == SAT_OK &&
+         softassign_mosaic(out, (ptrdiff_t)columns * TILE * 3, &tile_view, TILE, TILE, tile_of, columns, rows, &picture, 0.25f) == SAT_OK;
+    if (ok) {
+        snprintf(rest, sizeof rest, "%d of %d tiles, none twice; %.0f %% of the distances never computed", patches, tiles,
+                 100 - 100 * (double)report.distances_computed / ((double)patches * tiles));
+        print_row("mosaic", common_clock() - start, percent(error, sizeof error, report.gap, "of the cost, at most"), rest);
+        ok = image_save_u8(path, out, columns * TILE, rows * TILE, 3);
+    }
+    if (!ok) fprintf(stderr, "demo: the mosaic could not be made or written to %s\n", path);
+    free(sheet), free(out), free(wanted), free(offered), free(tile_of);
+    return ok;
+}
+
+/* ---- command line ---- */
+
+static int choose(const char *option, const char *word, const char *const *words)
+{
+    int i;
+    for (i = 0; words[i]; ++i)
+        if (strcmp(words[i], word) == 0) return i;
+    fprintf(stderr, "demo: --%s %s: must be one of", option, word);
+    for (i = 0; words[i]; ++i) fprintf(stderr, " %s", words[i]);
+    fputc('\n', stderr);
+    exit(2);
+}
+
+/* "out/demo.png" with "_mosaic" or "_0003" before the ending, which may be another one. */
+static void path_with(char *out, size_t size, const char *path, const char *more, const char *ending)
+{
+    const char *dot = strrchr(path, '.'), *slash = strrchr(path, '/');
+    int stem = dot && (!slash || dot > slash) ? (int)(dot - path) : (int)strlen(path);
+    snprintf(out, size, "%.*s%s%s", stem, path, more, ending ? ending : path + stem);
+}
+
+static int save(pipeline *p, const char *path)
+{
+    char exr[1024];
+    path_with(exr, sizeof exr, path, "", ".exr");
+#ifdef HAVE_OPENEXR
+    if (!image_save(&p->hdr, exr)) fprintf(stderr, "demo: %s\n", p->hdr.message);
+#endif
+    if (image_save_u8(path, p->pixels, p->options.width, p->options.height, 3)) return 1;
+    fprintf(stderr, "demo: %s cannot be written\n", path);
+    return 0;
+}
+
+static int run(pipeline *p, int frames, const char *out, int stats, int mosaic)
+{
+    double sum[PIPELINE_STAGES] = {0};
+    common_progress progress = {0, 0};
+    char path[1024], number[16];
+    int i, k;
+    for (i = 0; i < frames; ++i) {
+        if (!pipeline_frame(p, i ? 1 / 30.0 : 0)) {
+            fprintf(stderr, "demo: %s\n", p->message);
+            return 0;
+        }
+        for (k = PIPELINE_SCENE; k < PIPELINE_STAGES; ++k) sum[k] += p->seconds[k];
+        snprintf(number, sizeof number, "_%04d", i);
+        path_with(path, sizeof path, out, frames > 1 ? number : "", NULL);
+        if (!save(p, path)) return 0;
+        common_show_progress(&progress, "frames", i + 1, frames);
+    }
+    for (k = PIPELINE_SCENE; k < PIPELINE_STAGES; ++k) p->seconds[k] = sum[k] / frames;
+    if (stats) print_table(p);
+    path_with(path, sizeof path, out, "_mosaic", NULL);
+    return !mosaic || make_mosaic(p, path);
+}
+
+int main(int argc, char **argv)
+{
+    static const char *const hours[] = {"dusk", "night", "noon", NULL};
+    static const char *const operators[] = {"local", "global", "ashikhmin", "ashikhmin-global", "linear", NULL};
+    static const char *const mesopics[] = {"off", "uniform", "local", NULL};
+    const char *hour = "dusk", *operation = "local", *mesopic = "local", *rate = "150mm", *env = NULL, *shape = NULL, *out;
+    int size[2] = {1280, 720}, frames = 1, mosaic = 0, no_shadows = 0, no_occlusion = 0, no_rain = 0, no_tone = 0, first, ok;
+    pipeline_options o = pipeline_defaults();
+    const common_option options[] = {
+        {"env", 's', &env, "equirectangular picture of the light; without it a sky of our own"},
+        {"mesh", 's', &shape, "PLY or OBJ instead of the knot"},
+        {"size", 'z', size, "of the picture, 1280x720"},
+        {"rate", 's', &rate, "rain an hour, 150mm"},
+        {"hour", 's', &hour, "dusk, night or noon"},
+        {"turn", 'f', &o.turn, "degrees by which the light is turned"},
+        {"ao-radius", 'f', &o.ao_radius, "reach of ambient occlusion, 0.12 m"},
+        {"shutter", 'f', &o.shutter, "seconds for which the drops move, 0.001"},
+        {"operator", 's', &operation, "local, global, ashikhmin, ashikhmin-global or linear"},
+        {"key", 'f', &o.key, "display value of the log-average; 0: one for the hour"},
+        {"exposure", 'f', &o.exposure, "stops more light"},
+        {"mesopic", 's', &mesopic, "off, uniform or local: reds fade in dim light"},
+        {"samples", 'i', &o.samples, "points a pixel each way, 1 to 4; 2"},
+        {"frames", 'i', &frames, "pictures, 1/30 s apart"},
+        {"mosaic", 'b', &mosaic, "the picture again, from tiles"},
+        {"no-shadows", 'b', &no_shadows, "leave fiv.h out"},
+        {"no-occlusion", 'b', &no_occlusion, "leave ssao_sat.h out"},
+        {"no-rain", 'b', &no_rain, "leave raindrop.h out"},
+        {"no-tone", 'b', &no_tone, "leave tonemap.h out but for the exposure"},
+    };
+    common_settings common;
+    image light;
+    mesh sculpture;
+    pipeline p;
+    char *end;
+    first = common_parse(&common, argc, argv, "demo [options] [out.png]", options, (int)(sizeof options / sizeof options[0]));
+    out = common.out ? common.out : first < argc ? argv[first] : "demo.png";
+    o.hour = (scene_hour)choose("hour", hour, hours);
+    o.operation = (tonemap_operator)choose("operator", operation, operators);
+    o.mesopic = (tonemap_mesopic)choose("mesopic", mesopic, mesopics);
+    o.rate = (float)strtod(rate, &end);
+    if (end == rate || (*end && strcmp(end, "mm") != 0) || !(o.rate >= 0 && o.rate <= 500) || frames < 1 || frames > 9999) {
+        fprintf(stderr, "demo: --rate goes from 0mm to 500mm, --frames from 1 to 9999\n");
+        return 2;
+    }
+    o.width = size[0], o.height = size[1];
+    o.shadows = !no_shadows, o.occlusion = !no_occlusion, o.rain = !no_rain && o.rate > 0, o.tone = !no_tone;
+    o.threads = common.threads;
+    memset(&light, 0, sizeof light);
+    memset(&sculpture, 0, sizeof sculpture);
+    if ((env && !image_load(&light, env)) || (shape && !mesh_load(&sculpture, shape))) {
+        fprintf(stderr, "demo: %s\n", env && !light.pixels ? light.message : sculpture.message);
+        return 1;
+    }
+    o.environment = env ? &light : NULL;
+    o.shape = shape ? &sculpture : NULL;
+    ok = pipeline_create(&p, &o);
+    if (!ok) fprintf(stderr, "demo: %s\n", p.message);
+    ok = ok && run(&p, frames, out, common.stats, mosaic);
+    pipeline_destroy(&p);
+    image_free(&light);
+    mesh_free(&sculpture);
+    return !ok;
+}
