@@ -261,7 +261,7 @@ typedef struct raindrop_render_options {
     float coverage_threshold;  /* 0.0001; 0..1: drops that cover less of a pixel are left out and counted */
     int orders;                /* 1; 0..3: internal reflections, RAY and AUTO */
     int exit_fresnel;          /* 0: the last order carries what later ones would (0 orders: eq 2.5); 1: only its own */
-    float orders_radius;       /* 8 px; smaller drops do with order 0 */
+    float orders_radius;       /* 8 px; smaller drops do with order 0, and one ray a pixel at the rim too */
     int sort;                  /* 1: far to near; 0: in the order of the array, as published */
 } raindrop_render_options;
 RAINDROP_DEF raindrop_render_options raindrop_render_defaults(void);
@@ -808,13 +808,28 @@ RAINDROP_DEF sat_result raindrop_map_level_half(uint16_t *out, const raindrop_ma
 
 static inline void raindrop__map_bilinear(float out[8], const raindrop_map *map, int level, float s, float t)
 {
-    int r = map->base >> level, i;
-    float x = (s * 0.5f + 0.5f) * (float)r - 0.5f, y = (t * 0.5f + 0.5f) * (float)r - 0.5f, fx = floorf(x), fy = floorf(y);
-    float a = x - fx, b = y - fy, w00 = (1 - a) * (1 - b), w10 = a * (1 - b), w01 = (1 - a) * b, w11 = a * b;
-    size_t x0 = (size_t)sat__clamp_int((int)fx, 0, r - 1), x1 = (size_t)sat__clamp_int((int)fx + 1, 0, r - 1);
-    size_t y0 = (size_t)sat__clamp_int((int)fy, 0, r - 1) * (size_t)r, y1 = (size_t)sat__clamp_int((int)fy + 1, 0, r - 1) * (size_t)r;
-    const float *p00 = map->level[level] + 8 * (y0 + x0), *p10 = map->level[level] + 8 * (y0 + x1);
-    const float *p01 = map->level[level] + 8 * (y1 + x0), *p11 = map->level[level] + 8 * (y1 + x1);
+    int r = map->base >> level, i, x, y;
+    float a = (s * 0.5f + 0.5f) * (float)r + 0.5f, b = (t * 0.5f + 0.5f) * (float)r + 0.5f, w00, w10, w01, w11;
+    const float *p00, *p10, *p01, *p11;
+    size_t x0, x1, y0, y1;
+    a = a > 0 ? a : 0; /* a sprite's corner may lie half a texel outside */
+    b = b > 0 ? b : 0;
+    x = (int)a;
+    y = (int)b;
+    a -= (float)x;
+    b -= (float)y;
+    w00 = (1 - a) * (1 - b);
+    w10 = a * (1 - b);
+    w01 = (1 - a) * b;
+    w11 = a * b;
+    x0 = (size_t)sat__clamp_int(x - 1, 0, r - 1);
+    x1 = (size_t)sat__min_int(x, r - 1);
+    y0 = (size_t)sat__clamp_int(y - 1, 0, r - 1) * (size_t)r;
+    y1 = (size_t)sat__min_int(y, r - 1) * (size_t)r;
+    p00 = map->level[level] + 8 * (y0 + x0);
+    p10 = map->level[level] + 8 * (y0 + x1);
+    p01 = map->level[level] + 8 * (y1 + x0);
+    p11 = map->level[level] + 8 * (y1 + x1);
     for (i = 0; i < 8; i++) out[i] = w00 * p00[i] + w10 * p10[i] + w01 * p01[i] + w11 * p11[i];
 }
 
@@ -2052,19 +2067,27 @@ static inline void raindrop__tangents(float range[2], float u, float z, float ra
 
 typedef struct raindrop__box { int x0, y0, x1, y1; } raindrop__box;
 
-static inline int raindrop__pixel(float v, int limit)
+/* Rounded down or up after clamping to the picture: no call of floor. */
+static inline int raindrop__pixel_down(float v, int limit)
 {
     float inside = raindrop__clamp(v, 0, (float)limit);
     return (int)inside;
 }
 
+static inline int raindrop__pixel_up(float v, int limit)
+{
+    float inside = raindrop__clamp(v, 0, (float)limit);
+    int down = (int)inside;
+    return down + ((float)down < inside);
+}
+
 static inline raindrop__box raindrop__make_box(const raindrop__frame *frame, float x0, float y0, float x1, float y1)
 {
     raindrop__box box;
-    box.x0 = raindrop__pixel(floorf(x0), frame->width);
-    box.y0 = raindrop__pixel(floorf(y0), frame->height);
-    box.x1 = raindrop__pixel(ceilf(x1), frame->width);
-    box.y1 = raindrop__pixel(ceilf(y1), frame->height);
+    box.x0 = raindrop__pixel_down(x0, frame->width);
+    box.y0 = raindrop__pixel_down(y0, frame->height);
+    box.x1 = raindrop__pixel_up(x1, frame->width);
+    box.y1 = raindrop__pixel_up(y1, frame->height);
     return box;
 }
 
@@ -2148,9 +2171,8 @@ static inline void raindrop__add_motion(raindrop__visible *v, const raindrop__fr
 static inline raindrop__fate raindrop__reject(const raindrop__frame *frame, const raindrop_drop *drop, const raindrop__placed *placed, float reach)
 {
     float r = placed->radius;
-    if (!raindrop__finite3(drop->position) || !sat__is_finite(drop->radius) || !(drop->radius > 0) || !(drop->axis_ratio > 0) ||
-        !(drop->axis_ratio <= 1) || !raindrop__finite3(drop->velocity) || !sat__is_finite(placed->distance2))
-        return RAINDROP__INVALID;
+    float all = fabsf(drop->velocity[0]) + fabsf(drop->velocity[1]) + fabsf(drop->velocity[2]) + placed->distance2; /* finite if all are */
+    if (!sat__is_finite(all) || !sat__is_finite(r) || !(r > 0) || !(drop->axis_ratio > 0 && drop->axis_ratio <= 1)) return RAINDROP__INVALID;
     if (placed->distance2 <= 1.0001f * r * r) return RAINDROP__INSIDE;
     if (placed->z <= 0) return RAINDROP__BEHIND;
     if (!(placed->z - r > frame->camera.near_distance) || !(placed->z > 1.0001f * r)) return RAINDROP__NEAR_PLANE;
@@ -2281,7 +2303,7 @@ typedef struct raindrop__batch {
     float width, blur;    /* footprint of a pixel in b, and its widening */
     int orders;           /* -1: the short way without orders */
     float flatness;
-    int pixel[RAINDROP__BATCH];
+    float *pixel[RAINDROP__BATCH];
     float slope_x[RAINDROP__BATCH], slope_y[RAINDROP__BATCH]; /* the pixel's ray (x, y, -1) */
     float offset_x[RAINDROP__BATCH], offset_y[RAINDROP__BATCH]; /* q: where it passes the plane of the centre, in radii */
     float alpha[RAINDROP__BATCH];
@@ -2446,40 +2468,73 @@ static inline void raindrop__flat_colour(float colour[4], raindrop__batch *batch
     for (c = 0; c < 3; c++) colour[c] += (batch->frame->options.exit_fresnel ? ray.transmit : 1 - ray.fresnel) * v[c];
 }
 
+/* Adds one ray's orders. */
+static inline void raindrop__add_orders(float colour[4], const raindrop__batch *batch, const float d[3], const float p[3], float one_minus_b2)
+{
+    const raindrop_environment *environment = batch->frame->environment;
+    const int exit_fresnel = batch->frame->options.exit_fresnel;
+    float pixel = 1 / batch->frame->focal, v[4];
+    raindrop_order order;
+    raindrop_ray ray;
+    int k, c;
+    raindrop_trace(&ray, d, p, one_minus_b2, environment->n);
+    raindrop__sample(v, environment, ray.reflect, batch->blur * (ray.footprint_reflect * batch->width + pixel));
+    for (c = 0; c < 3; c++) colour[c] += ray.fresnel * v[c];
+    for (k = 0; k <= batch->orders; k++) {
+        float share;
+        raindrop_trace_order(&order, d, p, one_minus_b2, environment->n, k);
+        share = k == batch->orders && !exit_fresnel ? order.rest : order.weight;
+        raindrop__sample(v, environment, order.direction, batch->blur * fabsf(order.footprint * batch->width - pixel));
+        for (c = 0; c < 3; c++) colour[c] += share * v[c];
+    }
+}
+
+/* One fragment of a large drop. At the rim the angles change so fast along the radius that one lookup, however wide, is
+   wrong: four rays there share the pixel. */
+static inline void raindrop__large_colour(float colour[4], raindrop__batch *batch, int i, const float d[3], const float p[3])
+{
+    enum { TAPS = 4 };
+    float b = sqrtf(1 - batch->one_minus_b2[i]), tap[3];
+    int j, c, n = 0;
+    if (1 - b > 3 * batch->width || batch->width > 0.25f) {
+        raindrop__add_orders(colour, batch, d, p, batch->one_minus_b2[i]);
+        return;
+    }
+    for (j = 0; j < TAPS; j++) {
+        float at = b + (((float)j + 0.5f) / TAPS - 0.5f) * batch->width;
+        if (at >= 1 || at <= 0) continue;
+        raindrop__combine(tap, at / b, p, 0, p);
+        raindrop__add_orders(colour, batch, d, tap, (1 - at) * (1 + at));
+        n++;
+    }
+    for (c = 0; c < 3; c++) colour[c] /= (float)n;
+}
+
 /* Large drops: all orders, one ray at a time. Flattened ones: their own two hits. */
 static inline void raindrop__batch_slow(float (*colour)[4], raindrop__batch *batch)
 {
-    const raindrop_environment *environment = batch->frame->environment;
-    float pixel = 1 / batch->frame->focal, v[4], d[3], p[3];
-    int i, c, k;
+    float d[3], p[3];
+    int i;
     for (i = 0; i < batch->count; i++) {
-        raindrop_ray ray;
         memset(colour[i], 0, sizeof colour[i]);
         if (!(batch->alpha[i] > 0)) continue;
         raindrop__set(d, batch->direction[0][i], batch->direction[1][i], batch->direction[2][i]);
         raindrop__set(p, batch->closest[0][i], batch->closest[1][i], batch->closest[2][i]);
-        if (batch->flatness < 1) {
-            raindrop__flat_colour(colour[i], batch, i, d, p);
-            continue;
+        if (batch->flatness < 1) raindrop__flat_colour(colour[i], batch, i, d, p);
+        else {
+            raindrop__large_colour(colour[i], batch, i, d, p);
+            batch->tally->order_fragments += batch->orders > 0;
         }
-        raindrop_trace(&ray, d, p, batch->one_minus_b2[i], environment->n);
-        raindrop__sample(v, environment, ray.reflect, batch->blur * (ray.footprint_reflect * batch->width + pixel));
-        for (c = 0; c < 3; c++) colour[i][c] = ray.fresnel * v[c];
-        for (k = 0; k <= batch->orders; k++) {
-            raindrop_order order;
-            float share;
-            raindrop_trace_order(&order, d, p, batch->one_minus_b2[i], environment->n, k);
-            share = k == batch->orders && !batch->frame->options.exit_fresnel ? order.rest : order.weight;
-            raindrop__sample(v, environment, order.direction, batch->blur * fabsf(order.footprint * batch->width - pixel));
-            for (c = 0; c < 3; c++) colour[i][c] += share * v[c];
-        }
-        batch->tally->order_fragments += batch->orders > 0;
     }
 }
 
-static inline void raindrop__blend(const raindrop__frame *frame, int pixel, float alpha, const float colour[3])
+static inline float *raindrop__pixel(const raindrop__frame *frame, int x, int y)
 {
-    float *out = (float *)(void *)(frame->rgb + (ptrdiff_t)(pixel / frame->width) * frame->stride) + 3 * (pixel % frame->width);
+    return (float *)(void *)(frame->rgb + (ptrdiff_t)y * frame->stride) + 3 * (ptrdiff_t)x;
+}
+
+static inline void raindrop__blend(float *out, float alpha, const float colour[3])
+{
     out[0] += alpha * (colour[0] - out[0]);
     out[1] += alpha * (colour[1] - out[1]);
     out[2] += alpha * (colour[2] - out[2]);
@@ -2494,7 +2549,7 @@ static inline void raindrop__batch_blend(raindrop__batch *batch, float (*colour)
             for (c = 0; c < 3; c++) mean[c] += colour[j][c];
         for (c = 0; c < 3; c++) mean[c] /= (float)m;
         if (!(batch->alpha[i] > 0)) continue;
-        raindrop__blend(batch->frame, batch->pixel[i], batch->alpha[i], mean);
+        raindrop__blend(batch->pixel[i], batch->alpha[i], mean);
         batch->tally->fragments++;
     }
     batch->count = 0;
@@ -2531,7 +2586,7 @@ static inline void raindrop__push_ray(raindrop__batch *batch, int x, int y, floa
 {
     const raindrop__frame *frame = batch->frame;
     int at = batch->count++;
-    batch->pixel[at] = y * frame->width + x;
+    batch->pixel[at] = raindrop__pixel(frame, x, y);
     batch->slope_x[at] = ((float)x + 0.5f - frame->half_width) / frame->focal;
     batch->slope_y[at] = (frame->half_height - (float)y - 0.5f) / frame->focal;
     batch->offset_x[at] = ((float)x + 0.5f - centre_x) * batch->focal_in_radii;
@@ -2546,7 +2601,7 @@ static inline void raindrop__begin_drop(raindrop__batch *batch, const raindrop__
     batch->blur = 1;
     batch->samples = 1;
     batch->flatness = placed->flatness;
-    batch->orders = (o->orders > 0 || o->exit_fresnel) && v->radius >= o->orders_radius && !raindrop__is_sprite(batch->frame) ? o->orders : -1;
+    batch->orders = v->radius >= o->orders_radius && !raindrop__is_sprite(batch->frame) ? o->orders : -1;
 }
 
 static inline void raindrop__draw_still(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
@@ -2602,10 +2657,9 @@ static inline void raindrop__draw_far_soft(raindrop__batch *batch, const raindro
     int x, y;
     for (y = box->y0; y < box->y1; y++) {
         for (x = box->x0; x < box->x1; x++) {
-            int pixel = y * frame->width + x;
             float alpha = opacity * raindrop__path_cover(span, &path, (float)x + 0.5f - v->x, (float)y + 0.5f - v->y);
-            if (!(alpha > 0) || raindrop__occluded(frame, (size_t)pixel, v->depth)) continue;
-            raindrop__blend(frame, pixel, alpha, v->colour);
+            if (!(alpha > 0) || raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth)) continue;
+            raindrop__blend(raindrop__pixel(frame, x, y), alpha, v->colour);
             batch->tally->fragments++;
         }
     }
@@ -2676,8 +2730,8 @@ static inline void raindrop__draw_far(raindrop__batch *batch, const raindrop__vi
         for (x = box->x0; x < box->x1; x++) {
             float left = v->x - half > (float)x ? v->x - half : (float)x, right = v->x + half < (float)(x + 1) ? v->x + half : (float)(x + 1);
             float alpha = (high - low) * (right - left);
-            if (!(high > low) || !(right > left) || raindrop__occluded(frame, (size_t)(y * frame->width + x), v->depth)) continue;
-            raindrop__blend(frame, y * frame->width + x, alpha, v->colour);
+            if (!(high > low) || !(right > left) || raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth)) continue;
+            raindrop__blend(raindrop__pixel(frame, x, y), alpha, v->colour);
             batch->tally->fragments++;
         }
     }
@@ -2780,7 +2834,7 @@ static inline void raindrop__draw_sprite(raindrop__batch *batch, const raindrop_
 #endif
                 kept = raindrop__push_sprite(batch, at, s, t, distance, axes);
             if (!kept) continue;
-            batch->pixel[at] = y * frame->width + x;
+            batch->pixel[at] = raindrop__pixel(frame, x, y);
             batch->count++;
             if (batch->count == RAINDROP__BATCH) raindrop__flush_sprite(batch);
         }
@@ -2793,9 +2847,8 @@ static inline void raindrop__draw_sprite(raindrop__batch *batch, const raindrop_
 static inline void raindrop__draw(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
 {
     const raindrop__frame *frame = batch->frame;
-    raindrop__placed placed;
+    raindrop__placed placed = {0, 0, 0, 0, 0, 0};
     raindrop__box box;
-    memset(&placed, 0, sizeof placed);
     if (!(v->drop & RAINDROP__FAR_BIT)) {
         raindrop__place_drop(&placed, frame, &frame->rain->drops[v->drop]);
         raindrop__begin_drop(batch, v, &placed);
@@ -2814,20 +2867,46 @@ static inline void raindrop__draw(raindrop__batch *batch, const raindrop__visibl
     else raindrop__draw_still(batch, v, &box);
 }
 
+/* Records lie in the order of the array, not of the depths: those of the next drops are asked for before they are used. */
+static inline void raindrop__fetch(const raindrop__visible *v)
+{
+#if defined(SAT__SSE2)
+    _mm_prefetch((const char *)v, _MM_HINT_T0);
+#elif defined(__GNUC__)
+    __builtin_prefetch(v);
+#else
+    (void)v;
+#endif
+}
+
+static inline void raindrop__draw_queue(raindrop__batch *batch, const uint32_t *queue, int count, int y0, int y1)
+{
+    int i;
+    for (i = 0; i < count; i++) raindrop__draw(batch, &batch->frame->rain->visible[queue[i]], y0, y1);
+}
+
 static void raindrop__draw_bands(int begin, int end, int worker, void *context)
 {
+    enum { QUEUE = 32 };
     const raindrop__frame *frame = (const raindrop__frame *)context;
     raindrop__batch batch;
-    int band, i;
+    uint32_t queue[QUEUE];
+    int band, i, n;
     memset(&batch, 0, sizeof batch);
     batch.frame = frame;
     batch.tally = &frame->rain->tally[worker];
     for (band = begin; band < end; band++) {
         int y0 = band * RAINDROP__BAND, y1 = sat__min_int(y0 + RAINDROP__BAND, frame->height);
-        for (i = 0; i < frame->visible; i++) {
+        for (i = n = 0; i < frame->visible; i++) {
             uint32_t rows = frame->rain->rows[i];
-            if ((int)(rows >> 16) < y1 && (int)(rows & 0xffffu) > y0) raindrop__draw(&batch, &frame->rain->visible[frame->order[i].at], y0, y1);
+            if ((int)(rows >> 16) >= y1 || (int)(rows & 0xffffu) <= y0) continue;
+            queue[n] = frame->order[i].at;
+            raindrop__fetch(&frame->rain->visible[queue[n]]);
+            if (++n < QUEUE) continue;
+            raindrop__draw_queue(&batch, queue, n, y0, y1);
+            n = 0;
         }
+        raindrop__draw_queue(&batch, queue, n, y0, y1);
     }
 }
 

@@ -94,12 +94,12 @@ static inline reference_drop reference_trace(const reference_real *origin, const
 
 /* ---- environment: bilinear in the equirectangular picture, in double */
 
-static inline void reference_environment(double *rgb, const sat_image *image, const double *d)
+static inline void reference_environment(double *rgb, const sat_image *picture, const double *d)
 {
     double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), pi = acos(-1.0);
-    double x = (atan2(d[0], -d[2]) / (2 * pi) + 0.5) * image->width - 0.5, y = acos(d[1] / length) / pi * image->height - 0.5;
+    double x = (atan2(d[0], -d[2]) / (2 * pi) + 0.5) * picture->width - 0.5, y = acos(d[1] / length) / pi * picture->height - 0.5;
     double fx = x - floor(x), fy = y - floor(y);
-    int i, j, c, w = image->width, h = image->height;
+    int i, j, c, w = picture->width, h = picture->height;
     for (c = 0; c < 3; c++) rgb[c] = 0;
     for (j = 0; j < 2; j++) {
         for (i = 0; i < 2; i++) {
@@ -107,7 +107,7 @@ static inline void reference_environment(double *rgb, const sat_image *image, co
             double weight = (i ? fx : 1 - fx) * (j ? fy : 1 - fy);
             const float *p;
             yi = yi < 0 ? 0 : yi >= h ? h - 1 : yi;
-            p = (const float *)(const void *)((const char *)image->pixels + (ptrdiff_t)yi * image->stride) + (size_t)xi * (size_t)image->channels;
+            p = (const float *)(const void *)((const char *)picture->pixels + (ptrdiff_t)yi * picture->stride) + (size_t)xi * (size_t)picture->channels;
             for (c = 0; c < 3; c++) rgb[c] += weight * (double)p[c];
         }
     }
