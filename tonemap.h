@@ -277,7 +277,7 @@ struct tonemap {
     sat_allocator allocator;
     void *block;
     size_t block_size;
-    int width, height, row, ring_row, workers, tiles_x, tiles_y, started;
+    int width, height, row, ring_row, workers, tiles_x, tiles_y, started, skipping;
     float *luminance;       /* the picture, rows `row` floats apart */
     float *row_sum;         /* of each row */
     struct tonemap__range *tile_range, *tile_reached; /* of each tile: its own; with its neighbours in the row */
@@ -715,39 +715,22 @@ static inline void tonemap__prepare_frame(tonemap *map)
 
 typedef struct tonemap__range { float low, high, pixel_low, pixel_high; } tonemap__range;
 
-/* low and high from the extremes of sums over 2 x 2, 3 x 2, 2 x 3 and 3 x 3 pixels */
-static inline void tonemap__set_range(tonemap__range *range, const float *low, const float *high)
+/* Windows that begin in `rows` rows of a tile; two more rows, `row` floats apart, and two more columns follow. */
+static inline void tonemap__tile_range_plain(tonemap__range *range, const float *tile, int row, int rows)
 {
     static const float share[4] = {1 / 4.0f, 1 / 6.0f, 1 / 6.0f, 1 / 9.0f};
-    int i;
-    range->low = low[0] * share[0];
-    range->high = high[0] * share[0];
-    for (i = 1; i < 4; i++) {
-        if (low[i] * share[i] < range->low) range->low = low[i] * share[i];
-        if (high[i] * share[i] > range->high) range->high = high[i] * share[i];
-    }
-}
-
-/* Windows that begin in rows [y, y1) of a tile's columns. The rows are padded with the last pixel, and the last row
-   stands for those below it: that adds no new values. */
-static inline void tonemap__tile_range_plain(tonemap__range *range, const tonemap *map, int x, int y, int y1)
-{
-    float low[4], high[4];
-    int i, k, begin = y, end = x + TONEMAP__TILE, last = map->height - 1;
-    for (k = 0; k < 4; k++) {
-        low[k] = FLT_MAX;
-        high[k] = 0;
-    }
-    range->pixel_low = range->pixel_high = map->luminance[(size_t)y * (size_t)map->row + (size_t)x];
-    for (; x < end; x++)
-        for (y = begin; y < y1; y++) {
+    float low[4] = {FLT_MAX, FLT_MAX, FLT_MAX, FLT_MAX}, high[4] = {0, 0, 0, 0};
+    int i, k, x, y;
+    range->pixel_low = range->pixel_high = tile[0];
+    for (x = 0; x < TONEMAP__TILE; x++)
+        for (y = 0; y < rows; y++) {
+            const float *p = tile + (ptrdiff_t)y * row + x;
             float sum[4], h2[3], h3[3];
-            for (i = 0; i < 3; i++) {
-                const float *p = map->luminance + (size_t)sat__min_int(y + i, last) * (size_t)map->row + x;
+            range->pixel_low = p[0] < range->pixel_low ? p[0] : range->pixel_low;
+            range->pixel_high = p[0] > range->pixel_high ? p[0] : range->pixel_high;
+            for (i = 0; i < 3; i++, p += row) {
                 h2[i] = p[0] + p[1];
                 h3[i] = h2[i] + p[2];
-                if (i == 0) range->pixel_low = p[0] < range->pixel_low ? p[0] : range->pixel_low;
-                if (i == 0) range->pixel_high = p[0] > range->pixel_high ? p[0] : range->pixel_high;
             }
             sum[0] = h2[0] + h2[1];
             sum[1] = h3[0] + h3[1];
@@ -758,7 +741,12 @@ static inline void tonemap__tile_range_plain(tonemap__range *range, const tonema
                 high[k] = sum[k] > high[k] ? sum[k] : high[k];
             }
         }
-    tonemap__set_range(range, low, high);
+    range->low = low[0] * share[0];
+    range->high = high[0] * share[0];
+    for (k = 1; k < 4; k++) {
+        if (low[k] * share[k] < range->low) range->low = low[k] * share[k];
+        if (high[k] * share[k] > range->high) range->high = high[k] * share[k];
+    }
 }
 
 #ifdef SAT__VECTOR
@@ -781,22 +769,20 @@ static inline float tonemap__highest4(sat__f32x4 v)
 }
 
 /* Two rows of sums over two and three columns are carried down: the windows that begin in a row need the next two. */
-static inline void tonemap__tile_range_vector(tonemap__range *range, const tonemap *map, int x, int y, int y1)
+static inline void tonemap__tile_range_vector(tonemap__range *range, const float *tile, int row, int rows)
 {
     sat__f32x4 low22 = sat__f32x4_set1(FLT_MAX), low32 = low22, low23 = low22, low33 = low22, darkest = low22;
     sat__f32x4 high22 = sat__f32x4_set1(0), high32 = high22, high23 = high22, high33 = high22, brightest = high22;
-    float low[4], high[4];
-    int at, end = x + TONEMAP__TILE, last = map->height - 1;
-    for (; x < end; x += 4) {
-        const float *row = map->luminance + (size_t)y * (size_t)map->row + x;
-        sat__f32x4 pixel = sat__f32x4_load(row), next, two, three, two_below, three_below;
-        two = sat__f32x4_add(pixel, sat__f32x4_load(row + 1));
-        three = sat__f32x4_add(two, sat__f32x4_load(row + 2));
-        row = map->luminance + (size_t)sat__min_int(y + 1, last) * (size_t)map->row + x;
-        next = sat__f32x4_load(row);
-        two_below = sat__f32x4_add(next, sat__f32x4_load(row + 1));
-        three_below = sat__f32x4_add(two_below, sat__f32x4_load(row + 2));
-        for (at = y; at < y1; at++) {
+    int x, y;
+    for (x = 0; x < TONEMAP__TILE; x += 4) {
+        const float *p = tile + x;
+        sat__f32x4 pixel = sat__f32x4_load(p), next = sat__f32x4_load(p + row), two, three, two_below, three_below;
+        two = sat__f32x4_add(pixel, sat__f32x4_load(p + 1));
+        three = sat__f32x4_add(two, sat__f32x4_load(p + 2));
+        p += row;
+        two_below = sat__f32x4_add(next, sat__f32x4_load(p + 1));
+        three_below = sat__f32x4_add(two_below, sat__f32x4_load(p + 2));
+        for (y = 0; y < rows; y++) {
             sat__f32x4 sum2 = sat__f32x4_add(two, two_below), sum3 = sat__f32x4_add(three, three_below);
             darkest = sat__f32x4_min(darkest, pixel);
             brightest = sat__f32x4_max(brightest, pixel);
@@ -807,10 +793,10 @@ static inline void tonemap__tile_range_vector(tonemap__range *range, const tonem
             two = two_below;
             three = three_below;
             pixel = next;
-            row = map->luminance + (size_t)sat__min_int(at + 2, last) * (size_t)map->row + x;
-            next = sat__f32x4_load(row);
-            two_below = sat__f32x4_add(next, sat__f32x4_load(row + 1));
-            three_below = sat__f32x4_add(two_below, sat__f32x4_load(row + 2));
+            p += row;
+            next = sat__f32x4_load(p);
+            two_below = sat__f32x4_add(next, sat__f32x4_load(p + 1));
+            three_below = sat__f32x4_add(two_below, sat__f32x4_load(p + 2));
             sum2 = sat__f32x4_add(sum2, two_below);
             sum3 = sat__f32x4_add(sum3, three_below);
             low23 = sat__f32x4_min(low23, sum2);
@@ -819,17 +805,14 @@ static inline void tonemap__tile_range_vector(tonemap__range *range, const tonem
             high33 = sat__f32x4_max(high33, sum3);
         }
     }
-    low[0] = tonemap__lowest4(low22);
-    low[1] = tonemap__lowest4(low32);
-    low[2] = tonemap__lowest4(low23);
-    low[3] = tonemap__lowest4(low33);
-    high[0] = tonemap__highest4(high22);
-    high[1] = tonemap__highest4(high32);
-    high[2] = tonemap__highest4(high23);
-    high[3] = tonemap__highest4(high33);
+    low22 = sat__f32x4_min(sat__f32x4_mul(low22, sat__f32x4_set1(1 / 4.0f)), sat__f32x4_mul(low33, sat__f32x4_set1(1 / 9.0f)));
+    low23 = sat__f32x4_mul(sat__f32x4_min(low23, low32), sat__f32x4_set1(1 / 6.0f));
+    high22 = sat__f32x4_max(sat__f32x4_mul(high22, sat__f32x4_set1(1 / 4.0f)), sat__f32x4_mul(high33, sat__f32x4_set1(1 / 9.0f)));
+    high23 = sat__f32x4_mul(sat__f32x4_max(high23, high32), sat__f32x4_set1(1 / 6.0f));
+    range->low = tonemap__lowest4(sat__f32x4_min(low22, low23));
+    range->high = tonemap__highest4(sat__f32x4_max(high22, high23));
     range->pixel_low = tonemap__lowest4(darkest);
     range->pixel_high = tonemap__highest4(brightest);
-    tonemap__set_range(range, low, high);
 }
 #endif
 
@@ -839,24 +822,107 @@ static inline void tonemap__merge_range(tonemap__range *range, const tonemap__ra
     range->high = other->high > range->high ? other->high : range->high;
 }
 
-/* The ranges of a row of tiles, and what the boxes around their pixels reach in that row. */
+/* The rows of a row of tiles side by side in the cache: walked tile by tile where they are, they come one line at a
+   time from far away. Rows are padded with their last pixel, and the last row stands for those below it, which adds no
+   new values. */
+static inline const float *tonemap__gather_tiles(const tonemap *map, tonemap__worker *w, int ty)
+{
+    float *rows = (float *)(void *)w->sums;
+    int i;
+    for (i = 0; i < TONEMAP__TILE + 2; i++)
+        memcpy(rows + (size_t)i * (size_t)map->row, map->luminance + (size_t)sat__min_int(ty * TONEMAP__TILE + i, map->height - 1) * (size_t)map->row,
+               (size_t)map->row * sizeof(float));
+    return rows;
+}
+
+static inline void tonemap__find_range(tonemap *map, const float *rows, int tx, int ty)
+{
+    tonemap__range *range = &map->tile_range[(size_t)ty * (size_t)map->tiles_x + (size_t)tx];
+    int count = sat__min_int(TONEMAP__TILE, map->height - ty * TONEMAP__TILE);
+#ifdef SAT__VECTOR
+    tonemap__tile_range_vector(range, rows + tx * TONEMAP__TILE, map->row, count);
+#else
+    tonemap__tile_range_plain(range, rows + tx * TONEMAP__TILE, map->row, count);
+#endif
+}
+
+/* v^(1 / 2.4): sRGB codes are 269.025 times it less 14.025. Below 0.0031308 they are fewer; the bound is larger there. */
+static inline float tonemap__power(float v) { return tonemap__exp2(tonemap__log2(v) * (1 / 2.4f)); }
+
+/* What 1 / (1 + La) can be, and the largest component that the display does not clip. */
+typedef struct tonemap__bound { float most, least, peak; } tonemap__bound;
+
+static inline tonemap__bound tonemap__display_bound(const tonemap *map, const tonemap__range *range, float peak)
+{
+    const tonemap__frame *f = &map->frame;
+    float half = 0.5f / f->quantum, low = range->low, high = range->high, pixel = range->pixel_high * f->scale;
+    tonemap__bound bound;
+    if (pixel > f->cap) pixel = f->cap;
+    if (!(pixel < f->term[0] && high * f->scale < f->term[0])) { /* the first step may fail: La is then the pixel */
+        low = range->pixel_low < low ? range->pixel_low : low;
+        high = range->pixel_high > high ? range->pixel_high : high;
+    }
+    high = high * f->scale < f->cap ? high * f->scale : f->cap;
+    bound.most = 1 / (1 + (low * f->scale > half ? low * f->scale - half : 0)); /* the means are of rounded pixels */
+    bound.least = 1 / (1 + high + half);
+    peak *= f->scale * (1 + pixel * f->inverse_white2);
+    bound.peak = peak > TONEMAP__DARKEST ? peak * bound.most < 1 ? peak : 1 / bound.most : TONEMAP__DARKEST;
+    return bound;
+}
+
+/* A quick no: x^p >= x and 1 - x^p >= p (1 - x) for p = 1 / 2.4 and x <= 1. */
+static inline int tonemap__may_skip(const tonemap *map, const tonemap__bound *b)
+{
+    return 269.025f / 2.4f * b->peak * (b->most - b->least) <= 2.1f * (float)map->options.tolerance_codes;
+}
+
+/* The La of a tile that needs no search, or -1; *error is how many codes it may be off. */
+static inline float tonemap__skipped_local(const tonemap *map, const tonemap__bound *b, float *error)
+{
+    float upper = tonemap__power(b->most), lower = tonemap__power(b->least), middle = (upper + lower) / 2, peak = tonemap__power(b->peak);
+    float above = 269.025f * peak * (upper - middle);
+    float below = 269.025f * (peak * upper < 0.9999f ? peak : 1 / middle) * (middle - lower); /* a clipped component: up to its own limit */
+    *error = (above > below ? above : below) + 0.05f; /* of the polynomials */
+    return *error <= (float)map->options.tolerance_codes ? tonemap__exp2(-2.4f * tonemap__log2(middle)) - 1 : -1;
+}
+
+static inline int tonemap__tile_may_skip(const tonemap *map, int tx, int ty)
+{
+    size_t at = (size_t)ty * (size_t)map->tiles_x + (size_t)tx;
+    tonemap__bound bound = tonemap__display_bound(map, &map->tile_range[at], map->tile_peak[at]);
+    return tonemap__may_skip(map, &bound);
+}
+
+/* One row of tiles in eight is looked at first, to see whether skipping is worth it. */
+static inline int tonemap__is_sample(int ty) { return (ty & 7) == 3 || ty == 0; }
+
+static void tonemap__sample_tiles(int begin, int end, int worker, void *context)
+{
+    const tonemap__job *job = (const tonemap__job *)context;
+    tonemap__worker *w = &job->map->worker[worker];
+    int x;
+    for (; begin < end; begin++) {
+        const float *rows;
+        if (!tonemap__is_sample(begin)) continue;
+        rows = tonemap__gather_tiles(job->map, w, begin);
+        for (x = 0; x < job->map->tiles_x; x++) {
+            tonemap__find_range(job->map, rows, x, begin);
+            w->stats.skipped += (size_t)tonemap__tile_may_skip(job->map, x, begin);
+        }
+    }
+}
+
+/* The ranges of the other tiles, and what the boxes around a tile's pixels reach in its row. */
 static void tonemap__range_tiles(int begin, int end, int worker, void *context)
 {
     const tonemap__job *job = (const tonemap__job *)context;
-    const tonemap *map = job->map;
+    tonemap *map = job->map;
     int x, i, reach = (map->frame.reach + TONEMAP__TILE - 1) / TONEMAP__TILE;
-    (void)worker;
     for (; begin < end; begin++) {
-        tonemap__range *range = map->tile_range + (size_t)begin * (size_t)map->tiles_x;
+        const float *rows = tonemap__is_sample(begin) ? NULL : tonemap__gather_tiles(map, &map->worker[worker], begin);
+        const tonemap__range *range = map->tile_range + (size_t)begin * (size_t)map->tiles_x;
         tonemap__range *reached = map->tile_reached + (size_t)begin * (size_t)map->tiles_x;
-        int y = begin * TONEMAP__TILE, y1 = sat__min_int(y + TONEMAP__TILE, map->height);
-        for (x = 0; x < map->tiles_x; x++) {
-#ifdef SAT__VECTOR
-            tonemap__tile_range_vector(range + x, map, x * TONEMAP__TILE, y, y1);
-#else
-            tonemap__tile_range_plain(range + x, map, x * TONEMAP__TILE, y, y1);
-#endif
-        }
+        for (x = 0; rows && x < map->tiles_x; x++) tonemap__find_range(map, rows, x, begin);
         for (x = 0; x < map->tiles_x; x++) {
             int x1 = sat__min_int(x + reach + 1, map->tiles_x);
             reached[x] = range[x];
@@ -865,47 +931,19 @@ static void tonemap__range_tiles(int begin, int end, int worker, void *context)
     }
 }
 
-/* v^(1 / 2.4): sRGB codes are 269.025 times it less 14.025. Below 0.0031308 they are fewer; the bound is larger there. */
-static inline float tonemap__power(float v) { return tonemap__exp2(tonemap__log2(v) * (1 / 2.4f)); }
-
-/* The La of a tile that needs no search, or -1; *error is how many codes it may be off. */
-static inline float tonemap__skipped_local(const tonemap *map, const tonemap__range *range, float peak, float *error)
-{
-    const tonemap__frame *f = &map->frame;
-    float half = 0.5f / f->quantum, low = range->low, high = range->high, most = range->pixel_high * f->scale;
-    float tolerance = (float)map->options.tolerance_codes, a, b, middle, upper, lower, above, below;
-    if (most > f->cap) most = f->cap;
-    if (!(most < f->term[0] && high * f->scale < f->term[0])) { /* the first step may fail: La is then the pixel */
-        low = range->pixel_low < low ? range->pixel_low : low;
-        high = range->pixel_high > high ? range->pixel_high : high;
-    }
-    high = high * f->scale < f->cap ? high * f->scale : f->cap;
-    a = 1 / (1 + (low * f->scale > half ? low * f->scale - half : 0)); /* the means are of rounded pixels */
-    b = 1 / (1 + high + half);
-    peak *= f->scale * (1 + most * f->inverse_white2);
-    peak = peak > TONEMAP__DARKEST ? peak * a < 1 ? peak : 1 / a : TONEMAP__DARKEST;
-    /* a quick refusal: x^p >= x and 1 - x^p >= p (1 - x) for p = 1 / 2.4 and x <= 1 */
-    if (269.025f / 2.4f * peak * (a - b) > 2.1f * tolerance) return -1;
-    upper = tonemap__power(a);
-    lower = tonemap__power(b);
-    middle = (upper + lower) / 2;
-    peak = tonemap__power(peak);
-    above = 269.025f * peak * (upper - middle);
-    below = 269.025f * (peak * upper < 0.9999f ? peak : 1 / middle) * (middle - lower); /* a clipped component: up to its own limit */
-    *error = (above > below ? above : below) + 0.05f; /* of the polynomials */
-    return *error <= tolerance ? tonemap__exp2(-2.4f * tonemap__log2(middle)) - 1 : -1;
-}
-
 static inline void tonemap__bound_tile(tonemap *map, tonemap__worker *w, int tx, int ty)
 {
     int reach = (map->frame.reach + TONEMAP__TILE - 1) / TONEMAP__TILE, y = sat__max_int(ty - reach, 0), y1 = sat__min_int(ty + reach + 1, map->tiles_y);
     size_t at = (size_t)ty * (size_t)map->tiles_x + (size_t)tx;
     tonemap__range range = map->tile_range[at];
-    float error, peak = map->tile_peak[at];
-    map->tile_local[at] = tonemap__skipped_local(map, &range, peak, &error);
-    if (map->tile_local[at] < 0) return; /* its own windows are too different already */
+    tonemap__bound bound;
+    float error;
+    map->tile_local[at] = -1;
+    if (!tonemap__tile_may_skip(map, tx, ty)) return; /* its own windows are too different already */
     for (; y < y1; y++) tonemap__merge_range(&range, &map->tile_reached[(size_t)y * (size_t)map->tiles_x + (size_t)tx]);
-    map->tile_local[at] = tonemap__skipped_local(map, &range, peak, &error);
+    bound = tonemap__display_bound(map, &range, map->tile_peak[at]);
+    if (!tonemap__may_skip(map, &bound)) return;
+    map->tile_local[at] = tonemap__skipped_local(map, &bound, &error);
     if (!(map->tile_local[at] < 0) && (double)error > w->stats.worst_codes) w->stats.worst_codes = (double)error;
 }
 
@@ -915,6 +953,24 @@ static void tonemap__bound_tiles(int begin, int end, int worker, void *context)
     int x;
     for (; begin < end; begin++)
         for (x = 0; x < job->map->tiles_x; x++) tonemap__bound_tile(job->map, &job->map->worker[worker], x, begin);
+}
+
+/* Fills tile_local; 0 when fewer than one sampled tile in 16 could be skipped by itself: the whole is then searched. */
+static inline int tonemap__plan_skipping(tonemap *map, tonemap__job *job)
+{
+    const sat_threads *threads = &map->options.threads;
+    size_t hits = 0, sampled = 0;
+    int i;
+    sat__parallel_for(threads, map->tiles_y, tonemap__sample_tiles, job);
+    for (i = 0; i < map->workers; i++) {
+        hits += map->worker[i].stats.skipped;
+        map->worker[i].stats.skipped = 0;
+    }
+    for (i = 0; i < map->tiles_y; i++) sampled += tonemap__is_sample(i) ? (size_t)map->tiles_x : 0;
+    if (hits * 16 < sampled) return 0;
+    sat__parallel_for(threads, map->tiles_y, tonemap__range_tiles, job);
+    sat__parallel_for(threads, map->tiles_y, tonemap__bound_tiles, job);
+    return 1;
 }
 
 /* ---- second pass: sums. A ring of rows of a summed-area table of the scaled luminance, rounded to a quantum and added
@@ -1047,47 +1103,87 @@ static inline void tonemap__search_plain(float *local, const float *luminance, c
 }
 
 #ifdef SAT__VECTOR
-/* A group is done when all its pixels are. */
-static inline void tonemap__search_vector(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                          size_t *scale, int x, int end)
+/* One step for four pixels: where it holds, the centre becomes the surround; else the pixel is done and keeps it. */
+static inline sat__i32x4 tonemap__step4(sat__f32x4 *c, sat__i32x4 *live, sat__f32x4 v, sat__f32x4 epsilon, sat__f32x4 term)
 {
-    enum { PARTS = TONEMAP__GROUP / 4 };
-    sat__f32x4 cap = sat__f32x4_set1(f->cap), epsilon = sat__f32x4_set1(f->epsilon), factor = sat__f32x4_set1(f->scale);
-    sat__i32x4 passed[TONEMAP__LENGTHS];
-    int i, k;
-    for (k = 0; k < TONEMAP__LENGTHS; k++) passed[k] = sat__i32x4_set1(0);
-    for (; x < end; x += TONEMAP__GROUP) {
-        sat__f32x4 c[PARTS], taken[PARTS];
-        sat__i32x4 live[PARTS];
-        int border = x < f->reach || x + TONEMAP__GROUP + f->reach > window->width, partial = x + TONEMAP__GROUP > end;
-        for (i = 0; i < PARTS; i++) {
-            c[i] = taken[i] = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 4 * i), factor), cap);
-            live[i] = partial ? tonemap__inside4(x + 4 * i, end) : sat__i32x4_set1(-1);
-        }
-        for (k = 0; k + 1 < f->boxes; k++) {
-            sat__f32x4 inverse = sat__f32x4_set1(window->inverse[k + 1]), term = sat__f32x4_set1(f->term[k]);
-            sat__i32x4 any = sat__i32x4_set1(0);
-            for (i = 0; i < PARTS; i++) {
-                sat__f32x4 v;
-                if (border) inverse = tonemap__inverse4(window, f, k + 1, x + 4 * i);
-                v = sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 4 * i), inverse);
-                live[i] = sat__i32x4_and(live[i], sat__f32x4_less(sat__f32x4_abs(sat__f32x4_sub(c[i], v)),
-                                                                  sat__f32x4_add(sat__f32x4_mul(epsilon, c[i]), term)));
-                taken[i] = sat__f32x4_select(live[i], v, taken[i]);
-                c[i] = v;
-                any = sat__i32x4_or(any, live[i]);
-                passed[k] = sat__i32x4_sub(passed[k], live[i]);
-            }
-            if (!sat__i32x4_any(any)) break;
-        }
-        for (i = 0; i < PARTS; i++) sat__f32x4_store(local + x + 4 * i, taken[i]);
-    }
+    sat__f32x4 limit = sat__f32x4_add(sat__f32x4_mul(epsilon, *c), term);
+    *live = sat__i32x4_and(*live, sat__f32x4_less(sat__f32x4_abs(sat__f32x4_sub(*c, v)), limit));
+    *c = sat__f32x4_select(*live, v, *c);
+    return *live;
+}
+
+/* Sixteen pixels, spelt out to stay in registers; done when the last of them is. */
+static inline void tonemap__search_group(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                         sat__i32x4 *passed, int x)
+{
+    sat__f32x4 factor = sat__f32x4_set1(f->scale), cap = sat__f32x4_set1(f->cap), epsilon = sat__f32x4_set1(f->epsilon);
+    sat__f32x4 c0 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), factor), cap);
+    sat__f32x4 c1 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 4), factor), cap);
+    sat__f32x4 c2 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 8), factor), cap);
+    sat__f32x4 c3 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 12), factor), cap);
+    sat__i32x4 live0 = sat__i32x4_set1(-1), live1 = live0, live2 = live0, live3 = live0, alive;
+    int k;
     for (k = 0; k + 1 < f->boxes; k++) {
+        sat__f32x4 inverse = sat__f32x4_set1(window->inverse[k + 1]), term = sat__f32x4_set1(f->term[k]);
+        alive = tonemap__step4(&c0, &live0, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), epsilon, term);
+        alive = sat__i32x4_add(alive, tonemap__step4(&c1, &live1, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 4), inverse), epsilon, term));
+        alive = sat__i32x4_add(alive, tonemap__step4(&c2, &live2, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 8), inverse), epsilon, term));
+        alive = sat__i32x4_add(alive, tonemap__step4(&c3, &live3, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 12), inverse), epsilon, term));
+        if (!sat__i32x4_any(alive)) break;
+        passed[k] = sat__i32x4_sub(passed[k], alive);
+    }
+    sat__f32x4_store(local + x, c0);
+    sat__f32x4_store(local + x + 4, c1);
+    sat__f32x4_store(local + x + 8, c2);
+    sat__f32x4_store(local + x + 12, c3);
+}
+
+/* Four pixels, where boxes are clipped or a run ends. */
+static inline void tonemap__search_four(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                        sat__i32x4 *passed, int x, int end)
+{
+    sat__f32x4 epsilon = sat__f32x4_set1(f->epsilon), c = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale));
+    sat__i32x4 live = tonemap__inside4(x, end);
+    int k, border = x < f->reach || x + 4 + f->reach > window->width;
+    c = sat__f32x4_min(c, sat__f32x4_set1(f->cap));
+    for (k = 0; k + 1 < f->boxes; k++) {
+        sat__f32x4 inverse = border ? tonemap__inverse4(window, f, k + 1, x) : sat__f32x4_set1(window->inverse[k + 1]);
+        sat__f32x4 v = sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse);
+        tonemap__step4(&c, &live, v, epsilon, sat__f32x4_set1(f->term[k]));
+        if (!sat__i32x4_any(live)) break;
+        passed[k] = sat__i32x4_sub(passed[k], live);
+    }
+    sat__f32x4_store(local + x, c);
+}
+
+/* What passed step k moves on from scale k to k + 1 of the statistics. */
+static inline void tonemap__move_on(size_t *scale, const sat__i32x4 *passed, int steps)
+{
+    int k;
+    for (k = 0; k < steps; k++) {
         int32_t n[4];
         sat__i32x4_store(n, passed[k]);
         scale[k] -= (size_t)(n[0] + n[1] + n[2] + n[3]);
         scale[k + 1] += (size_t)(n[0] + n[1] + n[2] + n[3]);
     }
+}
+
+static inline void tonemap__search_vector(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                          size_t *scale, int x, int end)
+{
+    sat__i32x4 passed[TONEMAP__LENGTHS];
+    int k;
+    for (k = 0; k < TONEMAP__LENGTHS; k++) passed[k] = sat__i32x4_set1(0);
+    while (x < end) {
+        if (x >= f->reach && x + TONEMAP__GROUP <= end && x + TONEMAP__GROUP + f->reach <= window->width) {
+            tonemap__search_group(local, luminance, window, f, passed, x);
+            x += TONEMAP__GROUP;
+        } else {
+            tonemap__search_four(local, luminance, window, f, passed, x, end);
+            x += 4;
+        }
+    }
+    tonemap__move_on(scale, passed, f->boxes - 1);
 }
 #endif
 
@@ -1123,7 +1219,6 @@ static inline void tonemap__search_soft_vector(float *local, const float *lumina
     sat__f32x4 one = sat__f32x4_set1(1), zero = sat__f32x4_set1(0), half = sat__f32x4_set1(0.5f), top = sat__f32x4_set1(1 + f->soft);
     sat__f32x4 slope = sat__f32x4_set1(1 / (2 * f->soft)), cap = sat__f32x4_set1(f->cap);
     sat__i32x4 passed[TONEMAP__LENGTHS];
-    int32_t n[4];
     int k;
     for (k = 0; k < TONEMAP__LENGTHS; k++) passed[k] = sat__i32x4_set1(0);
     for (; x < end; x += 4) {
@@ -1144,11 +1239,7 @@ static inline void tonemap__search_soft_vector(float *local, const float *lumina
         }
         sat__f32x4_store(local + x, taken);
     }
-    for (k = 0; k + 1 < f->boxes; k++) {
-        sat__i32x4_store(n, passed[k]);
-        scale[k] -= (size_t)(n[0] + n[1] + n[2] + n[3]);
-        scale[k + 1] += (size_t)(n[0] + n[1] + n[2] + n[3]);
-    }
+    tonemap__move_on(scale, passed, f->boxes - 1);
 }
 #endif
 
@@ -1178,7 +1269,6 @@ static inline void tonemap__search_ashikhmin_vector(float *local, const float *l
 {
     sat__f32x4 half = sat__f32x4_set1(0.5f), quantum = sat__f32x4_set1(1 / f->quantum);
     sat__i32x4 passed[TONEMAP__ASHIKHMIN];
-    int32_t n[4];
     int s;
     for (s = 0; s < TONEMAP__ASHIKHMIN; s++) passed[s] = sat__i32x4_set1(0);
     for (; x < end; x += 4) {
@@ -1198,11 +1288,7 @@ static inline void tonemap__search_ashikhmin_vector(float *local, const float *l
         }
         sat__f32x4_store(local + x, sat__f32x4_select(sat__f32x4_less(taken, quantum), own, taken));
     }
-    for (s = 0; s + 1 < TONEMAP__ASHIKHMIN; s++) {
-        sat__i32x4_store(n, passed[s]);
-        scale[s] -= (size_t)(n[0] + n[1] + n[2] + n[3]);
-        scale[s + 1] += (size_t)(n[0] + n[1] + n[2] + n[3]);
-    }
+    tonemap__move_on(scale, passed, TONEMAP__ASHIKHMIN - 1);
 }
 #endif
 
@@ -1306,7 +1392,7 @@ static inline void tonemap__local_row(tonemap *map, tonemap__worker *w, int y)
         return;
     }
     tonemap__open_window(&window, map, w, y);
-    if (tonemap__skips(o)) tonemap__search_tiles(map, w, luminance, &window, y);
+    if (map->skipping) tonemap__search_tiles(map, w, luminance, &window, y);
     else if (o->selective > 0) tonemap__search_edges(map, w, luminance, &window, y);
     else tonemap__search(w, luminance, &window, &map->frame, o->operation == TONEMAP_ASHIKHMIN, 0, map->width);
 }
@@ -1689,10 +1775,7 @@ static inline sat_result tonemap__apply(tonemap__job *job, double dt_seconds, to
     sat__parallel_for(threads, bands, tonemap__measure_bands, job);
     if (tonemap__measured_state(map, measured)) tonemap__adapt(map, measured, dt_seconds);
     tonemap__prepare_frame(map);
-    if (tonemap__skips(&map->options)) {
-        sat__parallel_for(threads, map->tiles_y, tonemap__range_tiles, job);
-        sat__parallel_for(threads, map->tiles_y, tonemap__bound_tiles, job);
-    }
+    map->skipping = tonemap__skips(&map->options) && tonemap__plan_skipping(map, job);
     sat__parallel_for(threads, bands, tonemap__map_bands, job);
     tonemap__finish_stats(map);
     if (stats) *stats = map->stats;
