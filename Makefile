@@ -3,7 +3,7 @@
 # LIB=sat restricts a target to one header.
 
 all: examples
-.PHONY: all examples demo test bench report size check check-strict check-variants check-asan check-tsan \
+.PHONY: all examples demo web check-view test bench report size check check-strict check-variants check-asan check-tsan \
         check-analyze check-compilers fuzz data install dist gpu-bench deps help clean build-tests run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
@@ -95,6 +95,26 @@ run-demo: build/$(DEMO)
 	build/$(DEMO) --stats --out out/demo.png $(ARGS) $(IN)
 	@echo out/demo.png
 
+# The demo in a browser: open out/web/index.html. emcc's optimiser is not run when linking: Debian's lacks a part.
+EMCC    ?= emcc
+WEB     := -I. -Ibuild/web/include $(if $(wildcard /usr/include/stb/stb_image.h),-DHAVE_STB)
+STB_IMPLEMENTATIONS := '\#define STB_IMAGE_IMPLEMENTATION\n\#define STB_IMAGE_WRITE_IMPLEMENTATION\n\#include <stb/stb_image.h>\n\#include <stb/stb_image_write.h>\n'
+web:
+	@if command -v $(EMCC) >/dev/null; then $(MAKE) --no-print-directory out/web/index.html; \
+	 else echo 'make web needs emscripten: apt-get install emscripten'; fi
+out/web/index.html: examples/demo_web.html out/web/demo_web.js
+	cp $< $@
+out/web/demo_web.js: build/web/demo_web.o $(if $(findstring STB,$(WEB)),build/web/stb.o)
+	@mkdir -p $(@D)
+	$(EMCC) -O1 $^ -o $@ -sALLOW_MEMORY_GROWTH=1 -sSINGLE_FILE=1 -sEXPORTED_RUNTIME_METHODS=ccall,FS -sFORCE_FILESYSTEM=1 -sENVIRONMENT=web
+build/web/demo_web.o: examples/demo_web.c build/web/include/stb
+	$(EMCC) -std=gnu99 -O3 -msimd128 -msse2 $(WEB) -MMD -MP -c $< -o $@
+build/web/stb.o: build/web/include/stb
+	printf $(STB_IMPLEMENTATIONS) | $(EMCC) -w -O3 $(WEB) -x c -c - -o $@
+build/web/include/stb:
+	@mkdir -p $(@D)
+	ln -sfn /usr/include/stb $@
+
 # ---- tests -----------------------------------------------------------------------------------------------------
 
 TEST_SOURCES := $(if $(LIB),$(wildcard tests/test_$(LIB).c tests/test_$(LIB).cpp tests/test_$(LIB)_*.c tests/test_$(LIB)_*.cpp),\
@@ -156,6 +176,11 @@ check-compilers:
 fuzz:
 	@RUNNER='bash tests/check_fuzz.sh' JOBS=1 tests/run.sh $(LIBS)
 
+# the demo's window under Xvfb and its page in headless Chromium against the demo's picture
+check-view: examples
+	+@if command -v emcc >/dev/null; then $(MAKE) --no-print-directory web; fi
+	@RUNNER='bash tests/check_view.sh' JOBS=1 tests/run.sh view web
+
 # bytes of machine code with and without each option
 size:
 	@bash tests/size.sh $(LIBS)
@@ -214,6 +239,8 @@ help:
 	@echo 'make check            all of check-*; each takes LIB=sat'
 	@echo 'make deps      install missing packages (Debian)'
 	@echo 'make gpu-bench the OpenGL tables on the GPU (EGL), out/bench/gpu_*.tsv'
+	@echo 'make web       the demo in a browser: out/web/index.html  [needs emscripten]'
+	@echo 'make check-view the window and the page against the demo: Xvfb, headless Chromium'
 	@echo 'make report    all tables and plots in report/index.html  [QUICK=1]'
 	@echo 'make data      fetch free environment maps and meshes into data/'
 	@echo 'make dist      one-file editions in dist/: each header with what it needs of sat.h inside'

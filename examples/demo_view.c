@@ -144,7 +144,7 @@ static int view_loop(view *v, int frames, const char *out)
     double last = common_clock(), now, seconds = 0;
     int i, ok = 1;
     for (i = 0; ok && !v->quit && !glfwWindowShouldClose(v->window) && (frames == 0 || i < frames); ++i) {
-        ok = pipeline_change(&v->p, &v->wanted) && pipeline_frame(&v->p, v->paused ? 0 : 1 / 30.0);
+        ok = pipeline_change(&v->p, &v->wanted) && pipeline_frame(&v->p, i == 0 || v->paused ? 0 : 1 / 30.0);
         if (!ok) break;
         view_overlay(v, seconds);
         view_show(v);
