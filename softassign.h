@@ -59,7 +59,7 @@ typedef float softassign_cost_fn(int row, int column, void *user);
 
 /* Rows are patches, columns are tiles. Costs come from the first of these that is given: a dense matrix, a
    function, or features, whose Euclidean distance (Slomp 2012, eq 3.1) is computed when it is needed.
-   Infinite costs forbid a pair; NaN, -infinity and |cost| > 1e36 are refused, as are features beyond +-1e16. */
+   Infinite costs forbid a pair; NaN, -infinity and |cost| > 1e30 are refused, as are features beyond +-1e16. */
 typedef struct softassign_problem {
     int rows, columns;                     /* >= 1 */
     const float *cost;                     /* cost[row * stride + column], stride in floats */
@@ -70,7 +70,8 @@ typedef struct softassign_problem {
     const float *column_features;          /* columns x feature_count, packed */
     int feature_count;
     const int *capacity;                   /* per column, >= 0; NULL: options.capacity_default */
-    const int *minimum_use;                /* per column, 0..capacity: so many rows must get it; NULL: 0. Not for a solver */
+    const int *minimum_use;                /* per column, 0..capacity: so many rows must get it; NULL: 0. AUTO, EXACT and FAST
+                                              of softassign_solve */
     const int *previous;                   /* per row, the column of the last frame or -1; NULL: none. See options.switching */
 } softassign_problem;
 
@@ -245,7 +246,7 @@ extern "C" {
    ------------------------------------------------------------------------------------------------ */
 
 #define SOFTASSIGN__INFINITY (sat__float_from_bits(0x7f800000u))
-#define SOFTASSIGN__LARGEST_COST 1e36f
+#define SOFTASSIGN__LARGEST_COST 1e30f /* sums of a million of them are floats */
 #define SOFTASSIGN__LARGEST_FEATURE 1e16f
 #define SOFTASSIGN__DENSE_CELLS 100000 /* below, lists do not pay */
 #define SOFTASSIGN__DIMS 16            /* coordinates of the cheap bound; the last is the norm of what the others leave */
@@ -345,6 +346,7 @@ struct softassign {
     int *list_length;
     double *list_limit;    /* every slot outside the list has cost - price at or above this, as long as prices fall */
     unsigned char *raised; /* per slot: its price rose since the lists were made */
+    unsigned char *stale;  /* per row: its list is to be made (anew) */
 
     double *distance, *row_distance; /* path search: per slot, per row */
     double *dense_price, *closed_distance; /* the same on the matrix: prices of open slots, distances of closed ones */
@@ -764,7 +766,8 @@ static void softassign__list_range(int begin, int end, int worker, void *context
 {
     softassign *s = (softassign *)context;
     int i;
-    for (i = begin; i < end; i++) softassign__list_row(s, s->next + i, &s->scratch[worker]);
+    for (i = s->next + begin; i < s->next + end; i++)
+        if (s->stale[i]) softassign__list_row(s, i, &s->scratch[worker]);
 }
 
 /* A list made again while serial work goes on. */
@@ -798,7 +801,7 @@ static double softassign__list_least(const softassign *s, int row)
 static inline float softassign__exp(float x)
 {
     float z, k, r, p;
-    if (x < -87.0f) x = -87.0f;
+    if (!(x > -87.0f)) x = -87.0f; /* NaN too */
     if (x > 88.0f) x = 88.0f;
     z = x * 1.44269504f + 12582912.0f;
     k = z - 12582912.0f;
@@ -833,6 +836,9 @@ static inline sat__f32x4 softassign__exp4(sat__f32x4 x)
     return sat__f32x4_mul(p, sat__f32x4_from_bits(sat__f32x4_truncate(k)));
 }
 #endif
+
+/* 1 / eps, finite, so that 0 / eps is 0. */
+static inline float softassign__inverse(float eps) { return eps > 1e-37f ? 1 / eps : 1e37f; }
 
 /* e[q] = exp((least - e[q]) / eps); returns the sum. */
 static float softassign__weights(float *e, int n, float least, float inverse)
@@ -873,8 +879,9 @@ static float softassign__price_sweep(softassign *s, float eps)
             }
             if (again || (double)least <= s->list_limit[i]) break;
             softassign__relist(s, i);
+            s->stale[i] = 1; /* these prices may rise again */
         }
-        sum = 1 / softassign__weights(e, s->list_length[i], least, 1 / eps);
+        sum = 1 / softassign__weights(e, s->list_length[i], least, softassign__inverse(eps));
         for (q = 0; q < s->list_length[i]; q++) s->column_sum[s->list_slot[at + (size_t)q]] += e[q] * sum;
     }
     for (j = 0; j < s->slots; j++) {
@@ -1493,7 +1500,10 @@ static void softassign__reset_assignment(softassign *s)
         s->first_row[j] = -1;
         s->raised[j] = 0;
     }
-    for (i = 0; i < s->rows; i++) s->slot_of_row[i] = -1;
+    for (i = 0; i < s->rows; i++) {
+        s->slot_of_row[i] = -1;
+        s->stale[i] = 1;
+    }
 }
 
 static void softassign__reset_prices(softassign *s)
@@ -1516,15 +1526,19 @@ static double softassign__mean_least(const softassign *s)
     return count ? sum / count : 0;
 }
 
-/* One step of a phase; sets the next phase when it is over. SAT_ERR_LIMIT: report.row_error found no column. */
+/* Lists made before the prices moved, at the top prices, hold for any prices; only those made in between are renewed.
+   One step of a phase; sets the next phase when it is over. SAT_ERR_LIMIT: report.row_error found no column. */
 static sat_result softassign__list_phase(softassign *s, size_t budget)
 {
-    int count = s->rows - s->next;
+    int count = s->rows - s->next, i;
     if ((size_t)count > budget) count = (int)budget;
     sat__parallel_for(&s->options.threads, count, softassign__list_range, s);
+    for (i = s->next; i < s->next + count; i++) {
+        s->report.lists_built += s->stale[i];
+        s->stale[i] = 0;
+    }
     s->next += count;
     s->report.work += (size_t)count;
-    s->report.lists_built += (size_t)count;
     if (s->next < s->rows) return SAT_OK;
     s->next = 0;
     if (s->phase == SOFTASSIGN__RELIST || s->prices_known) s->phase = SOFTASSIGN__PATHS;
@@ -1662,6 +1676,7 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->heap = (int *)sat__carve(a, slots + rows, sizeof(int));
     s->heap_at = (int *)sat__carve(a, slots + rows, sizeof(int));
     s->raised = (unsigned char *)sat__carve(a, slots, 1);
+    s->stale = (unsigned char *)sat__carve(a, rows, 1);
     s->scratch = (softassign__scratch *)sat__carve(a, (size_t)workers, sizeof *s->scratch);
     for (w = 0; w < workers; w++) {
         float *keys = (float *)sat__carve(a, padded, sizeof(float));
@@ -1795,6 +1810,7 @@ static int softassign__improve_row(softassign *s, int row)
         if (!(cost < s->cost_of_row[row])) continue;
         gain = softassign__move_gain(s, row, j, cost, &other, &back);
         if (!(gain < best) || softassign__conflicts(s, row, j, other)) continue;
+        if (other < 0 && s->slot_of_row[row] >= s->columns) continue; /* a mandatory slot stays full */
         if (other >= 0 && softassign__conflicts(s, other, s->slot_of_row[row], row)) continue;
         best = gain;
         to = j;
@@ -2068,7 +2084,7 @@ static void softassign__sweep_range(int begin, int end, int worker, void *contex
             float least = softassign__reduced_row(s->matrix + (size_t)i * (size_t)n, s->price_f, e, n), total;
             if (!(least < SOFTASSIGN__INFINITY)) continue;
             w->bound[chunk] += (double)least;
-            total = 1 / softassign__weights(e, n, least, 1 / w->eps);
+            total = 1 / softassign__weights(e, n, least, softassign__inverse(w->eps));
             softassign__accumulate(sum, e, total, n);
             if (w->soft)
                 for (j = 0; j < n; j++) w->soft[(ptrdiff_t)i * w->soft_stride + j] = e[j] * total;
@@ -2451,7 +2467,7 @@ static void softassign__check_range(int begin, int end, int worker, void *contex
             if (copy) copy[j] = cost;
         }
         if (copy && stay >= 0) copy[stay] -= s->bonus;
-        for (j = 0; largest > 0x7b000000u && j < s->columns && *wrong != SAT_ERR_NON_FINITE; j++) { /* 6.6e35 */
+        for (j = 0; largest > 0x7149f2cau && j < s->columns && *wrong != SAT_ERR_NON_FINITE; j++) { /* 1e30 */
             sat_result found = softassign__check_cost(softassign__pair(p, i, j));
             if (found != SAT_OK) *wrong = found;
         }
@@ -2740,6 +2756,7 @@ SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row
 
 static sat_result softassign__list_all(softassign *s)
 {
+    memset(s->stale, 1, (size_t)s->rows);
     s->next = 0;
     s->phase = SOFTASSIGN__RELIST; /* goes on to the paths */
     return softassign__list_phase(s, (size_t)-1);
@@ -2894,7 +2911,7 @@ static void softassign__separate(softassign *s)
         softassign__scratch *w = &s->scratch[0];
         float best = SOFTASSIGN__INFINITY;
         int to = -1;
-        if (!softassign__conflicts(s, i, s->slot_of_row[i], -1)) continue;
+        if (s->slot_of_row[i] >= s->columns || !softassign__conflicts(s, i, s->slot_of_row[i], -1)) continue; /* mandatory ones stay */
         softassign__keys(s, i, w);
         for (j = 0; j < s->slots; j++) {
             float cost;
@@ -3005,6 +3022,7 @@ SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_
         report->row_error = report->column_error = -1;
     }
     if (!column_of_row || !softassign__problem_is_valid(problem) || !softassign__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    if (problem->minimum_use && (int)o.method > SOFTASSIGN_FAST) return SAT_ERR_ARGUMENT;
     features = problem->cost || problem->cost_fn ? 0 : sat__min_int(problem->feature_count, SOFTASSIGN__BOUND_FEATURES);
     result = softassign__allocate(&s, problem->rows, problem->columns, softassign__mandatory_count(problem), features, 1, &o);
     if (result != SAT_OK) return result;

@@ -495,7 +495,7 @@ static sat_result solve_with(problem *q, softassign_report *r)
 
 TEST(softassign_bad_costs_are_refused_with_their_row)
 {
-    static const float bad[] = {NAN, -INFINITY, 2e36f, -2e36f};
+    static const float bad[] = {NAN, -INFINITY, 2e30f, -2e30f};
     static const sat_result codes[] = {SAT_ERR_NON_FINITE, SAT_ERR_NON_FINITE, SAT_ERR_ARGUMENT, SAT_ERR_ARGUMENT};
     int k, m, x[30];
     for (k = 0; k < 4; k++)
