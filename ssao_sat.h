@@ -26,6 +26,9 @@
 #if SAT_VERSION < 100
 #error "ssao_sat.h needs sat.h 0.1.0 or newer"
 #endif
+#if defined(SSAO_SAT_NO_SLABS) && !defined(SSAO_SAT_NO_BENT)
+#define SSAO_SAT_NO_BENT /* bent normals come from the slabs */
+#endif
 
 /* SSAO_SAT_STATIC makes every function private to the file; SSAO_SAT_DEF replaces the linkage altogether. */
 #ifndef SSAO_SAT_DEF
@@ -212,7 +215,7 @@ static inline void ssao_sat__transpose(ssao_sat__f *m)
 #else
 typedef struct ssao_sat__f { float v[4]; } ssao_sat__f;
 typedef struct ssao_sat__i { uint32_t v[4]; } ssao_sat__i;
-#define SSAO_SAT__EACH(type, expression) type r; int k; for (k = 0; k < 4; k++) r.v[k] = (expression); return r
+#define SSAO_SAT__EACH(type, expression) type r = {{0, 0, 0, 0}}; int k; for (k = 0; k < 4; k++) r.v[k] = (expression); return r
 static inline ssao_sat__f ssao_sat__load(const float *p) { SSAO_SAT__EACH(ssao_sat__f, p[k]); }
 static inline void ssao_sat__store(float *p, ssao_sat__f v) { int k; for (k = 0; k < 4; k++) p[k] = v.v[k]; }
 static inline ssao_sat__f ssao_sat__set(float v) { SSAO_SAT__EACH(ssao_sat__f, v); }
@@ -334,7 +337,11 @@ SSAO_SAT_DEF ssao_sat_options ssao_sat_defaults(void)
 {
     ssao_sat_options o;
     memset(&o, 0, sizeof o);
+#ifdef SSAO_SAT_NO_SLABS
+    o.method = SSAO_SAT_PLANE;
+#else
     o.method = SSAO_SAT_SLABS;
+#endif
     o.radius = 0.5;
     o.gain = 1;
     o.power = 1;
@@ -763,6 +770,7 @@ static void ssao_sat__hold_rows(int begin, int end, int worker, void *context)
     }
 }
 
+#ifndef SSAO_SAT_NO_SLABS
 /* Count, sum of q, x and y of one slab. Rows without it are copies of the row above. */
 static void ssao_sat__build_slab(ssao_sat *s, int k)
 {
@@ -796,6 +804,8 @@ static void ssao_sat__build_slab(ssao_sat *s, int k)
     }
 }
 
+#endif
+
 /* The single table of the other methods; floats restart nothing and round as they did in 2012. */
 static void ssao_sat__build_value(ssao_sat *s)
 {
@@ -821,6 +831,7 @@ static void ssao_sat__build_value(ssao_sat *s)
     }
 }
 
+#ifndef SSAO_SAT_NO_SLABS
 /* Is the pixel no part of a plane that its neighbours see too? Affine depth has no second differences on planes, and the
    tangent plane of the given normal falls as the depth does. What passes moves no sine beyond the bias: flat_limit. */
 static int ssao_sat__is_bent(const ssao_sat *s, const float *a, size_t at, float rx, float ry)
@@ -863,20 +874,46 @@ static void ssao_sat__build_flags(ssao_sat *s)
         }
     }
 }
+#endif
 
 /* Table number `begin`..: the slabs, then the flags. */
 static void ssao_sat__build_tables(int begin, int end, int worker, void *context)
 {
     ssao_sat *s = (ssao_sat *)context;
-    int slabs = s->options.method == SSAO_SAT_SLABS ? s->frame_slabs : 0, i;
+    int i;
     (void)worker;
     for (i = begin; i < end; i++) {
-        if (i < slabs) ssao_sat__build_slab(s, i);
-        else if (slabs) ssao_sat__build_flags(s);
-        else ssao_sat__build_value(s);
+#ifndef SSAO_SAT_NO_SLABS
+        if (s->options.method == SSAO_SAT_SLABS) {
+            if (i < s->frame_slabs) ssao_sat__build_slab(s, i);
+            else ssao_sat__build_flags(s);
+            continue;
+        }
+#endif
+        ssao_sat__build_value(s);
     }
 }
 
+/* Box sum in a table of `words` words an entry, rows and columns within it. */
+static inline uint32_t ssao_sat__box(const ssao_sat *s, const uint32_t *table, size_t words, int x0, int y0, int x1, int y1)
+{
+    const uint32_t *above = table + words * (size_t)(y0 - s->first) * s->table_stride;
+    const uint32_t *below = table + words * (size_t)(y1 - s->first) * s->table_stride;
+    return below[words * (size_t)x1] - below[words * (size_t)x0] - above[words * (size_t)x1] + above[words * (size_t)x0];
+}
+
+/* (1 - strength occlusion)^power; the fitted exponents are 1, 1.5, 2 or 3, so powf is for callers who ask for others. */
+static inline float ssao_sat__accessibility(const ssao_sat *s, float occlusion, float gain)
+{
+    float open = 1 - gain * occlusion;
+    open = open > 0 ? open < 1 ? open : 1 : 0;
+    if (s->fit.power == 1.5f) open *= sqrtf(open);
+    else if (s->fit.power == 2.0f) open *= open;
+    else if (s->fit.power == 3.0f) open *= open * open;
+    return s->options.power == 1 ? open : powf(open, (float)s->options.power);
+}
+
+#ifndef SSAO_SAT_NO_SLABS
 /* ------------------------------------------------------------------------------------------------
    SLABS: in every cell of every ring, what each slab holds is one occluder at its exact centroid
 
@@ -1030,25 +1067,6 @@ static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, float hal
     }
 }
 
-/* Box sum of a table of single words, rows and columns within it. */
-static inline uint32_t ssao_sat__box(const ssao_sat *s, const uint32_t *table, size_t words, int x0, int y0, int x1, int y1)
-{
-    const uint32_t *above = table + words * (size_t)(y0 - s->first) * s->table_stride;
-    const uint32_t *below = table + words * (size_t)(y1 - s->first) * s->table_stride;
-    return below[words * (size_t)x1] - below[words * (size_t)x0] - above[words * (size_t)x1] + above[words * (size_t)x0];
-}
-
-/* (1 - strength occlusion)^power; the fitted exponents are 1, 1.5, 2 or 3, so powf is for callers who ask for others. */
-static inline float ssao_sat__accessibility(const ssao_sat *s, float occlusion, float gain)
-{
-    float open = 1 - gain * occlusion;
-    open = open > 0 ? open < 1 ? open : 1 : 0;
-    if (s->fit.power == 1.5f) open *= sqrtf(open);
-    else if (s->fit.power == 2.0f) open *= open;
-    else if (s->fit.power == 3.0f) open *= open * open;
-    return s->options.power == 1 ? open : powf(open, (float)s->options.power);
-}
-
 static inline float ssao_sat__sum_lanes(ssao_sat__f a, ssao_sat__f b)
 {
     float v[4];
@@ -1127,6 +1145,7 @@ static void ssao_sat__estimate_slabs(ssao_sat *s, int x, int y, ssao_sat_stats *
     if (s->bent_wanted) ssao_sat__store_blocked(s, &p, at, fade * s->fit.gain * SSAO_SAT__BLOCKED);
 #endif
 }
+#endif /* SSAO_SAT_NO_SLABS */
 
 /* ------------------------------------------------------------------------------------------------
    The single-table methods: MINIMALIST, NORMAL_GUIDED, REFINED as published, and PLANE
@@ -1152,13 +1171,19 @@ static void ssao_sat__look_up(ssao_sat__region *r, const ssao_sat *s, int step, 
         }
 }
 
+static inline int ssao_sat__round(float v)
+{
+    float rounded = floorf(v + 0.5f);
+    return (int)rounded;
+}
+
 static void ssao_sat__set_region(ssao_sat__region *r, const ssao_sat *s, float cx, float cy, float half_x, float half_y)
 {
     float x0 = cx - half_x, x1 = cx + half_x, y0 = cy - half_y, y1 = cy + half_y;
-    r->x[0] = sat__clamp_int((int)floorf(x0 + 0.5f), 0, s->columns - 1);
-    r->y[0] = sat__clamp_int((int)floorf(y0 + 0.5f), 0, s->rows - 1);
-    r->x[4] = sat__clamp_int((int)floorf(x1 + 0.5f), r->x[0] + 1, s->columns);
-    r->y[4] = sat__clamp_int((int)floorf(y1 + 0.5f), r->y[0] + 1, s->rows);
+    r->x[0] = sat__clamp_int(ssao_sat__round(x0), 0, s->columns - 1);
+    r->y[0] = sat__clamp_int(ssao_sat__round(y0), 0, s->rows - 1);
+    r->x[4] = sat__clamp_int(ssao_sat__round(x1), r->x[0] + 1, s->columns);
+    r->y[4] = sat__clamp_int(ssao_sat__round(y1), r->y[0] + 1, s->rows);
     r->x[2] = (r->x[0] + r->x[4]) / 2;
     r->y[2] = (r->y[0] + r->y[4]) / 2;
     r->x[1] = (r->x[0] + r->x[2]) / 2;
@@ -1189,6 +1214,7 @@ static float ssao_sat__deficit(const ssao_sat *s, float mean, float z)
     return s->options.inverted_depth ? (mean * z - 1) * z : z - mean;
 }
 
+#ifndef SSAO_SAT_NO_REFINED
 /* Eq 5.4 over the children of one node: those that are nearer than their parent, weighted by area. As printed (E: "higher",
    where 5.4.1 calls higher values farther away) the others are kept. No child passes: the parent. */
 static float ssao_sat__refine(ssao_sat__region *r, const ssao_sat *s, float z, int i0, int j0, int step, int level, ssao_sat_stats *stats)
@@ -1214,6 +1240,7 @@ static float ssao_sat__refine(ssao_sat__region *r, const ssao_sat *s, float z, i
         }
     return weight > 0 ? sum / weight : parent;
 }
+#endif
 
 /* Where the region is centred: moved along the projected normal (5.4.2). A normal n at P moves its point along
    n.xy - n.z P.xy / P.z on the screen; the text's n.xy is right in orthographic views. */
@@ -1232,8 +1259,11 @@ static float ssao_sat__published(const ssao_sat *s, ssao_sat__region *r, float z
 {
     float deficit, gain = 1;
     ssao_sat__look_up(r, s, 4, 0, stats);
+#ifndef SSAO_SAT_NO_REFINED
     if (s->options.method == SSAO_SAT_REFINED) deficit = ssao_sat__refine(r, s, z, 0, 0, 2, 0, stats);
-    else deficit = ssao_sat__deficit(s, ssao_sat__mean(r, s, 0, 0, 4, 4), z);
+    else
+#endif
+        deficit = ssao_sat__deficit(s, ssao_sat__mean(r, s, 0, 0, 4, 4), z);
     if (s->farthest > s->nearest) gain += (float)s->options.depth_gain * (z - s->nearest) / (s->farthest - s->nearest);
     return deficit > 0 ? gain * deficit / s->radius : 0;
 }
@@ -1336,12 +1366,17 @@ static void ssao_sat__estimate_rows(int begin, int end, int worker, void *contex
 {
     ssao_sat *s = (ssao_sat *)context;
     ssao_sat_stats unused;
-    int y, x, slabs = s->options.method == SSAO_SAT_SLABS && !s->is_signed, above = s->step == 2 && s->begin > 0;
+    int y, x, above = s->step == 2 && s->begin > 0;
     memset(&unused, 0, sizeof unused);
     for (y = s->begin - above + begin; y < s->begin - above + end; y++) {
         ssao_sat_stats *stats = y >= s->begin && y < s->end ? &s->workers[worker].stats : &unused; /* neighbours of the band count there */
-        if (slabs) for (x = 0; x < s->columns; x++) ssao_sat__estimate_slabs(s, x, y, stats);
-        else for (x = 0; x < s->columns; x++) s->open[ssao_sat__at(s, y) + (size_t)x] = ssao_sat__estimate_pixel(s, x, y, stats);
+#ifndef SSAO_SAT_NO_SLABS
+        if (s->options.method == SSAO_SAT_SLABS && !s->is_signed) {
+            for (x = 0; x < s->columns; x++) ssao_sat__estimate_slabs(s, x, y, stats);
+            continue;
+        }
+#endif
+        for (x = 0; x < s->columns; x++) s->open[ssao_sat__at(s, y) + (size_t)x] = ssao_sat__estimate_pixel(s, x, y, stats);
     }
 }
 
@@ -1690,6 +1725,12 @@ static int ssao_sat__in_range(double v, double low, double high) { return v >= l
 
 static int ssao_sat__options_are_valid(const ssao_sat_options *o)
 {
+#ifdef SSAO_SAT_NO_SLABS
+    if (o->method == SSAO_SAT_SLABS) return 0;
+#endif
+#ifdef SSAO_SAT_NO_REFINED
+    if (o->method == SSAO_SAT_REFINED) return 0;
+#endif
     return (unsigned)o->method <= (unsigned)SSAO_SAT_REFINED && ssao_sat__in_range(o->radius, 0, 1e15) && ssao_sat__in_range(o->gain, 0, 1e6) &&
            o->power > 0 && ssao_sat__in_range(o->power, 0, 1e3) && (o->half_resolution == 0 || o->half_resolution == 1) &&
            ssao_sat__in_range(o->slabs, 1, SSAO_SAT__MAX_SLABS) && ssao_sat__in_range(o->scales, 1, SSAO_SAT__MAX_SCALES) &&
