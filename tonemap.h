@@ -1344,7 +1344,37 @@ static inline void tonemap__sobel_row(float *out, const float *above, const floa
 /* The pixel for itself: what the global operators take, and pixels that are not worth a search. */
 static inline void tonemap__own_luminance(float *local, const float *luminance, float scale, int x, int end)
 {
+#ifdef SAT__VECTOR
+    for (; x + 4 <= end; x += 4) sat__f32x4_store(local + x, sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale)));
+#endif
     for (; x < end; x++) local[x] = luminance[x] * scale;
+}
+
+/* Some squared gradient of [x, end) is above the threshold. */
+static inline int tonemap__has_edge(const float *edge, float threshold, int x, int end)
+{
+#ifdef SAT__VECTOR
+    sat__i32x4 above = sat__i32x4_set1(0);
+    for (; x + 4 <= end; x += 4) above = sat__i32x4_or(above, sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x)));
+    if (sat__i32x4_any(above)) return 1;
+#endif
+    for (; x < end; x++)
+        if (edge[x] > threshold) return 1;
+    return 0;
+}
+
+/* Where it is not, the pixel stands for itself. */
+static inline void tonemap__reset_flat(float *local, const float *luminance, const float *edge, float threshold, float scale, int x, int end)
+{
+#ifdef SAT__VECTOR
+    for (; x + 4 <= end; x += 4) {
+        sat__i32x4 above = sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x));
+        sat__f32x4 own = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale));
+        sat__f32x4_store(local + x, sat__f32x4_select(above, sat__f32x4_load(local + x), own));
+    }
+#endif
+    for (; x < end; x++)
+        if (!(edge[x] > threshold)) local[x] = luminance[x] * scale;
 }
 
 /* Tiles without a search get their constant; runs of the others are searched. */
@@ -1368,17 +1398,18 @@ static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const
     const tonemap__frame *f = &map->frame;
     const float *above = y > 0 ? luminance - map->row : luminance, *below = y + 1 < map->height ? luminance + map->row : luminance;
     float threshold = (float)map->options.selective / f->scale, *edge = w->edge;
-    int x, end, important;
+    int x, end;
     threshold *= threshold;
     tonemap__sobel_row(edge, above, luminance, below, map->width);
     for (x = 0; x < map->width; x = end) {
-        int i;
         end = sat__min_int(x + TONEMAP__GROUP, map->width);
-        for (important = 0, i = x; i < end; i++) important |= edge[i] > threshold;
-        if (important) tonemap__search(w, luminance, window, f, map->options.operation == TONEMAP_ASHIKHMIN, x, end);
-        else w->stats.skipped += (size_t)(end - x);
-        for (i = x; i < end; i++)
-            if (!(edge[i] > threshold)) w->local[i] = luminance[i] * f->scale;
+        if (tonemap__has_edge(edge, threshold, x, end)) {
+            tonemap__search(w, luminance, window, f, map->options.operation == TONEMAP_ASHIKHMIN, x, end);
+            tonemap__reset_flat(w->local, luminance, edge, threshold, f->scale, x, end);
+        } else {
+            tonemap__own_luminance(w->local, luminance, f->scale, x, end);
+            w->stats.skipped += (size_t)(end - x);
+        }
     }
 }
 
@@ -1492,14 +1523,40 @@ static inline void tonemap__gain_photographic(float *gain, const float *local, c
 }
 
 /* Ld = TM(La) L / La; a flat picture gets the key. */
+static inline float tonemap__ashikhmin_gain(float local, float luminance, const tonemap__frame *f, float key)
+{
+    float la = local > TONEMAP__DARKEST ? local : TONEMAP__DARKEST;
+    float display = f->curve_factor > 0 ? (tonemap__capacity(la * f->cd) - f->curve_low) * f->curve_factor : key;
+    return luminance > 0 && display > 0 ? display * f->scale / la : 0;
+}
+
+#ifdef SAT__VECTOR
+static inline sat__f32x4 tonemap__capacity4(sat__f32x4 cd)
+{
+    sat__f32x4 ln = sat__f32x4_mul(sat__f32x4_set1(0.693147181f), tonemap__log2_4(sat__f32x4_max(cd, sat__f32x4_set1(TONEMAP__DARKEST))));
+    sat__f32x4 c1 = sat__f32x4_mul(cd, sat__f32x4_set1(1 / 0.0014f)), c2, c3, c4;
+    c2 = sat__f32x4_add(sat__f32x4_set1(16.5431894f), sat__f32x4_mul(ln, sat__f32x4_set1(1 / 0.4027f)));
+    c3 = sat__f32x4_add(sat__f32x4_set1(16.5431894f), sat__f32x4_mul(sat__f32x4_sub(cd, sat__f32x4_set1(1)), sat__f32x4_set1(1 / 0.4027f)));
+    c4 = sat__f32x4_add(sat__f32x4_set1(-3.56579561f), sat__f32x4_mul(ln, sat__f32x4_set1(1 / 0.0556f)));
+    c4 = sat__f32x4_select(sat__f32x4_less(cd, sat__f32x4_set1(7.2444f)), c3, c4);
+    c4 = sat__f32x4_select(sat__f32x4_less(cd, sat__f32x4_set1(1)), c2, c4);
+    return sat__f32x4_select(sat__f32x4_less(cd, sat__f32x4_set1(0.0034f)), c1, c4);
+}
+#endif
+
 static inline void tonemap__gain_ashikhmin(float *gain, const float *local, const float *luminance, const tonemap__frame *f, float key, int end)
 {
-    int x;
-    for (x = 0; x < end; x++) {
-        float la = local[x] > TONEMAP__DARKEST ? local[x] : TONEMAP__DARKEST;
-        float display = f->curve_factor > 0 ? (tonemap__capacity(la * f->cd) - f->curve_low) * f->curve_factor : key;
-        gain[x] = luminance[x] > 0 && display > 0 ? display * f->scale / la : 0;
+    int x = 0;
+#ifdef SAT__VECTOR
+    sat__f32x4 zero = sat__f32x4_set1(0), scale = sat__f32x4_set1(f->scale), low = sat__f32x4_set1(f->curve_low), factor = sat__f32x4_set1(f->curve_factor);
+    for (; f->curve_factor > 0 && x + 4 <= end; x += 4) {
+        sat__f32x4 la = sat__f32x4_max(sat__f32x4_load(local + x), sat__f32x4_set1(TONEMAP__DARKEST));
+        sat__f32x4 display = sat__f32x4_mul(sat__f32x4_sub(tonemap__capacity4(sat__f32x4_mul(la, sat__f32x4_set1(f->cd))), low), factor);
+        sat__i32x4 shown = sat__i32x4_and(sat__f32x4_less(zero, sat__f32x4_load(luminance + x)), sat__f32x4_less(zero, display));
+        sat__f32x4_store(gain + x, sat__f32x4_select(shown, sat__f32x4_div(sat__f32x4_mul(display, scale), la), zero));
     }
+#endif
+    for (; x < end; x++) gain[x] = tonemap__ashikhmin_gain(local[x], luminance[x], f, key);
 }
 
 static inline void tonemap__gain_row(tonemap *map, tonemap__worker *w, int y)

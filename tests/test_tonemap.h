@@ -324,6 +324,8 @@ TEST(vector_and_plain_code_give_the_same_bits)
         differ += a[1] != tonemap__exp2(-50 + 0.025f * (float)x);
         sat__f32x4_store(b, tonemap__cbrt4(sat__f32x4_set1(v)));
         differ += b[3] != tonemap__cbrt(v);
+        sat__f32x4_store(a, tonemap__capacity4(sat__f32x4_set1(v)));
+        differ += a[0] != tonemap__capacity(v);
         EXPECT_NEAR(tonemap__log2(v), -90 + 0.045 * x, 1e-5);
         EXPECT_REL(tonemap__exp2(-50 + 0.025f * (float)x), exp2((double)(-50 + 0.025f * (float)x)), 1e-5);
         if (v > 1 && v < 1e6f) EXPECT_REL(tonemap__cbrt(v), cbrt((double)v), 5e-5);
