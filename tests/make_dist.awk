@@ -50,18 +50,20 @@ FNR == 1 { lib = FILENAME; sub(/.*\//, "", lib) }
 
 function paste(name,    i) { for (i = 1; i <= size[name]; ++i) print text_of[name, i] }
 
-# The interface without functions and the comments before them; what is left out goes to the part "prototypes".
-function paste_interface(    i, line, comment, in_comment, in_prototype, mark) {
+# The interface without functions and the comments before them; what is left out goes to the parts
+# "prototypes" and "gl_prototypes".
+function paste_interface(    i, line, comment, in_comment, in_prototype, mark, depth, gl) {
     for (i = 1; i <= size["interface"]; ++i) {
         line = text_of["interface", i]
         if (line ~ /^SAT_DEF /) { in_prototype = 1; comment = "" }
-        if (in_prototype) { add("prototypes", line); in_prototype = line !~ /;/; continue }
+        if (in_prototype) { add(gl[depth] ? "gl_prototypes" : "prototypes", line); in_prototype = line !~ /;/; continue }
         if (line ~ /^\/\*/ || in_comment) {
             comment = comment line "\n"
             in_comment = line !~ /\*\//
             continue
         }
-        if (line ~ /^#(if|ifdef|ifndef|else|elif|endif)/ && line !~ /__cplusplus|SAT_H|SAT_STATIC|SAT_DEF/) add("prototypes", line)
+        if (line ~ /^#(if|ifdef|ifndef) /) gl[++depth] = gl[depth - 1] || line ~ /defined\(SAT_GL\)|ifdef SAT_GL$/
+        if (line ~ /^#endif/) --depth
         printf "%s", comment
         comment = ""
         print line
@@ -76,9 +78,9 @@ function paste_core(    i, line) {
         line = text_of["core", i]
         if (line ~ /^static [^=]*\(/ && line !~ /^static inline/) sub(/^static /, "static inline ", line)   # may be unused
         print line
-        if (line ~ /^#define SAT_IMPLEMENTED$/) {
+        if (line ~ /^#define SAT_(IMPLEMENTED|_GL_IMPLEMENTED)$/) {
             print "\n#ifdef __cplusplus\nextern \"C\" {\n#endif"
-            paste("prototypes")
+            paste(line ~ /GL/ ? "gl_prototypes" : "prototypes")
             print "#ifdef __cplusplus\n}\n#endif"
         }
     }
@@ -88,8 +90,9 @@ END {
     print "/* One-file edition of " lib ": sat.h is inside, private. Made by `make dist`; do not edit. */\n"
     for (k = 1; k <= size["header"]; ++k) {
         if (text_of["header", k] != "#include \"sat.h\"") { print text_of["header", k]; continue }
+        if (++inclusions > 2) continue
         print "/* ================ from sat.h ================ */"
-        if (++inclusions == 1) {
+        if (inclusions == 1) {
             print "#if defined(SAT_H) && !defined(SAT_EDITION)"
             print "#error \"a one-file edition brings its own sat.h: include editions only, or plain headers only\""
             print "#endif\n#ifndef SAT_EDITION\n#define SAT_EDITION\n#define SAT_STATIC\n#endif"
