@@ -1,0 +1,536 @@
+/* Error against run time of ssao_sat.h, and of what others use, against a ray tracer.
+
+   FIT=1 in the environment fits the parameters of all methods first (minutes) and prints them as a table. The ray-traced pictures are
+   kept in build/, so that only the first run draws them. */
+#define SAT_IMPLEMENTATION
+#define SSAO_SAT_IMPLEMENTATION
+#include "ssao_sat.h"
+#include "bench.h"
+#include "mesh.h"
+#include "reference_ssao.h"
+
+enum { FITTED = 3, IMAGES = FITTED * REF_RADII, OURS = 9, ALL = OURS + REF_METHODS };
+
+static ref_picture pictures[REF_SCENES];
+static int side;
+static size_t pixels;
+static float *out, *other;
+
+/* ---- pictures ---- */
+
+static void keep(ref_picture *p, const char *path, int reading)
+{
+    FILE *f = fopen(path, reading ? "rb" : "wb");
+    size_t n = pixels, want = n * 4 * (1 + REF_RADII), done = 0;
+    int r;
+    if (!f) return;
+    if (reading) {
+        done += fread(p->z, 4, n, f) + fread(p->normals, 4, 3 * n, f);
+        for (r = 0; r < REF_RADII; r++) done += fread(p->ao[r], 4, n, f) + fread(p->bent[r], 4, 3 * n, f);
+        p->width = done == want ? side : 0;
+    } else {
+        done += fwrite(p->z, 4, n, f) + fwrite(p->normals, 4, 3 * n, f);
+        for (r = 0; r < REF_RADII; r++) done += fwrite(p->ao[r], 4, n, f) + fwrite(p->bent[r], 4, 3 * n, f);
+    }
+    if (fclose(f) != 0 || (!reading && done != want)) remove(path);
+}
+
+static void draw_pictures(int rays)
+{
+    int i;
+    for (i = 0; i < REF_SCENES; i++) {
+        ref_scene s;
+        ref_picture p;
+        char path[64];
+        snprintf(path, sizeof path, "build/ssao_%d_%d_%d.ref", i, side, rays);
+        ref_open(&s, i);
+        p = ref_draw(&s, side, side, 0, 0, ref_make(0, 0, 0), 2);
+        p.width = 0;
+        keep(&p, path, 1);
+        if (!p.width) {
+            ref_free(&p);
+            p = ref_draw(&s, side, side, 0, rays, ref_make(0, 0, 0), 2);
+            keep(&p, path, 0);
+        }
+        ref_close(&s);
+        pictures[i] = p;
+    }
+}
+
+/* ---- methods ---- */
+
+typedef struct method {
+    const char *name;
+    int theirs;                /* ref_method, or -1 */
+    ssao_sat_options options;
+    ref_fit fit;
+    int is_default;
+} method;
+
+static method methods[ALL];
+
+static method *add(int *count, const char *name, ssao_sat_method m, int half)
+{
+    method *e = &methods[(*count)++];
+    memset(e, 0, sizeof *e);
+    e->name = name;
+    e->theirs = -1;
+    e->options = ssao_sat_defaults();
+    e->options.method = m;
+    e->options.half_resolution = half;
+    return e;
+}
+
+static void list_methods(void)
+{
+    int n = 0, i;
+    add(&n, "minimalist", SSAO_SAT_MINIMALIST, 0);
+    add(&n, "normal-guided", SSAO_SAT_NORMAL_GUIDED, 0);
+    add(&n, "refined, as printed", SSAO_SAT_REFINED, 0)->options.as_printed = 1;
+    add(&n, "refined", SSAO_SAT_REFINED, 0);
+    add(&n, "plane, one box", SSAO_SAT_PLANE, 0)->options.plane_boxes = 1;
+    add(&n, "plane 2x2", SSAO_SAT_PLANE, 0);
+    add(&n, "slabs, full resolution", SSAO_SAT_SLABS, 0);
+    add(&n, "slabs, 4 of them", SSAO_SAT_SLABS, 1)->options.slabs = 4;
+    add(&n, "slabs", SSAO_SAT_SLABS, 1)->is_default = 1;
+    for (i = 0; i < REF_METHODS; i++) {
+        method *e = &methods[n++];
+        memset(e, 0, sizeof *e);
+        e->name = ref_method_names[i];
+        e->theirs = i;
+        e->fit = ref_fits[i];
+    }
+}
+
+/* Seconds of processor time: all of this is one thread, and the machine may be busy. */
+static double processor_clock(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Seconds of one image (create left out). Accessibility in `out`, or the comparators' occlusion. */
+static double apply(const method *m, const ref_picture *p, double radius)
+{
+    ssao_sat_input in = ssao_sat_input_linear(p->z, p->width, p->height, p->fov);
+    ssao_sat_options o = m->options;
+    ssao_sat *ao = NULL;
+    double start = processor_clock();
+    if (m->theirs >= 0) {
+        ref_run((ref_method)m->theirs, &m->fit, p, (float)radius, out, other);
+        return processor_clock() - start;
+    }
+    in.normals = p->normals;
+    o.radius = radius;
+    if (ssao_sat_create(&ao, p->width, p->height, &o) != SAT_OK) exit(1);
+    ssao_sat_apply(ao, out, 0, &in, NULL); /* pages and caches warm */
+    start = processor_clock();
+    if (ssao_sat_apply(ao, out, 0, &in, NULL) != SAT_OK) exit(1);
+    start = processor_clock() - start;
+    ssao_sat_destroy(ao);
+    return start;
+}
+
+/* ---- fits: gain and power for given occlusion, over the pictures of some scenes ---- */
+
+enum { GAINS = 40, POWERS = 6 };
+static const float powers[POWERS] = {0.5f, 1, 1.5f, 2, 3, 4};
+static float gain_of(int g) { return 0.05f * powf(1.15f, (float)g); }
+
+typedef struct error_table { double rmse[GAINS][POWERS]; } error_table;
+static float *occlusions[REF_SCENES * REF_RADII];
+
+/* Occlusion before the tone curve of the method, all scenes and radii. */
+static void occlude(const method *m)
+{
+    const ssao_sat__fit *fit = &ssao_sat__fits[m->options.method == SSAO_SAT_PLANE && m->options.plane_boxes == 1 ? 5 : (int)m->options.method];
+    int scene, r;
+    size_t i;
+    for (scene = 0; scene < REF_SCENES; scene++)
+        for (r = 0; r < REF_RADII; r++) {
+            float *o = occlusions[scene * REF_RADII + r];
+            apply(m, &pictures[scene], (double)pictures[scene].radius[r]);
+            for (i = 0; i < pixels; i++) o[i] = m->theirs >= 0 ? out[i] : (1 - powf(out[i], 1 / fit->power)) / fit->gain;
+        }
+}
+
+static void tabulate(error_table *t, int image)
+{
+    const ref_picture *p = &pictures[image / REF_RADII];
+    const float *truth = p->ao[image % REF_RADII], *o = occlusions[image];
+    int g, k;
+    for (g = 0; g < GAINS; g++)
+        for (k = 0; k < POWERS; k++) {
+            double sum = 0;
+            size_t i, n = 0;
+            for (i = 0; i < pixels; i += 13) {
+                float v = ref_clamp(1 - gain_of(g) * o[i], 0, 1), e;
+                if (!(p->z[i] < 1e18f)) continue;
+                v = k == 0 ? sqrtf(v) : k == 1 ? v : k == 2 ? v * sqrtf(v) : k == 3 ? v * v : k == 4 ? v * v * v : v * v * v * v;
+                e = v - truth[i];
+                sum += (double)(e * e);
+                n++;
+            }
+            t->rmse[g][k] = sqrt(sum / (double)n);
+        }
+}
+
+/* The best joint gain and power on all fitted scenes but one (-1: on all); their mean RMSE. */
+static double best_tone(const error_table *t, int left_out, int *gain, int *power)
+{
+    double best = 1e9;
+    int g, k, i;
+    for (g = 0; g < GAINS; g++)
+        for (k = 0; k < POWERS; k++) {
+            double sum = 0;
+            for (i = 0; i < IMAGES; i++) sum += i / REF_RADII == left_out ? 0 : t[i].rmse[g][k];
+            sum /= left_out < 0 ? IMAGES : IMAGES - REF_RADII;
+            if (sum < best) { best = sum; *gain = g; *power = k; }
+        }
+    return best;
+}
+
+static void fit_comparators(void)
+{
+    static const float first[4] = {1, 1.4f, 2, 2.8f}, second[3][4] = {{0.01f, 0.05f, 0.1f, 0.2f}, {0.05f, 0.15f, 0.25f, 0.4f}, {0, 0.15f, 0.3f, 0.5f}};
+    static error_table t[IMAGES];
+    int i, a, b, k, g, p;
+    bench_table("Fit of the comparators", "method\tradius\tsecond\tgain\tpower\trmse");
+    for (i = OURS; i < ALL; i++) {
+        ref_fit best = methods[i].fit;
+        double least = 1e9;
+        for (a = 0; a < 4; a++)
+            for (b = 0; b < 4; b++) {
+                double e;
+                methods[i].fit.parameters[0] = first[a];
+                methods[i].fit.parameters[1] = second[methods[i].theirs % 3][b];
+                occlude(&methods[i]);
+                for (k = 0; k < IMAGES; k++) tabulate(&t[k], k);
+                e = best_tone(t, -1, &g, &p);
+                if (e >= least) continue;
+                least = e;
+                best = methods[i].fit;
+                best.gain = gain_of(g);
+                best.power = powers[p];
+            }
+        methods[i].fit = best;
+        bench_row("%s\t%g\t%g\t%.3f\t%g\t%.4f", methods[i].name, (double)best.parameters[0], (double)best.parameters[1], (double)best.gain,
+                  (double)best.power, least);
+    }
+}
+
+/* ---- tables ---- */
+
+typedef struct score { double rmse, ssim, held_out, other, seconds[16]; } score;
+
+/* The same three radii of a scene that no method was fitted to, and each fitted scene with gain and power from the other two. */
+static void measure_errors(const method *m, score *s)
+{
+    static error_table t[IMAGES];
+    int i, scene, g, p;
+    size_t k;
+    memset(s, 0, sizeof *s);
+    occlude(m);
+    for (i = 0; i < IMAGES; i++) tabulate(&t[i], i);
+    for (scene = 0; scene < FITTED; scene++) {
+        best_tone(t, scene, &g, &p);
+        for (i = 0; i < REF_RADII; i++) s->held_out += t[scene * REF_RADII + i].rmse[g][p] / IMAGES;
+    }
+    for (i = 0; i < REF_SCENES * REF_RADII; i++) {
+        const ref_picture *q = &pictures[i / REF_RADII];
+        apply(m, q, (double)q->radius[i % REF_RADII]);
+        if (m->theirs >= 0) ref_tone(out, pixels, m->fit.gain, m->fit.power);
+        for (k = 0; k < pixels; k++)
+            if (!(q->z[k] < 1e18f)) out[k] = 1;
+        if (i >= IMAGES) s->other += ref_rmse(q, out, q->ao[i % REF_RADII]) / REF_RADII;
+        else {
+            s->rmse += ref_rmse(q, out, q->ao[i % REF_RADII]) / IMAGES;
+            s->ssim += ref_ssim(q, out, q->ao[i % REF_RADII]) / IMAGES;
+        }
+    }
+}
+
+/* Time of the nine pictures, all methods in turn, so that each ratio is of one run; the median over the rounds. */
+static void measure_times(score *scores, int rounds)
+{
+    int r, m, i;
+    for (r = 0; r < rounds; r++)
+        for (m = 0; m < ALL; m++)
+            for (scores[m].seconds[r] = 0, i = 0; i < IMAGES; i++)
+                scores[m].seconds[r] += apply(&methods[m], &pictures[i / REF_RADII], (double)pictures[0].radius[i % REF_RADII]);
+}
+
+static double ratio(const score *a, const score *b, int rounds)
+{
+    double v[16];
+    int r;
+    for (r = 0; r < rounds; r++) v[r] = a->seconds[r] / b->seconds[r];
+    return support_median(v, rounds);
+}
+
+static void error_against_time(void)
+{
+    static score scores[ALL];
+    int m, rounds = bench_quick() ? 1 : 3;
+    for (m = 0; m < ALL; m++) measure_errors(&methods[m], &scores[m]);
+    measure_times(scores, rounds);
+    bench_table("Error against time: 3 scenes x radii 0.1, 0.25, 0.6, one thread",
+                "method\ttime_ratio\trmse\tssim\trmse_held_out\trmse_other_scene\tms\tto_gtao_half_ratio\tto_ssao_ratio\tto_hbao_half_ratio\tdefault");
+    bench_plot("RMSE against time (1 = minimalist); x=time_ratio; y=rmse; by=method; log=x");
+    bench_plot("RMSE on a scene held out; x=time_ratio; y=rmse_other_scene; by=method; log=x");
+    bench_note("rmse: one parameter set a method for all nine pictures. rmse_held_out: gain and power from the other two scenes. rmse_other_scene: "
+               "the same parameters on a scene with other objects that nothing was fitted to.");
+    for (m = 0; m < ALL; m++)
+        bench_row("%s\t%.2f\t%.4f\t%.3f\t%.4f\t%.4f\t%.1f\t%.3f\t%.3f\t%.3f\t%d", methods[m].name, ratio(&scores[m], &scores[0], rounds), scores[m].rmse,
+                  scores[m].ssim, scores[m].held_out, scores[m].other, scores[m].seconds[0] / IMAGES * 1e3,
+                  ratio(&scores[m], &scores[OURS + REF_GTAO_HALF], rounds), ratio(&scores[m], &scores[OURS + REF_SSAO], rounds),
+                  ratio(&scores[m], &scores[OURS + REF_HBAO_HALF], rounds), methods[m].is_default);
+}
+
+static void radius_table(void)
+{
+    static const int which[] = {0, 5, 8, OURS + REF_SSAO, OURS + REF_GTAO_HALF};
+    int i, r, k, rounds = bench_rounds(5);
+    bench_table("Time against radius (three scenes together)", "method\tradius\tms\tto_smallest_ratio");
+    bench_plot("Time against radius; x=radius; y=ms; by=method; style=lines");
+    for (i = 0; i < 5; i++) {
+        double base = 0;
+        for (r = 0; r < REF_RADII; r++) {
+            double t[16];
+            for (k = 0; k < rounds; k++) t[k] = apply(&methods[which[i]], &pictures[0], (double)pictures[0].radius[r]) +
+                                               apply(&methods[which[i]], &pictures[1], (double)pictures[0].radius[r]) +
+                                               apply(&methods[which[i]], &pictures[2], (double)pictures[0].radius[r]);
+            t[0] = support_median(t, rounds);
+            if (r == 0) base = t[0];
+            bench_row("%s\t%g\t%.2f\t%.2f", methods[which[i]].name, (double)pictures[0].radius[r], t[0] * 1e3, t[0] / base);
+        }
+    }
+}
+
+/* Slomp 2012, figure 5.16 and table 5.1: every method at sizes up to 2048; half-resolution variants as in the thesis. */
+static void resolution_table(void)
+{
+    int size, top = bench_quick() ? 512 : 2048, m;
+    bench_table("Figure 5.16 re-made: time against resolution, scene 0, R = 0.25", "method\tsize\tms\tto_minimalist_ratio");
+    bench_plot("Time against resolution; x=size; y=ms; by=method; log=xy; style=lines");
+    for (size = 256; size <= top; size *= 2) {
+        ref_scene s;
+        ref_picture p;
+        double base = 0;
+        free(out);
+        free(other);
+        out = (float *)malloc((size_t)size * (size_t)size * 4);
+        other = (float *)malloc((size_t)size * (size_t)size * 4);
+        ref_open(&s, 0);
+        p = ref_draw(&s, size, size, 0, 0, ref_make(0, 0, 0), 2);
+        ref_close(&s);
+        for (m = 0; m < ALL; m++) {
+            double t = apply(&methods[m], &p, 0.25), again = size < 2048 ? apply(&methods[m], &p, 0.25) : t;
+            if (again < t) t = again;
+            if (m == 0) base = t;
+            bench_row("%s\t%d\t%.2f\t%.2f", methods[m].name, size, t * 1e3, t / base);
+        }
+        if (size == 1024 || bench_quick()) {
+            method refined = methods[3];
+            double t[4];
+            refined.options.half_resolution = 1;
+            t[0] = apply(&methods[OURS + REF_SSAO_HALF], &p, 0.25);
+            t[1] = apply(&methods[OURS + REF_HBAO_HALF], &p, 0.25);
+            t[2] = apply(&refined, &p, 0.25);
+            t[3] = apply(&methods[8], &p, 0.25);
+            printf("# table 5.1 at %d, all at half resolution: traditional %.1f ms, horizon-based %.1f ms, refined %.1f ms, slabs %.1f ms; to refined: "
+                   "%.2f %.2f 1 %.2f (the thesis, whole frames on its GPU: 1.71 2.44 1)\n", size, t[0] * 1e3, t[1] * 1e3, t[2] * 1e3, t[3] * 1e3,
+                   t[0] / t[2], t[1] / t[2], t[3] / t[2]);
+        }
+        ref_free(&p);
+    }
+}
+
+typedef struct job { ssao_sat *ao; ssao_sat_input in; float *bent; } job;
+static void run_job(void *user)
+{
+    job *j = (job *)user;
+#ifndef SSAO_SAT_NO_BENT
+    if (j->bent) { ssao_sat_apply_bent(j->ao, out, 0, j->bent, 0, &j->in, NULL); return; }
+#endif
+    ssao_sat_apply(j->ao, out, 0, &j->in, NULL);
+}
+
+static void leave_out_table(void)
+{
+    int scene, r;
+    bench_table("Leaving out regions that are one plane", "scene\tradius\tflat_percent\twithout_to_with_ratio\tlargest_difference\tslabs_skipped_percent");
+    for (scene = 0; scene < REF_SCENES; scene++)
+        for (r = 0; r < REF_RADII; r++) {
+            const ref_picture *p = &pictures[scene];
+            ssao_sat_options o = ssao_sat_defaults();
+            ssao_sat_stats stats;
+            job a, b;
+            bench_times t;
+            double worst = 0;
+            size_t i;
+            a.in = ssao_sat_input_linear(p->z, side, side, p->fov);
+            a.in.normals = p->normals;
+            a.bent = NULL;
+            b = a;
+            o.radius = (double)p->radius[r];
+            ssao_sat_create(&a.ao, side, side, &o);
+            o.skip_flat = 0;
+            ssao_sat_create(&b.ao, side, side, &o);
+            t = bench_ratio(run_job, &b, run_job, &a, bench_rounds(7));
+            ssao_sat_apply(a.ao, other, 0, &a.in, &stats);
+            ssao_sat_apply(b.ao, out, 0, &b.in, NULL);
+            for (i = 0; i < pixels; i++) worst = fmax(worst, fabs((double)(out[i] - other[i])));
+            bench_row("%d\t%g\t%.1f\t%.2f\t%.1e\t%.1f", scene, o.radius, 100.0 * (double)stats.flat / (double)stats.pixels, t.ratio, worst,
+                      100.0 * (double)stats.slabs_skipped / (double)(stats.slabs_skipped + stats.slabs_visited + !stats.slabs_visited));
+            ssao_sat_destroy(a.ao);
+            ssao_sat_destroy(b.ao);
+        }
+}
+
+#ifndef SSAO_SAT_NO_BENT
+static void bent_table(void)
+{
+    float *bent = (float *)malloc(pixels * 12);
+    int scene, r, k;
+    bench_table("Bent normals", "scene\tradius\ttime_ratio\tangle_degrees\tplain_normal_degrees");
+    for (scene = 0; scene < REF_SCENES; scene++)
+        for (r = 0; r < REF_RADII; r++) {
+            const ref_picture *p = &pictures[scene];
+            ssao_sat_options o = ssao_sat_defaults();
+            job a, b;
+            bench_times t;
+            double sum = 0, plain = 0;
+            size_t i, n = 0;
+            a.in = ssao_sat_input_linear(p->z, side, side, p->fov);
+            a.in.normals = p->normals;
+            a.bent = NULL;
+            o.radius = (double)p->radius[r];
+            ssao_sat_create(&a.ao, side, side, &o);
+            b = a;
+            b.bent = bent;
+            t = bench_ratio(run_job, &b, run_job, &a, bench_rounds(7));
+            for (i = 0; i < pixels; i++) {
+                double c = 0, d = 0;
+                if (!(p->z[i] < 1e18f)) continue;
+                for (k = 0; k < 3; k++) {
+                    c += (double)(bent[3 * i + (size_t)k] * p->bent[r][3 * i + (size_t)k]);
+                    d += (double)(p->normals[3 * i + (size_t)k] * p->bent[r][3 * i + (size_t)k]);
+                }
+                sum += acos(fmin(fmax(c, -1), 1)) * 57.29578;
+                plain += acos(fmin(fmax(d, -1), 1)) * 57.29578;
+                n++;
+            }
+            bench_row("%d\t%g\t%.3f\t%.2f\t%.2f", scene, o.radius, t.ratio, sum / (double)n, plain / (double)n);
+            ssao_sat_destroy(a.ao);
+        }
+    free(bent);
+}
+#endif
+
+/* How much the picture changes while the camera glides: mean |difference| of successive frames where depth hardly changes. */
+static void motion_table(void)
+{
+    enum { FRAMES = 6 };
+    static const int which[] = {5, 8, OURS + REF_SSAO, OURS + REF_HBAO_HALF, OURS + REF_GTAO, OURS + REF_GTAO_HALF};
+    float *last = (float *)malloc(pixels * 4), *last_z = (float *)malloc(pixels * 4);
+    double change[6] = {0};
+    long count[6] = {0};
+    int f, i;
+    size_t k;
+    ref_scene s;
+    ref_open(&s, 1);
+    for (i = 0; i < 6; i++)
+        for (f = 0; f < FRAMES; f++) {
+            ref_picture p = ref_draw(&s, side, side, 0, 0, ref_make(0.0015f * (float)f, 0.0007f * (float)f, 0), 2);
+            apply(&methods[which[i]], &p, 0.25);
+            if (methods[which[i]].theirs >= 0) ref_tone(out, pixels, methods[which[i]].fit.gain, methods[which[i]].fit.power);
+            for (k = 0; k < pixels && f > 0; k++) {
+                if (!(p.z[k] < 1e18f) || !(fabsf(p.z[k] - last_z[k]) < 0.005f * p.z[k])) continue;
+                change[i] += fabs((double)(out[k] - last[k]));
+                count[i]++;
+            }
+            memcpy(last, out, pixels * 4);
+            memcpy(last_z, p.z, pixels * 4);
+            ref_free(&p);
+        }
+    ref_close(&s);
+    bench_table("Camera in motion, scene 1, a quarter of a pixel a frame", "method\tmean_change\tto_slabs_ratio");
+    for (i = 0; i < 6; i++)
+        bench_row("%s\t%.5f\t%.2f", methods[which[i]].name, change[i] / (double)count[i], change[i] / (double)count[i] / (change[1] / (double)count[1]));
+    free(last);
+    free(last_z);
+}
+
+/* Box means of 1/z over 17 x 17 pixels: the formats of 5.5 and 4.6 against integers modulo 2^32. */
+static void format_table(void)
+{
+    static const char *const names[] = {"uint32 modulo 2^32", "float", "float less mean"};
+    int size, kind;
+    bench_table("Largest error of a box mean of 1/z, in units of one depth step R / z^2, R = 0.25 (1/10 shows)", "table\tsize\tlargest_error");
+    bench_plot("Table formats; x=size; y=largest_error; by=table; log=xy; style=lines");
+    for (size = 512; size <= (bench_quick() ? 512 : 4096); size *= 2)
+        for (kind = 0; kind < 3; kind++) {
+            size_t n = (size_t)size * (size_t)size, i;
+            float *z = (float *)malloc(n * 4), *result = (float *)malloc(n * 4);
+            ssao_sat_options o = ssao_sat_defaults();
+            ssao_sat_input in = ssao_sat_input_linear(z, size, size, 0.8);
+            ssao_sat *ao;
+            uint64_t state = 1;
+            double worst = 0;
+            int k;
+            for (i = 0; i < n; i++) z[i] = pictures[0].z[(i / (size_t)size) % (size_t)side * (size_t)side + (i % (size_t)size) % (size_t)side];
+            o.method = SSAO_SAT_PLANE;
+            o.half_resolution = 0;
+            o.float_table = kind;
+            o.max_pixels = 8;
+            if (ssao_sat_create(&ao, size, size, &o) != SAT_OK || ssao_sat_apply(ao, result, 0, &in, NULL) != SAT_OK) exit(1);
+            for (k = 0; k < 4000; k++) {
+                int x = support_below(&state, size - 17), y = support_below(&state, size - 17), u, v;
+                ssao_sat__region r;
+                double sum = 0, centre = (double)z[(size_t)(y + 8) * (size_t)size + (size_t)(x + 8)];
+                ssao_sat_stats stats;
+                memset(&stats, 0, sizeof stats);
+                ssao_sat__set_region(&r, ao, (float)x + 8.5f, (float)y + 8.5f, 8.5f, 8.5f);
+                ssao_sat__look_up(&r, ao, 4, 0, &stats);
+                for (v = r.y[0]; v < r.y[4]; v++)
+                    for (u = r.x[0]; u < r.x[4]; u++) sum += 1 / (double)z[(size_t)v * (size_t)size + (size_t)u];
+                sum /= (r.x[4] - r.x[0]) * (r.y[4] - r.y[0]);
+                worst = fmax(worst, fabs((double)ssao_sat__mean(&r, ao, 0, 0, 4, 4) - sum) * centre * centre / 0.25);
+            }
+            bench_row("%s\t%d\t%.2e", names[kind], size, worst);
+            ssao_sat_destroy(ao);
+            free(z);
+            free(result);
+        }
+}
+
+int main(void)
+{
+    const char *fit = getenv("FIT");
+    int i;
+    side = bench_quick() ? 192 : 512;
+    pixels = (size_t)side * (size_t)side;
+    out = (float *)malloc(pixels * 4);
+    other = (float *)malloc(pixels * 4);
+    for (i = 0; i < REF_SCENES * REF_RADII; i++) occlusions[i] = (float *)malloc(pixels * 4);
+    bench_start("ssao_sat.h");
+    draw_pictures(bench_quick() ? 64 : 256);
+    list_methods();
+    if (fit && *fit) fit_comparators();
+    error_against_time();
+    radius_table();
+    leave_out_table();
+#ifndef SSAO_SAT_NO_BENT
+    bent_table();
+#endif
+    motion_table();
+    format_table();
+    resolution_table(); /* last: it replaces the buffers */
+    for (i = 0; i < REF_SCENES * REF_RADII; i++) free(occlusions[i]);
+    for (i = 0; i < REF_SCENES; i++) ref_free(&pictures[i]);
+    free(out);
+    free(other);
+    return 0;
+}
