@@ -299,6 +299,60 @@ RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride
 #endif /* RAINDROP_H */
 
 /* ------------------------------------------------------------------------------------------------
+   OpenGL: GL 3.3 core and ES 3.0 / WebGL 2 (define RAINDROP_GL)
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(RAINDROP_GL) && !defined(RAINDROP__GL_API)
+#define RAINDROP__GL_API
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct raindrop_gl_options {
+    const raindrop_map *map; /* NULL; needed by RAINDROP_LOOK_MAP, copied to the GPU */
+    int half_map;            /* 1: half floats, 22 MB for a base of 1024; 0: floats */
+    int quads;               /* 0: point sprites, as published, which vanish when their centre leaves the picture and
+                                are cut at the context's largest point; 1: instanced quads, without these limits */
+    sat_allocator allocator; /* malloc; used by create, destroy and set_environment only */
+} raindrop_gl_options;
+RAINDROP_DEF raindrop_gl_options raindrop_gl_defaults(void);
+
+/* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL
+   state as it was (but for pending errors, which are lost). */
+typedef struct raindrop_gl raindrop_gl;
+/* On an OpenGL error *out only answers raindrop_gl_message, and is to be destroyed; on the others it is NULL. */
+RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *get_proc, const raindrop_gl_options *options);
+RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *gl);
+RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl);
+
+/* Copies; needed before render. Radiance above 65000 makes it floats instead of half floats, which ES cannot filter. */
+RAINDROP_DEF sat_result raindrop_gl_set_environment(raindrop_gl *gl, const raindrop_environment *environment);
+RAINDROP_DEF sat_result raindrop_gl_set_rain(raindrop_gl *gl, const raindrop_rain *rain);
+#ifndef RAINDROP_NO_RAIN
+/* raindrop_rain_advance by transform feedback: the same step, in floats, and the same random numbers. */
+RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *gl, double dt_seconds);
+RAINDROP_DEF sat_result raindrop_gl_set_wind(raindrop_gl *gl, const float wind[3]);
+#endif
+/* The drops back from the GPU, which waits for it; count as in the rain. */
+RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *drops, int count);
+
+/* Blends the drops over the bound framebuffer's viewport (0, 0, width, height), which should hold floats: row 0 is the
+   bottom one, as OpenGL has it. Unsorted, as published; looks as in raindrop_render but without internal reflections,
+   flattened shapes, streaks and depth of field. depth_near > 0: the depth test is on, against a depth buffer of the
+   usual perspective with these planes; depth is not written. */
+RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, int width, int height, const raindrop_camera *camera,
+                                           const raindrop_render_options *options, float depth_near, float depth_far);
+
+/* GLSL (3.30 or ES 3.00) for shaders of your own: raindrop_ray raindrop_trace(d, p, one_minus_b2, n) as on the CPU. */
+RAINDROP_DEF const char *raindrop_gl_glsl(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* RAINDROP__GL_API */
+
+/* ------------------------------------------------------------------------------------------------
    Stop here if you only want to use the library.
    ------------------------------------------------------------------------------------------------ */
 
@@ -875,7 +929,7 @@ struct raindrop_environment {
     raindrop_filter filter;
     sat_table *table;
     int table_width, table_height;
-    float n;
+    float n, largest;
     sat_allocator allocator;
     size_t bytes;
 };
@@ -1418,6 +1472,7 @@ RAINDROP_DEF sat_result raindrop_environment_create(raindrop_environment **out, 
 #ifndef RAINDROP_NO_BOW
         if (bow) raindrop_bow_profile(bow, RAINDROP__BOW_BINS);
 #endif
+        e->largest = local.largest;
         result = raindrop__fill_environment(e, &picture, bow, &o, &memory);
     }
     sat__release(&memory, picture.rgb, bytes);
@@ -1769,18 +1824,37 @@ static inline float raindrop__wrap(double position, double low, double size)
 }
 
 /* Out below: another drop comes in on top, after what is left of the time. */
-static inline void raindrop__reenter(raindrop_drop *drop, const raindrop_rain *rain, double below, uint32_t i)
+static inline void raindrop__reenter(raindrop_drop *drop, double at[3], const raindrop_rain *rain, double below, uint32_t i)
 {
     const raindrop_rain_options *o = &rain->options;
     double size = (double)o->box_size[1], top = (double)o->centre[1] + size / 2, old = -(double)drop->velocity[1];
     if (!(o->diameter_mm > 0)) {
         uint32_t stream = rain->step * 512u;
         raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 1));
-        drop->position[0] = raindrop__place(o, 0, raindrop__hash(o->seed, stream, i));
-        drop->position[2] = raindrop__place(o, 2, raindrop__hash(o->seed, stream + 2, i));
-        if (old > 0) below *= (double)raindrop_terminal_velocity((double)drop->radius * 2e3) / old;
+        at[0] = (double)raindrop__place(o, 0, raindrop__hash(o->seed, stream, i));
+        at[2] = (double)raindrop__place(o, 2, raindrop__hash(o->seed, stream + 2, i));
+        if (old > 0) below *= raindrop_terminal_velocity((double)drop->radius * 2e3) / old;
     }
-    drop->position[1] = raindrop__wrap(top - fmod(below, size), top - size, size);
+    at[1] = top - fmod(below, size);
+}
+
+/* The drag of one drop, or none once all are settled; returns whether its velocity still changes. */
+static inline int raindrop__move(double way[3], raindrop_drop *drop, const raindrop_rain *rain, double dt)
+{
+    double velocity[3];
+    int axis, moving = 0;
+    for (axis = 0; axis < 3; axis++) {
+        velocity[axis] = (double)drop->velocity[axis];
+        way[axis] = velocity[axis] * dt;
+    }
+    if (rain->settled || !(drop->radius > 0) || !(dt > 0)) return 0;
+    raindrop__step(velocity, way, (double)drop->radius, rain->options.wind, dt);
+    for (axis = 0; axis < 3; axis++) {
+        float v = (float)velocity[axis];
+        moving |= fabsf(v - drop->velocity[axis]) > 1e-6f * fabsf(v);
+        drop->velocity[axis] = v;
+    }
+    return moving;
 }
 
 static void raindrop__advance_range(int begin, int end, int worker, void *context)
@@ -1788,7 +1862,7 @@ static void raindrop__advance_range(int begin, int end, int worker, void *contex
     const raindrop__advance_job *job = (const raindrop__advance_job *)context;
     raindrop_rain *rain = job->rain;
     const raindrop_rain_options *o = &rain->options;
-    double velocity[3], way[3], low[3], position;
+    double way[3], low[3], at[3];
     int chunk, i, axis;
     (void)worker;
     for (axis = 0; axis < 3; axis++) low[axis] = (double)o->centre[axis] - (double)o->box_size[axis] / 2;
@@ -1796,26 +1870,13 @@ static void raindrop__advance_range(int begin, int end, int worker, void *contex
         int last = sat__min_int((chunk + 1) * RAINDROP__CHUNK, rain->count), moving = 0;
         for (i = chunk * RAINDROP__CHUNK; i < last; i++) {
             raindrop_drop *drop = &rain->drops[i];
-            for (axis = 0; axis < 3; axis++) velocity[axis] = (double)drop->velocity[axis];
-            if (rain->settled || !(drop->radius > 0)) {
-                for (axis = 0; axis < 3; axis++) way[axis] = velocity[axis] * job->dt;
-            } else {
-                raindrop__step(velocity, way, (double)drop->radius, o->wind, job->dt);
-                for (axis = 0; axis < 3; axis++) {
-                    float v = (float)velocity[axis];
-                    moving |= fabsf(v - drop->velocity[axis]) > 1e-6f * fabsf(v);
-                    drop->velocity[axis] = v;
-                }
-            }
+            moving |= raindrop__move(way, drop, rain, job->dt);
+            for (axis = 0; axis < 3; axis++) at[axis] = (double)drop->position[axis] + way[axis];
+            if (!rain->own && way[1] < 0 && at[1] < low[1]) raindrop__reenter(drop, at, rain, low[1] - at[1], (uint32_t)i);
             for (axis = 0; axis < 3; axis++) {
-                position = (double)drop->position[axis] + way[axis];
-                if (!rain->own && (position < low[axis] || position >= low[axis] + (double)o->box_size[axis])) {
-                    if (axis == 1 && way[1] < 0 && position < low[1]) {
-                        raindrop__reenter(drop, rain, low[1] - position, (uint32_t)i);
-                        continue;
-                    }
-                    drop->position[axis] = raindrop__wrap(position, low[axis], (double)o->box_size[axis]);
-                } else drop->position[axis] = (float)position;
+                double size = (double)o->box_size[axis];
+                int outside = !rain->own && (at[axis] < low[axis] || at[axis] >= low[axis] + size);
+                drop->position[axis] = outside ? raindrop__wrap(at[axis], low[axis], size) : (float)at[axis];
             }
         }
         rain->unsettled[chunk] = moving;
@@ -3049,3 +3110,696 @@ RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride
 }
 #endif
 #endif /* RAINDROP_IMPLEMENTATION */
+
+/* ------------------------------------------------------------------------------------------------
+   OpenGL
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(RAINDROP_IMPLEMENTATION) && defined(RAINDROP_GL) && !defined(RAINDROP__GL_IMPLEMENTED)
+#define RAINDROP__GL_IMPLEMENTED
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+RAINDROP_DEF const char *raindrop_gl_glsl(void)
+{
+    return "#ifndef RAINDROP_GLSL\n"
+           "#define RAINDROP_GLSL\n"
+           "struct raindrop_ray { vec3 reflected, refracted; float fresnel, transmit, footprint; };\n"
+           "raindrop_ray raindrop_trace(vec3 d, vec3 p, float one_minus_b2, float n) {\n"
+           "    raindrop_ray ray;\n"
+           "    float m = clamp(one_minus_b2, 0.0, 1.0), b2 = 1.0 - m, inside = (m + (n - 1.0) * (n + 1.0)) / (n * n);\n"
+           "    float ci = sqrt(m), cr = sqrt(max(inside, 0.0)), cd = ci * cr + b2 / n, sd = cr - ci / n;\n"
+           "    float a = (ci - n * cr) / (ci + n * cr + 1e-12), c = (n * ci - cr) / (n * ci + cr + 1e-12);\n"
+           "    float fs = a * a, fp = c * c;\n"
+           "    bool total = inside <= 0.0 && n < 1.0;\n"
+           "    if (total) fs = fp = 1.0;\n"
+           "    ray.reflected = (2.0 * b2 - 1.0) * d + 2.0 * ci * p;\n"
+           "    ray.refracted = total ? ray.reflected : (1.0 - 2.0 * b2 * sd * sd) * d - 2.0 * sd * cd * p;\n"
+           "    ray.fresnel = 0.5 * (fs + fp);\n"
+           "    ray.transmit = 0.5 * ((1.0 - fs) * (1.0 - fs) + (1.0 - fp) * (1.0 - fp));\n"
+           "    ray.footprint = total ? 2.0 : 2.0 * sqrt(abs((1.0 / (ci + 1e-6) - 1.0 / (n * cr + 1e-6)) * sd * cd));\n"
+           "    return ray;\n"
+           "}\n"
+           "#endif\n";
+}
+
+/* Lookups in the environment's levels, laid out as an atlas: level 0, and to its right the others one above another. */
+static const char raindrop__glsl_environment[] =
+    "uniform sampler2D environment, far_drops;\n"
+    "uniform vec2 environment_size;\n" /* resolution, levels */
+    "vec3 fold(vec3 d) {\n"            /* unit square, and |x|+|y|+|z| */
+    "    float sum = abs(d.x) + abs(d.y) + abs(d.z);\n"
+    "    vec2 p = d.xz / sum, s = vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);\n"
+    "    if (d.y < 0.0) p = (1.0 - abs(p.yx)) * s;\n"
+    "    return vec3(p * 0.5 + 0.5, sum / length(d));\n"
+    "}\n"
+    "vec3 atlas(vec2 uv, float level) {\n"
+    "    float r = environment_size.x, below = exp2(level), side = r / below;\n"
+    "    vec2 corner = level < 0.5 ? vec2(0.0) : vec2(r + 2.0, r * (1.0 - 2.0 / below) + 2.0 * (level - 1.0));\n"
+    "    return textureLod(environment, (corner + 1.0 + uv * side) / vec2(textureSize(environment, 0)), 0.0).rgb;\n"
+    "}\n"
+    "vec3 look(vec3 d, float cone) {\n"
+    "    vec3 at = fold(d);\n"
+    "    float texels = 0.6 * cone * 0.5 * environment_size.x / (at.z * sqrt(at.z));\n"
+    "    float lod = clamp(log2(max(texels, 1.0)), 0.0, environment_size.y - 1.0), level = floor(lod);\n"
+    "    vec3 fine = atlas(at.xy, level);\n"
+    "    if (level + 1.0 >= environment_size.y) return fine;\n"
+    "    return mix(fine, atlas(at.xy, level + 1.0), lod - level);\n"
+    "}\n";
+
+/* A drop's sprite. LOOK 0 map, 1 sprite, 2 ray, 3 auto. */
+static const char raindrop__glsl_draw_vertex[] =
+    "layout(location = 0) in vec4 drop;\n"     /* position, radius */
+    "layout(location = 1) in vec4 motion;\n"   /* velocity, axis ratio */
+    "uniform vec3 eye, right, up, back;\n"
+    "uniform vec4 view;\n"                     /* half width, half height, focal length in pixels, near distance */
+    "uniform vec4 limits;\n"                   /* far radius, coverage threshold, depth planes */
+    "flat out vec4 place;\n"                   /* centre in pixels, half side, focal length in radii */
+    "flat out vec3 seen;\n"                    /* centre in radii, view space, z forward */
+    "flat out vec4 far_colour;\n"              /* colour, half side of the square that stands for a far drop */
+    "void main() {\n"
+    "    vec3 rel = drop.xyz - eye, v = vec3(dot(rel, right), dot(rel, up), -dot(rel, back));\n"
+    "    float r = drop.w, d2 = dot(v, v), half_side = 0.0;\n"
+    "    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);\n"
+    "    place = vec4(0.0);\n"
+    "    seen = vec3(0.0);\n"
+    "    far_colour = vec4(0.0);\n"
+    "    bool kept = r > 0.0 && d2 > 1.0001 * r * r && v.z - r > view.w && v.z > 1.0001 * r;\n"
+    "    float tangent2 = r * r / (d2 - r * r), stretch = sqrt(d2) / v.z;\n"
+    "    float area_radius = view.z * sqrt(tangent2 * stretch * stretch * stretch);\n"
+    "    kept = kept && 3.14159265 * area_radius * area_radius >= limits.y;\n"
+    "    if (kept) {\n"
+    "        vec2 centre = view.xy + view.z * v.xy / v.z, middle = centre;\n"
+    "        seen = v / r;\n"
+    "        place = vec4(centre, 0.0, v.z / (view.z * r));\n"
+    "#if LOOK < 2\n"
+    "        half_side = max(view.z * sqrt(tangent2) * stretch, 0.5);\n"
+    "        place.z = half_side;\n"
+    "        half_side += 0.01;\n" /* rasterisers snap to 1/256 of a pixel; the fragment cuts exactly */
+    "#else\n"
+    /* tangents from the eye, exact off axis */
+    "        vec2 q = sqrt(v.xy * v.xy + v.z * v.z - r * r), low = (v.xy * q - r * v.z) / (v.z * q + r * v.xy);\n"
+    "        vec2 high = (v.xy * q + r * v.z) / (v.z * q - r * v.xy), reach = 0.5 * view.z * (high - low) + 1.0;\n"
+    "        middle = view.xy + 0.5 * view.z * (low + high);\n"
+    "        half_side = max(reach.x, reach.y);\n"
+    "#if LOOK == 3\n"
+    "        if (area_radius < limits.x) {\n"
+    "            vec3 d = v.x * right + v.y * up - v.z * back, at = fold(d);\n"
+    "            vec2 size = vec2(textureSize(far_drops, 0));\n"
+    "            far_colour = vec4(textureLod(far_drops, (at.xy * (size - 2.0) + 1.0) / size, 0.0).rgb, 0.886227 * area_radius);\n"
+    "            half_side = far_colour.w + 1.0;\n"
+    "            middle = centre;\n"
+    "        }\n"
+    "#endif\n"
+    "#endif\n"
+    "        float z = limits.z > 0.0 ? ((limits.w + limits.z) - 2.0 * limits.w * limits.z / v.z) / (limits.w - limits.z) : 0.0;\n"
+    "#ifdef QUADS\n"
+    "        vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;\n"
+    "        middle += corner * half_side;\n"
+    "#endif\n"
+    "        gl_Position = vec4(middle / view.xy - 1.0, z, 1.0);\n"
+    "    }\n"
+    "#ifndef QUADS\n"
+    "    gl_PointSize = max(2.0 * half_side, 1.0);\n"
+    "#endif\n"
+    "}\n";
+
+static const char raindrop__glsl_draw_fragment[] =
+    "flat in vec4 place;\n"
+    "flat in vec3 seen;\n"
+    "flat in vec4 far_colour;\n"
+    "uniform vec3 right, up, back;\n"
+    "uniform vec4 view;\n"
+    "uniform vec2 optics;\n" /* index, whether the exit has Fresnel factors */
+    "#if LOOK == 0\n"
+    "uniform sampler2D reflections, refractions;\n"
+    "#endif\n"
+    "layout(location = 0) out vec4 colour;\n"
+    "vec3 shade(raindrop_ray ray, float width) {\n"
+    "    float pixel = 1.0 / view.z, pass = optics.y > 0.5 ? ray.transmit : 1.0 - ray.fresnel;\n"
+    "    return ray.fresnel * look(ray.reflected, 2.0 * width + pixel) + pass * look(ray.refracted, abs(ray.footprint * width - pixel));\n"
+    "}\n"
+    "#if LOOK < 2\n"
+    /* the camera's axes under the shortest rotation from back to the direction of the eye (eq 2.1 without eq 2.3) */
+    "vec3 turned(vec3 v, vec3 n) {\n"
+    "    float k = 1.0 / (1.0 + n.z);\n"
+    "    vec3 to_eye = n.x * right + n.y * up + n.z * back;\n"
+    "    return v.x * (right - n.x * k * (back + to_eye)) + v.y * (up - n.y * k * (back + to_eye)) + v.z * to_eye;\n"
+    "}\n"
+    "void main() {\n"
+    "    vec2 st = (gl_FragCoord.xy - place.xy) / place.z;\n"
+    "    if (max(abs(st.x), abs(st.y)) > 1.0) discard;\n"
+    "    float d2 = dot(seen, seen), width = sqrt(d2 - 1.0) / view.z;\n"
+    "    vec3 n = vec3(-seen.xy, seen.z) / sqrt(d2);\n"
+    "    raindrop_ray ray;\n"
+    "#if LOOK == 0\n"
+    "    float lod = max(0.5 * log2(max(d2 - 1.0, 1.0)), 0.0), b2 = min(dot(st, st), 0.9999 * min(optics.x * optics.x, 1.0));\n"
+    "    vec4 l = textureLod(reflections, st * 0.5 + 0.5, lod), r = textureLod(refractions, st * 0.5 + 0.5, lod);\n"
+    "    if (r.a <= 1.0 / 255.0) discard;\n"
+    "    ray = raindrop_trace(vec3(0.0, 0.0, -1.0), vec3(sqrt(b2), 0.0, 0.0), 1.0 - b2, optics.x);\n" /* for the footprint */
+    "    ray.reflected = turned(normalize(l.xyz), n);\n"
+    "    ray.refracted = turned(normalize(r.xyz), n);\n"
+    "    ray.fresnel = l.a;\n"
+    "    ray.transmit = 1.0 - l.a;\n"
+    "    colour = vec4(shade(ray, width), r.a);\n"
+    "#else\n"
+    "    float rho = length(st), alpha = clamp((1.0 - rho) / width + 0.5, 0.0, 1.0), dist = sqrt(d2);\n"
+    "    if (alpha <= 0.0) discard;\n"
+    "    if (rho > 0.999) st *= 0.999 / rho;\n"
+    "    vec2 xy = st / sqrt(d2 - 1.0);\n"
+    "    float c2 = 1.0 / (1.0 + dot(xy, xy));\n"
+    "    vec3 d = vec3(xy, -1.0) * sqrt(c2), p = dist * vec3(xy * c2, 1.0 - c2);\n"
+    "    ray = raindrop_trace(turned(d, n), turned(p, n), (1.0 - dot(st, st)) * c2, optics.x);\n"
+    "    colour = vec4(shade(ray, width), alpha);\n"
+    "#endif\n"
+    "}\n"
+    "#else\n"
+    "void main() {\n"
+    "    vec2 at = gl_FragCoord.xy - place.xy;\n"
+    "#if LOOK == 3\n"
+    "    if (far_colour.w > 0.0) {\n" /* a square cut with the pixel */
+    "        vec2 cut = max(min(at + 0.5, vec2(far_colour.w)) - max(at - 0.5, vec2(-far_colour.w)), vec2(0.0));\n"
+    "        if (cut.x * cut.y <= 0.0) discard;\n"
+    "        colour = vec4(far_colour.rgb, cut.x * cut.y);\n"
+    "        return;\n"
+    "    }\n"
+    "#endif\n"
+    "    float k = place.w, width = sqrt(dot(seen, seen) - 1.0) / view.z;\n"
+    "    vec3 ray_at = vec3((gl_FragCoord.xy - view.xy) / view.z, 1.0), q = vec3(at * k, 0.0);\n"
+    "    float l2 = dot(ray_at, ray_at), t = dot(q, ray_at) / l2;\n"
+    "    vec3 p = q - t * ray_at;\n"
+    "    float b2 = dot(p, p), b = sqrt(max(b2, 1e-12));\n"
+    "    float alpha = clamp(0.5 + (1.0 - b) / max(length(p.xy * (k - t / view.z)) / b, 1e-9), 0.0, 1.0);\n"
+    "    if (alpha <= 0.0) discard;\n"
+    "    p *= min(1.0, 0.999 / b);\n"
+    "    vec3 d = ray_at / sqrt(l2);\n"
+    "    d = d.x * right + d.y * up - d.z * back;\n"
+    "    p = p.x * right + p.y * up - p.z * back;\n"
+    "    colour = vec4(shade(raindrop_trace(d, p, max(1.0 - b2, 0.001999), optics.x), width), alpha);\n"
+    "}\n"
+    "#endif\n";
+
+/* raindrop__step and raindrop__reenter in floats. */
+static const char raindrop__glsl_step[] =
+    "const float G = 9.79482824;\n"
+    "float decay(float x) { return x < 1e-3 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x); }\n"
+    "float log_1p(float x) { return abs(x) < 1e-3 ? x * (1.0 - x * (0.5 - x / 3.0)) : log(1.0 + x); }\n"
+    "float terminal(float mm) {\n"
+    "    float stokes = G * 998.2 * mm * mm * 1e-6 / (18.0 * 1.81e-5), best = 9.32 * decay(pow(mm / 1.77, 1.147));\n"
+    "    float slow = min(stokes, best), s = slow / stokes, t = slow / best;\n"
+    "    return slow * inversesqrt(sqrt(s * s * s * s + t * t * t * t));\n"
+    "}\n"
+    /* speed downwards, way downwards, integral of a + b|v| */
+    "vec3 sink(float v, float vt, float a, float b, float h) {\n"
+    "    float u = v - vt, k = a + 2.0 * b * vt, lost = decay(k * h), q = b * u / k * lost;\n"
+    "    return vec3(vt + u * (1.0 - lost) / (1.0 + q), vt * h + u * lost / k * (abs(q) > 1e-3 ? log_1p(q) / q : 1.0 - q * (0.5 - q / 3.0)),\n"
+    "                (a + b * vt) * h + log_1p(q));\n"
+    "}\n"
+    "vec3 rise(float s, float a, float b, inout float h) {\n"
+    "    float d = a * a - 4.0 * b * G, apex, t, end, way;\n"
+    "    if (d > 0.0) {\n"
+    "        float root = sqrt(d), sum = a + root, r1 = 2.0 * G / sum, start = (s + r1) / (2.0 * b * s + sum);\n"
+    "        apex = log(start * sum / r1) / root;\n"
+    "        t = min(h, apex);\n"
+    "        start *= exp(-root * t);\n"
+    "        end = h < apex ? (start * sum - r1) / (1.0 - 2.0 * b * start) : 0.0;\n"
+    "        way = (r1 * log((end + r1) / (s + r1)) - sum / (2.0 * b) * log_1p(2.0 * b * (end - s) / (2.0 * b * s + sum))) / root;\n"
+    "    } else {\n"
+    "        float root = sqrt(-d) + 1e-12, phase = atan((2.0 * b * s + a) / root), last = atan(a / root);\n"
+    "        apex = 2.0 * (phase - last) / root;\n"
+    "        t = min(h, apex);\n"
+    "        last = phase - 0.5 * root * t;\n"
+    "        end = h < apex ? (root * tan(last) - a) / (2.0 * b) : 0.0;\n"
+    "        way = log(cos(last) / cos(phase)) / b - a * t / (2.0 * b);\n"
+    "    }\n"
+    "    h -= t;\n"
+    "    return vec3(-max(end, 0.0), -way, a * t + b * way);\n"
+    "}\n"
+    "void drift(inout vec2 speed, inout vec2 way, float damping, float h) {\n"
+    "    way += speed * h * (damping > 1e-6 ? decay(damping) / damping : 1.0);\n"
+    "    speed *= exp(-damping);\n"
+    "}\n"
+    "void fall(inout vec3 velocity, out vec3 way, float radius, vec3 wind, float h) {\n"
+    "    float mm = 2e3 * radius, vt = terminal(mm), a = 18.0 * 1.81e-5 / (998.2 * mm * mm * 1e-6), b = max(G - a * vt, 1e-6) / (vt * vt);\n"
+    "    float v = wind.y - velocity.y, left = h;\n"
+    "    vec2 side = velocity.xz - wind.xz, side_way = wind.xz * h;\n"
+    "    way = wind * h;\n"
+    "    if (v < 0.0) {\n"
+    "        vec3 up_phase = rise(-v, a, b, left);\n"
+    "        drift(side, side_way, up_phase.z, h - left);\n"
+    "        way.y -= up_phase.y;\n"
+    "        v = up_phase.x;\n"
+    "    }\n"
+    "    if (left > 0.0) {\n"
+    "        vec3 down_phase = sink(v, vt, a, b, left);\n"
+    "        drift(side, side_way, down_phase.z, left);\n"
+    "        way.y -= down_phase.y;\n"
+    "        v = down_phase.x;\n"
+    "    }\n"
+    "    way.xz = side_way;\n"
+    "    velocity = vec3(side.x + wind.x, wind.y - v, side.y + wind.z);\n"
+    "}\n";
+
+static const char raindrop__glsl_advance[] =
+    "layout(location = 0) in vec4 drop;\n"
+    "layout(location = 1) in vec4 motion;\n"
+    "uniform vec3 wind, centre, box;\n"
+    "uniform vec4 sizes;\n"      /* lambda, smallest, largest diameter in mm, the fixed one or 0 */
+    "uniform vec4 step_and;\n"   /* dt, settled, own drops, published speed */
+    "uniform vec2 fastest;\n"    /* terminal velocity of the largest, oblate */
+    "uniform uint seed, stream;\n"
+    "out vec4 next_drop, next_motion;\n"
+    "uint mix_bits(uint v) {\n"
+    "    v = (v ^ (v >> 16)) * 0x7feb352du;\n"
+    "    v = (v ^ (v >> 15)) * 0x846ca68bu;\n"
+    "    return v ^ (v >> 16);\n"
+    "}\n"
+    "uint hash(uint s, uint i) { return mix_bits(i ^ mix_bits(s ^ mix_bits(seed ^ 0x9e3779b9u))); }\n"
+    "float uniform_of(uint bits) { return (float(bits >> 9) + 0.5) / 8388608.0; }\n"
+    "float diameter(uint i) {\n"
+    "    float span = sizes.z - sizes.y, all = 1.0 - exp(-sizes.x * span), d = sizes.y;\n"
+    "    for (uint attempt = 0u; attempt < 256u; attempt++) {\n"
+    "        uint bits = hash(stream + 16u + attempt, i);\n"
+    "        d = sizes.y - log_1p(-uniform_of(bits) * all) / sizes.x;\n"
+    "        if (step_and.w > 0.0 || uniform_of(mix_bits(bits)) * fastest.x < terminal(d)) break;\n"
+    "    }\n"
+    "    return d;\n"
+    "}\n"
+    "float oblateness(float d) { return min(1.0, 1.0048 + d * (5.7e-4 + d * (-2.628e-2 + d * (3.682e-3 - d * 1.677e-4)))); }\n"
+    "void main() {\n"
+    "    vec3 velocity = motion.xyz, way = velocity * step_and.x, low = centre - 0.5 * box, at;\n"
+    "    float radius = drop.w, ratio = motion.w;\n"
+    "    if (step_and.y < 0.5 && radius > 0.0) fall(velocity, way, radius, wind, step_and.x);\n"
+    "    at = drop.xyz + way;\n"
+    "    if (step_and.z < 0.5) {\n"
+    "        float below = low.y - at.y;\n"
+    "        bool leaves = way.y < 0.0 && below > 0.0;\n"
+    "        if (leaves && sizes.w <= 0.0) {\n"
+    "            uint i = uint(gl_VertexID);\n"
+    "            float mm = diameter(i), vt = terminal(mm);\n"
+    "            if (velocity.y < 0.0) below *= vt / -velocity.y;\n"
+    "            radius = 0.5e-3 * mm;\n"
+    "            ratio = fastest.y > 0.5 ? oblateness(mm) : 1.0;\n"
+    "            velocity = wind - vec3(0.0, step_and.w > 0.0 ? step_and.w : vt, 0.0);\n"
+    "            at.x = centre.x + (uniform_of(hash(stream, i)) - 0.5) * box.x;\n"
+    "            at.z = centre.z + (uniform_of(hash(stream + 2u, i)) - 0.5) * box.z;\n"
+    "        }\n"
+    "        if (leaves) at.y = low.y + box.y - mod(below, box.y);\n"
+    "        vec3 turns = floor((at - low) / box);\n"
+    "        if (any(notEqual(turns, vec3(0.0)))) at -= turns * box;\n"
+    "    }\n"
+    "    next_drop = vec4(at, radius);\n"
+    "    next_motion = vec4(velocity, ratio);\n"
+    "    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);\n"
+    "    gl_PointSize = 1.0;\n"
+    "}\n";
+
+enum { RAINDROP__GL_TEXTURE_MIN_LOD_LINEAR = 0x2703 }; /* GL_LINEAR_MIPMAP_LINEAR */
+
+struct raindrop_gl {
+    sat__gl gl;
+    raindrop_gl_options options;
+    unsigned draw[4], advance;        /* programs; draw by look, 0 where it cannot be */
+    unsigned environment, far_drops, map[2];
+    unsigned drops[2], arrays[2];     /* ping-pong buffers and their vertex arrays */
+    unsigned scratch, target;         /* a texture of one texel: transform feedback needs a framebuffer of ours */
+    int resolution, levels, count, capacity, front, settled, own;
+    float n;
+    uint32_t step;
+    raindrop_rain_options rain;
+    sat_allocator allocator;
+};
+
+RAINDROP_DEF raindrop_gl_options raindrop_gl_defaults(void)
+{
+    raindrop_gl_options o;
+    memset(&o, 0, sizeof o);
+    o.half_map = 1;
+    return o;
+}
+
+RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl) { return gl ? gl->gl.message : "there is no object"; }
+
+static inline sat_result raindrop__gl_programs(raindrop_gl *g)
+{
+    static const char *const varyings[] = {"next_drop", "next_motion", NULL};
+    const char *library[3], *vertex[3], *fragment[2];
+    sat__gl_shaders shaders;
+    sat_result result = SAT_OK;
+    int look;
+    memset(&shaders, 0, sizeof shaders);
+    library[0] = raindrop_gl_glsl();
+    library[1] = raindrop__glsl_environment;
+    library[2] = NULL;
+    vertex[0] = raindrop__glsl_draw_vertex;
+    vertex[1] = NULL;
+    fragment[0] = raindrop__glsl_draw_fragment;
+    fragment[1] = NULL;
+    shaders.name = "raindrop: drops";
+    shaders.library = library;
+    shaders.vertex = vertex;
+    shaders.fragment = fragment;
+    for (look = g->options.map ? 0 : 1; look < 4 && result == SAT_OK; look++) {
+        sat__gl_define(&g->gl, "LOOK", look);
+        if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
+        result = sat__gl_build(&g->gl, &g->draw[look], &shaders);
+    }
+    if (result != SAT_OK) return result;
+    vertex[0] = raindrop__glsl_step;
+    vertex[1] = raindrop__glsl_advance;
+    vertex[2] = NULL;
+    shaders.name = "raindrop: advance";
+    shaders.library = NULL;
+    shaders.fragment = NULL;
+    shaders.varyings = varyings;
+    return sat__gl_build(&g->gl, &g->advance, &shaders);
+}
+
+#ifndef RAINDROP_NO_MAP
+/* The map's two textures, level by level: the texels' halves are taken apart in the caller's scratch memory. */
+static inline sat_result raindrop__gl_map(raindrop_gl *g, const raindrop_map *map, float *scratch)
+{
+    sat__gl *gl = &g->gl;
+    int half, level, r;
+    size_t i;
+    gl->GenTextures(2, g->map);
+    gl->ActiveTexture(SAT__GL_TEXTURE0);
+    for (half = 0; half < 2; half++) {
+        gl->BindTexture(SAT__GL_TEXTURE_2D, g->map[half]);
+        for (level = 0; level < map->levels; level++) {
+            const float *texels = raindrop_map_level(map, level, &r);
+            for (i = 0; i < (size_t)r * (size_t)r; i++) memcpy(scratch + 4 * i, texels + 8 * i + 4 * half, 4 * sizeof(float));
+            gl->TexImage2D(SAT__GL_TEXTURE_2D, level, g->options.half_map ? SAT__GL_RGBA16F : SAT__GL_RGBA32F, r, r, 0, SAT__GL_RGBA, SAT__GL_FLOAT, scratch);
+        }
+        gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MAX_LEVEL, map->levels - 1);
+        gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MIN_FILTER, RAINDROP__GL_TEXTURE_MIN_LOD_LINEAR);
+        gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MAG_FILTER, SAT__GL_LINEAR);
+        gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_WRAP_S, SAT__GL_CLAMP_TO_EDGE);
+        gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_WRAP_T, SAT__GL_CLAMP_TO_EDGE);
+    }
+    return sat__gl_check(gl, "OpenGL refused the map's textures");
+}
+#endif
+
+RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *get_proc, const raindrop_gl_options *options)
+{
+    raindrop_gl_options o = options ? *options : raindrop_gl_defaults();
+    sat_allocator memory;
+    sat__gl_state state;
+    sat_result result;
+    raindrop_gl *g;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (!get_proc || !sat__resolve_allocator(&memory, &o.allocator)) return SAT_ERR_ARGUMENT;
+    g = (raindrop_gl *)sat__alloc(&memory, sizeof *g);
+    if (!g) return SAT_ERR_MEMORY;
+    memset(g, 0, sizeof *g);
+    g->allocator = memory;
+    g->options = o;
+    *out = g;
+    result = sat__gl_open(&g->gl, get_proc);
+    if (result != SAT_OK) return result;
+    sat__gl_begin(&g->gl, &state, 1);
+    result = raindrop__gl_programs(g);
+    if (result == SAT_OK) result = sat__gl_texture(&g->gl, &g->scratch, SAT__GL_RGBA8, 1, 1, NULL);
+    if (result == SAT_OK) result = sat__gl_framebuffer(&g->gl, &g->target, &g->scratch, 1, 0);
+#ifndef RAINDROP_NO_MAP
+    if (result == SAT_OK && o.map) {
+        size_t bytes = (size_t)o.map->base * (size_t)o.map->base * 4 * sizeof(float);
+        float *scratch = (float *)sat__alloc(&memory, bytes);
+        result = scratch ? raindrop__gl_map(g, o.map, scratch) : SAT_ERR_MEMORY;
+        sat__release(&memory, scratch, bytes);
+    }
+#endif
+    sat__gl_end(&g->gl, &state);
+    if (result == SAT_ERR_MEMORY) {
+        raindrop_gl_destroy(g);
+        *out = NULL;
+    }
+    return result;
+}
+
+RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *g)
+{
+    sat_allocator memory;
+    sat__gl *gl;
+    int i;
+    if (!g) return;
+    gl = &g->gl;
+    memory = g->allocator;
+    if (gl->vertex_array) { /* the context was good enough to open */
+        for (i = 0; i < 4; i++)
+            if (g->draw[i]) gl->DeleteProgram(g->draw[i]);
+        if (g->advance) gl->DeleteProgram(g->advance);
+        if (g->target) gl->DeleteFramebuffers(1, &g->target);
+        gl->DeleteTextures(1, &g->scratch);
+        gl->DeleteTextures(1, &g->environment);
+        gl->DeleteTextures(1, &g->far_drops);
+        gl->DeleteTextures(2, g->map);
+        gl->DeleteBuffers(2, g->drops);
+        gl->DeleteVertexArrays(2, g->arrays);
+    }
+    sat__gl_close(gl);
+    sat__release(&memory, g, sizeof *g);
+}
+
+/* ---- environment */
+
+static inline void raindrop__gl_sphere(sat__gl *gl, unsigned texture, const raindrop__sphere *sphere, unsigned internal, int width, int height)
+{
+    int level, x = 0, y = 0;
+    gl->BindTexture(SAT__GL_TEXTURE_2D, texture);
+    gl->TexImage2D(SAT__GL_TEXTURE_2D, 0, (int)internal, width, height, 0, SAT__GL_RGBA, SAT__GL_FLOAT, NULL);
+    for (level = 0; level < sphere->levels; level++) {
+        int side = (sphere->resolution >> level) + 2;
+        gl->TexSubImage2D(SAT__GL_TEXTURE_2D, 0, x, y, side, side, SAT__GL_RGBA, SAT__GL_FLOAT, sphere->texels + sphere->offset[level]);
+        if (level == 0) x = side;
+        else y += side;
+    }
+    gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MAX_LEVEL, 0);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MIN_FILTER, SAT__GL_LINEAR);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MAG_FILTER, SAT__GL_LINEAR);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_WRAP_S, SAT__GL_CLAMP_TO_EDGE);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_WRAP_T, SAT__GL_CLAMP_TO_EDGE);
+}
+
+RAINDROP_DEF sat_result raindrop_gl_set_environment(raindrop_gl *g, const raindrop_environment *environment)
+{
+    sat__gl_state state;
+    sat_result result;
+    const raindrop__sphere *sphere;
+    unsigned internal;
+    int width, height;
+    if (!g || !environment || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
+    sphere = &environment->near_sphere;
+    internal = environment->largest < 65000 ? SAT__GL_RGBA16F : SAT__GL_RGBA32F;
+    width = sphere->resolution + 2 + sphere->resolution / 2 + 2;
+    height = sphere->resolution + 2 * sphere->levels;
+    if (width > g->gl.max_size) return sat__gl_fail(&g->gl, SAT_ERR_SIZE, "the context's largest texture is smaller than the environment", NULL);
+    sat__gl_begin(&g->gl, &state, 1);
+    g->gl.ActiveTexture(SAT__GL_TEXTURE0);
+    if (!g->environment) g->gl.GenTextures(1, &g->environment);
+    if (!g->far_drops) g->gl.GenTextures(1, &g->far_drops);
+    raindrop__gl_sphere(&g->gl, g->environment, sphere, internal, width, height);
+    raindrop__gl_sphere(&g->gl, g->far_drops, &environment->far_sphere, internal, environment->far_sphere.resolution + 2, environment->far_sphere.resolution + 2);
+    result = sat__gl_check(&g->gl, "OpenGL refused the environment");
+    sat__gl_end(&g->gl, &state);
+    g->resolution = sphere->resolution;
+    g->levels = sphere->levels;
+    g->n = environment->n;
+    return result;
+}
+
+/* ---- drops */
+
+RAINDROP_DEF sat_result raindrop_gl_set_rain(raindrop_gl *g, const raindrop_rain *rain)
+{
+    sat__gl_state state;
+    sat_result result;
+    int i;
+    if (!g || !rain || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
+    sat__gl_begin(&g->gl, &state, 1);
+    if (!g->drops[0]) {
+        g->gl.GenBuffers(2, g->drops);
+        g->gl.GenVertexArrays(2, g->arrays);
+    }
+    for (i = 0; i < 2; i++) {
+        g->gl.BindVertexArray(g->arrays[i]);
+        g->gl.BindBuffer(SAT__GL_ARRAY_BUFFER, g->drops[i]);
+        g->gl.BufferData(SAT__GL_ARRAY_BUFFER, (ptrdiff_t)sizeof(raindrop_drop) * sat__max_int(rain->count, 1), rain->count && i == 0 ? rain->drops : NULL, SAT__GL_DYNAMIC_COPY);
+        g->gl.VertexAttribPointer(0, 4, SAT__GL_FLOAT, 0, (int)sizeof(raindrop_drop), NULL);
+        g->gl.VertexAttribPointer(1, 4, SAT__GL_FLOAT, 0, (int)sizeof(raindrop_drop), (const void *)sizeof(float[4]));
+        g->gl.EnableVertexAttribArray(0);
+        g->gl.EnableVertexAttribArray(1);
+    }
+    result = sat__gl_check(&g->gl, "OpenGL refused the buffers of the drops");
+    sat__gl_end(&g->gl, &state);
+    g->count = rain->count;
+    g->front = 0;
+    g->settled = rain->settled;
+    g->own = rain->own;
+    g->step = rain->step;
+    g->rain = rain->options;
+    return result;
+}
+
+RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *g, raindrop_drop *drops, int count)
+{
+    sat__gl_state state;
+    const void *mapped;
+    ptrdiff_t bytes = (ptrdiff_t)sizeof *drops * count;
+    if (!g || !drops || count < 1 || count > g->count) return SAT_ERR_ARGUMENT;
+    if (!g->gl.MapBufferRange || !g->gl.UnmapBuffer) return sat__gl_fail(&g->gl, SAT_ERR_GL_FUNCTION, "the context cannot read buffers", "glMapBufferRange");
+    sat__gl_begin(&g->gl, &state, 1);
+    g->gl.BindBuffer(SAT__GL_ARRAY_BUFFER, g->drops[g->front]);
+    mapped = g->gl.MapBufferRange(SAT__GL_ARRAY_BUFFER, 0, bytes, SAT__GL_MAP_READ_BIT);
+    if (mapped) memcpy(drops, mapped, (size_t)bytes);
+    g->gl.UnmapBuffer(SAT__GL_ARRAY_BUFFER);
+    sat__gl_end(&g->gl, &state);
+    return mapped ? SAT_OK : sat__gl_fail(&g->gl, SAT_ERR_GL_STATE, "OpenGL refused to read the drops", NULL);
+}
+
+#ifndef RAINDROP_NO_RAIN
+RAINDROP_DEF sat_result raindrop_gl_set_wind(raindrop_gl *g, const float wind[3])
+{
+    if (!g || !wind || !raindrop__finite3(wind)) return SAT_ERR_ARGUMENT;
+    raindrop__set(g->rain.wind, wind[0], wind[1], wind[2]);
+    g->settled = g->rain.speed > 0;
+    return SAT_OK;
+}
+
+static inline void raindrop__gl_set_advance(raindrop_gl *g, double dt)
+{
+    sat__gl *gl = &g->gl;
+    const raindrop_rain_options *o = &g->rain;
+    float v[4];
+    sat__gl_set_float3(gl, g->advance, "wind", o->wind);
+    sat__gl_set_float3(gl, g->advance, "centre", o->centre);
+    sat__gl_set_float3(gl, g->advance, "box", o->box_size);
+    v[0] = (float)raindrop__lambda(o->rate_mm_h);
+    v[1] = (float)o->diameter_min_mm;
+    v[2] = (float)o->diameter_max_mm;
+    v[3] = (float)o->diameter_mm;
+    sat__gl_set_float4(gl, g->advance, "sizes", v);
+    v[0] = (float)dt;
+    v[1] = (float)g->settled;
+    v[2] = (float)g->own;
+    v[3] = o->speed;
+    sat__gl_set_float4(gl, g->advance, "step_and", v);
+    sat__gl_set_float2(gl, g->advance, "fastest", (float)raindrop_terminal_velocity(o->diameter_max_mm), (float)(o->oblate != 0));
+    sat__gl_set_uint(gl, g->advance, "seed", o->seed);
+    sat__gl_set_uint(gl, g->advance, "stream", g->step * 512u);
+}
+
+RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt_seconds)
+{
+    sat__gl_state state;
+    sat__gl *gl;
+    if (!g || !g->drops[0] || !sat__is_finite_double(dt_seconds) || dt_seconds < 0) return SAT_ERR_ARGUMENT;
+    if (!(dt_seconds > 0) || !g->count) return SAT_OK;
+    gl = &g->gl;
+    g->step++;
+    sat__gl_begin(gl, &state, 1);
+    gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, g->target);
+    gl->UseProgram(g->advance);
+    raindrop__gl_set_advance(g, dt_seconds);
+    gl->BindBuffer(SAT__GL_ARRAY_BUFFER, 0);
+    gl->BindVertexArray(g->arrays[g->front]);
+    if (g->options.quads) {
+        gl->VertexAttribDivisor(0, 0);
+        gl->VertexAttribDivisor(1, 0);
+    }
+    gl->BindBufferBase(SAT__GL_TRANSFORM_FEEDBACK_BUFFER, 0, g->drops[1 - g->front]);
+    gl->Enable(SAT__GL_RASTERIZER_DISCARD);
+    gl->BeginTransformFeedback(SAT__GL_POINTS);
+    gl->DrawArrays(SAT__GL_POINTS, 0, g->count);
+    gl->EndTransformFeedback();
+    gl->Disable(SAT__GL_RASTERIZER_DISCARD);
+    gl->BindBufferBase(SAT__GL_TRANSFORM_FEEDBACK_BUFFER, 0, 0);
+    sat__gl_end(gl, &state);
+    g->front = 1 - g->front;
+    return SAT_OK;
+}
+#endif
+
+/* ---- picture */
+
+static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const raindrop__frame *frame, float depth_near, float depth_far)
+{
+    sat__gl *gl = &g->gl;
+    const raindrop_camera *camera = &frame->camera;
+    float v[4];
+    sat__gl_set_float3(gl, program, "eye", camera->position);
+    sat__gl_set_float3(gl, program, "right", camera->right);
+    sat__gl_set_float3(gl, program, "up", camera->up);
+    sat__gl_set_float3(gl, program, "back", camera->back);
+    v[0] = frame->half_width;
+    v[1] = frame->half_height;
+    v[2] = frame->focal;
+    v[3] = camera->near_distance;
+    sat__gl_set_float4(gl, program, "view", v);
+    v[0] = frame->options.far_radius;
+    v[1] = frame->options.coverage_threshold;
+    v[2] = depth_near;
+    v[3] = depth_far;
+    sat__gl_set_float4(gl, program, "limits", v);
+    sat__gl_set_float2(gl, program, "optics", g->n, (float)(frame->options.exit_fresnel != 0));
+    sat__gl_set_float2(gl, program, "environment_size", (float)g->resolution, (float)g->levels);
+    sat__gl_set_texture(gl, program, "environment", 0, g->environment);
+    sat__gl_set_texture(gl, program, "far_drops", 1, g->far_drops);
+    if (frame->options.look == RAINDROP_LOOK_MAP) {
+        sat__gl_set_texture(gl, program, "reflections", 2, g->map[0]);
+        sat__gl_set_texture(gl, program, "refractions", 3, g->map[1]);
+    }
+}
+
+RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height, const raindrop_camera *camera,
+                                           const raindrop_render_options *options, float depth_near, float depth_far)
+{
+    raindrop__frame frame;
+    sat__gl_state state;
+    sat__gl *gl;
+    unsigned program;
+    memset(&frame, 0, sizeof frame);
+    frame.camera = camera ? *camera : raindrop_camera_defaults();
+    frame.options = options ? *options : raindrop_render_defaults();
+    frame.width = width;
+    frame.height = height;
+    if (!g || !g->environment || !g->drops[0] || width < 1 || height < 1 || width > 32768 || height > 32768) return SAT_ERR_ARGUMENT;
+    if (!raindrop__camera_is_valid(&frame.camera) || (unsigned)frame.options.look > RAINDROP_LOOK_AUTO) return SAT_ERR_ARGUMENT;
+    if (!(depth_near >= 0) || (depth_near > 0 && !(depth_far > depth_near))) return SAT_ERR_ARGUMENT;
+    program = g->draw[frame.options.look];
+    if (!program) return SAT_ERR_ARGUMENT;
+    if (!g->count) return SAT_OK;
+    gl = &g->gl;
+    raindrop__set_frame(&frame);
+    sat__gl_begin(gl, &state, 4);
+    gl->UseProgram(program);
+    gl->Viewport(0, 0, width, height);
+    raindrop__gl_set_draw(g, program, &frame, depth_near, depth_far);
+    gl->Enable(SAT__GL_BLEND);
+    gl->BlendEquationSeparate(0x8006, 0x8006); /* GL_FUNC_ADD */
+    gl->BlendFuncSeparate(SAT__GL_SRC_ALPHA, SAT__GL_ONE_MINUS_SRC_ALPHA, SAT__GL_ZERO, SAT__GL_ONE);
+    if (depth_near > 0) {
+        gl->Enable(SAT__GL_DEPTH_TEST);
+        gl->DepthFunc(SAT__GL_LEQUAL);
+    }
+    gl->DepthMask(0);
+    if (!gl->is_es) gl->Enable(SAT__GL_PROGRAM_POINT_SIZE);
+    gl->BindVertexArray(g->arrays[g->front]);
+    if (g->options.quads) {
+        gl->VertexAttribDivisor(0, 1);
+        gl->VertexAttribDivisor(1, 1);
+        gl->DrawArraysInstanced(SAT__GL_TRIANGLE_STRIP, 0, 4, g->count);
+    } else gl->DrawArrays(SAT__GL_POINTS, 0, g->count);
+    sat__gl_end(gl, &state);
+    return SAT_OK;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* RAINDROP_IMPLEMENTATION && RAINDROP_GL */

@@ -1,0 +1,396 @@
+/* raindrop.h on the GPU: the same pictures and the same rain as on the CPU, and the state left as it was. Needs OSMesa
+   (or a GPU, see gl_context.h); skips without. */
+
+enum { RG_W = 160, RG_H = 120 };
+
+typedef struct rg_scene {
+    gl_context context;
+    sat__gl gl;
+    unsigned texture, depth, framebuffer;
+    raindrop_environment *environment;
+    raindrop_map *map;
+    raindrop_camera camera;
+    float *background, *cpu, *gpu;
+    double key;
+} rg_scene;
+
+static int rg_open(rg_scene *s)
+{
+    float *sky;
+    sat_image image;
+    sat__gl_state state;
+    memset(s, 0, sizeof *s);
+    if (!gl_context_open(&s->context, 3, 3)) {
+        expect_skip(s->context.message);
+        return 0;
+    }
+    EXPECT_EQ(sat__gl_open(&s->gl, s->context.get_proc), SAT_OK);
+    sky = (float *)malloc(sizeof(float) * 3 * 256 * 128);
+    reference_sky(sky, 256, 128);
+    image = sat_image_f32(sky, 256, 128, 3);
+    EXPECT_EQ(raindrop_environment_create(&s->environment, &image, NULL, NULL), SAT_OK);
+    free(sky);
+    EXPECT_EQ(raindrop_map_create(&s->map, 256, 32, RAINDROP_WATER, NULL), SAT_OK);
+    s->camera = raindrop_camera_defaults();
+    s->camera.fov_y = 1.3f;
+    s->background = (float *)malloc(sizeof(float) * 3 * RG_W * RG_H);
+    s->cpu = (float *)malloc(sizeof(float) * 3 * RG_W * RG_H);
+    s->gpu = (float *)malloc(sizeof(float) * 4 * RG_W * RG_H);
+    raindrop_environment_render(s->background, RG_W * 12, RG_W, RG_H, &s->camera, s->environment, NULL);
+    s->key = reference_key(s->background, RG_W * RG_H);
+    sat__gl_begin(&s->gl, &state, 1);
+    EXPECT_EQ(sat__gl_texture(&s->gl, &s->texture, SAT__GL_RGBA32F, RG_W, RG_H, NULL), SAT_OK);
+    EXPECT_EQ(sat__gl_texture(&s->gl, &s->depth, SAT__GL_DEPTH_COMPONENT32F, RG_W, RG_H, NULL), SAT_OK);
+    EXPECT_EQ(sat__gl_framebuffer(&s->gl, &s->framebuffer, &s->texture, 1, s->depth), SAT_OK);
+    sat__gl_end(&s->gl, &state);
+    return 1;
+}
+
+static void rg_close(rg_scene *s)
+{
+    s->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, 0);
+    s->gl.DeleteFramebuffers(1, &s->framebuffer);
+    s->gl.DeleteTextures(1, &s->texture);
+    s->gl.DeleteTextures(1, &s->depth);
+    EXPECT_EQ(s->gl.GetError(), 0);
+    sat__gl_close(&s->gl);
+    gl_context_close(&s->context);
+    raindrop_environment_destroy(s->environment);
+    raindrop_map_destroy(s->map);
+    free(s->background);
+    free(s->cpu);
+    free(s->gpu);
+}
+
+/* Drops of the CPU's rain over the background, both ways; returns the RMSE after tone mapping. */
+static double rg_compare(rg_scene *s, raindrop_gl *g, const raindrop_rain *rain, const raindrop_render_options *options)
+{
+    sat__gl_state state;
+    int x, y, c;
+    memcpy(s->cpu, s->background, sizeof(float) * 3 * RG_W * RG_H);
+    EXPECT_EQ(raindrop_render(s->cpu, RG_W * 12, RG_W, RG_H, NULL, &s->camera, rain, s->environment, options, NULL), SAT_OK);
+    for (y = 0; y < RG_H; y++)
+        for (x = 0; x < RG_W; x++) {
+            for (c = 0; c < 3; c++) s->gpu[4 * ((RG_H - 1 - y) * RG_W + x) + c] = s->background[3 * (y * RG_W + x) + c];
+            s->gpu[4 * ((RG_H - 1 - y) * RG_W + x) + 3] = 1;
+        }
+    sat__gl_begin(&s->gl, &state, 1);
+    sat__gl_upload(&s->gl, s->texture, SAT__GL_RGBA32F, RG_W, RG_H, s->gpu);
+    sat__gl_end(&s->gl, &state);
+    s->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s->framebuffer);
+    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s->camera, options, 0, 0), SAT_OK);
+    sat__gl_begin(&s->gl, &state, 1);
+    EXPECT_EQ(sat__gl_read(&s->gl, s->gpu, s->texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
+    sat__gl_end(&s->gl, &state);
+    for (y = 0; y < RG_H / 2; y++) /* top row first, packed */
+        for (x = 0; x < RG_W; x++)
+            for (c = 0; c < 4; c++) {
+                float *a = s->gpu + 4 * (y * RG_W + x) + c, *b = s->gpu + 4 * ((RG_H - 1 - y) * RG_W + x) + c, t = *a;
+                *a = *b;
+                *b = t;
+            }
+    for (x = 0; x < RG_W * RG_H; x++) memmove(s->gpu + 3 * x, s->gpu + 4 * x, 3 * sizeof(float));
+    return reference_rmse(s->gpu, s->cpu, NULL, RG_W * RG_H, s->key);
+}
+
+static raindrop_rain *rg_rain(int count, float box, float diameter)
+{
+    raindrop_rain_options o = raindrop_rain_defaults();
+    raindrop_rain *rain = NULL;
+    o.count = count;
+    o.diameter_mm = (double)diameter;
+    o.box_size[0] = o.box_size[1] = o.box_size[2] = box;
+    EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK);
+    return rain;
+}
+
+TEST(raindrop_gl_draws_the_picture_of_the_cpu)
+{
+    static const char *const names[4] = {"map", "sprite", "ray", "auto"};
+    rg_scene s;
+    raindrop_gl_options g_options = raindrop_gl_defaults();
+    int quads, look;
+    if (!rg_open(&s)) return;
+    g_options.map = s.map;
+    for (quads = 0; quads < 2; quads++) {
+        raindrop_gl *g = NULL;
+        raindrop_rain *few = rg_rain(300, 0.1f, 2), *many = rg_rain(20000, 1, 2);
+        raindrop_render_options o = raindrop_render_defaults();
+        g_options.quads = quads;
+        if (!EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &g_options), SAT_OK)) puts(raindrop_gl_message(g));
+        EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+        o.map = s.map;
+        o.orders_radius = 1e9f;
+        o.sort = 0;
+        s.camera.near_distance = quads ? 0.001f : 0.01f;
+        for (look = 0; look < 4; look++) {
+            double error;
+            o.look = (raindrop_look)look;
+            error = rg_compare(&s, g, many, &o);
+            EXPECT(error < 2e-3);
+            REPORT(names[look], error, quads ? "RMSE from the CPU, rain, quads" : "RMSE from the CPU, rain, points");
+            if (!quads) s.camera.near_distance = 0.03f; /* no centre of a drop that is seen lies outside */
+            error = rg_compare(&s, g, few, &o);
+            if (quads) EXPECT(error < 4e-3);
+            REPORT(names[look], error, quads ? "RMSE from the CPU, near drops, quads" : "RMSE from the CPU, near drops, points");
+        }
+        EXPECT(reference_rmse(s.cpu, s.background, NULL, RG_W * RG_H, s.key) > 0.01); /* there was something to see */
+        raindrop_gl_destroy(g);
+        raindrop_rain_destroy(few);
+        raindrop_rain_destroy(many);
+    }
+    rg_close(&s);
+}
+
+TEST(raindrop_gl_respects_the_depth_buffer)
+{
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_drop drops[2];
+    raindrop_rain_options o = raindrop_rain_defaults();
+    raindrop_rain *rain = NULL;
+    float black[4] = {0, 0, 0, 1}, depth, *left, *right, near = 0.1f, far = 10;
+    sat__gl_state state;
+    if (!rg_open(&s)) return;
+    memset(drops, 0, sizeof drops);
+    drops[0].position[0] = -0.5f;
+    drops[0].position[2] = -1;
+    drops[1].position[0] = 1.5f;
+    drops[1].position[2] = -3;
+    drops[0].radius = 0.1f;
+    drops[1].radius = 0.3f;
+    drops[0].axis_ratio = drops[1].axis_ratio = 1;
+    o.drops = drops;
+    o.count = 2;
+    EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK);
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s.framebuffer);
+    s.gl.ClearBufferfv(SAT__GL_COLOR, 0, black);
+    depth = ((far + near) - 2 * far * near / 2.0f) / (far - near) * 0.5f + 0.5f; /* a wall at 2 m */
+    s.gl.ClearBufferfv(SAT__GL_DEPTH, 0, &depth);
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL, near, far), SAT_OK);
+    sat__gl_begin(&s.gl, &state, 1);
+    EXPECT_EQ(sat__gl_read(&s.gl, s.gpu, s.texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
+    sat__gl_end(&s.gl, &state);
+    {
+        double focal = 0.5 * RG_H / tan(0.65);
+        left = s.gpu + 4 * (RG_H / 2 * RG_W + (int)(RG_W / 2 - focal * 0.5));
+        right = s.gpu + 4 * (RG_H / 2 * RG_W + (int)(RG_W / 2 + focal * 0.5));
+    }
+    EXPECT(left[1] > 0);   /* before the wall */
+    EXPECT(right[1] == 0); /* behind it */
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL, 1, 0.5f), SAT_ERR_ARGUMENT);
+    raindrop_gl_destroy(g);
+    raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
+
+/* Positions and speeds against the CPU's after the same steps; drops that the two re-entered at different steps, by a
+   rounding at the floor, are few. */
+static double rg_advance(raindrop_gl *g, raindrop_rain *rain, const double *steps, int count)
+{
+    int n = 0, i, k, c, off = 0;
+    const raindrop_drop *cpu = raindrop_rain_drops(rain, &n);
+    raindrop_drop *gpu = (raindrop_drop *)malloc(sizeof *gpu * (size_t)n);
+    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    for (k = 0; k < count; k++) {
+        EXPECT_EQ(raindrop_rain_advance(rain, steps[k]), SAT_OK);
+        EXPECT_EQ(raindrop_gl_advance(g, steps[k]), SAT_OK);
+    }
+    EXPECT_EQ(raindrop_gl_read_drops(g, gpu, n), SAT_OK);
+    for (i = 0; i < n; i++) {
+        int same = fabsf(gpu[i].radius - cpu[i].radius) <= 1e-5f * cpu[i].radius && fabsf(gpu[i].axis_ratio - cpu[i].axis_ratio) < 1e-5f;
+        for (c = 0; c < 3; c++) {
+            same = same && fabsf(gpu[i].position[c] - cpu[i].position[c]) < 3e-4f;
+            same = same && fabsf(gpu[i].velocity[c] - cpu[i].velocity[c]) < 1e-4f * (1 + fabsf(cpu[i].velocity[c]));
+        }
+        off += !same;
+    }
+    free(gpu);
+    return (double)off / n;
+}
+
+TEST(raindrop_gl_rain_falls_as_on_the_cpu)
+{
+    static const double frames[8] = {1 / 60.0, 1 / 60.0, 0, 0.1, 0.2, 1e-4, 0.05, 0.3};
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_rain_options o = raindrop_rain_defaults();
+    raindrop_rain *rain = NULL;
+    float gust[3] = {4, 0, -2}, updraught[3] = {0, 15, 0}, calm[3] = {0, 0, 0};
+    double off;
+    if (!rg_open(&s)) return;
+    o.count = 20000;
+    o.oblate = 1;
+    EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK);
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
+    off = rg_advance(g, rain, frames, 8);
+    EXPECT(off < 2e-3);
+    REPORT("drops that fell differently on the GPU", 100 * off, "%");
+    EXPECT_EQ(raindrop_rain_set_wind(rain, gust), SAT_OK);
+    off = rg_advance(g, rain, frames, 8);
+    EXPECT(off < 5e-3);
+    REPORT("the same in a gust", 100 * off, "%");
+    EXPECT_EQ(raindrop_rain_set_wind(rain, updraught), SAT_OK);
+    off = rg_advance(g, rain, frames, 4);
+    EXPECT(off < 2e-2);
+    REPORT("the same in an updraught", 100 * off, "%");
+    EXPECT_EQ(raindrop_rain_set_wind(rain, calm), SAT_OK); /* risen, stopped, falling again */
+    off = rg_advance(g, rain, frames, 8);
+    EXPECT(off < 2e-2);
+    EXPECT_EQ(raindrop_gl_advance(g, -1), SAT_ERR_ARGUMENT);
+    raindrop_gl_destroy(g);
+    raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
+
+TEST(raindrop_gl_steps_1um_drops)
+{
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_drop dust[4], back[4];
+    raindrop_rain_options o = raindrop_rain_defaults();
+    raindrop_rain *rain = NULL;
+    int i;
+    if (!rg_open(&s)) return;
+    memset(dust, 0, sizeof dust);
+    for (i = 0; i < 4; i++) {
+        dust[i].radius = 0.5e-6f * (float)pow(10, i);
+        dust[i].velocity[1] = -10;
+        dust[i].axis_ratio = 1;
+    }
+    o.drops = dust;
+    o.count = 4;
+    EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK);
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    EXPECT_EQ(raindrop_gl_advance(g, 10), SAT_OK);
+    EXPECT_EQ(raindrop_gl_read_drops(g, back, 4), SAT_OK);
+    for (i = 0; i < 4; i++) EXPECT_REL(-back[i].velocity[1], raindrop_terminal_velocity((double)dust[i].radius * 2e3), 2e-5);
+    raindrop_gl_destroy(g);
+    raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
+
+/* Everything sat__gl_begin can save is as before, after every call. */
+TEST(raindrop_gl_restores_the_state)
+{
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_gl_options o = raindrop_gl_defaults();
+    raindrop_rain *rain = rg_rain(1000, 1, 2);
+    sat__gl_state before, after, scratch;
+    unsigned texture, buffer, array;
+    if (!rg_open(&s)) return;
+    o.map = s.map;
+    memset(&before, 0, sizeof before);
+    memset(&after, 0, sizeof after);
+    s.gl.GenTextures(1, &texture);
+    s.gl.GenBuffers(1, &buffer);
+    s.gl.GenVertexArrays(1, &array);
+    s.gl.BindVertexArray(array);
+    s.gl.ActiveTexture(SAT__GL_TEXTURE0 + 2);
+    s.gl.BindTexture(SAT__GL_TEXTURE_2D, texture);
+    s.gl.BindBuffer(SAT__GL_ARRAY_BUFFER, buffer);
+    s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s.framebuffer);
+    s.gl.Enable(SAT__GL_CULL_FACE);
+    s.gl.Enable(SAT__GL_DEPTH_TEST);
+    s.gl.DepthFunc(SAT__GL_ALWAYS);
+    s.gl.BlendFuncSeparate(SAT__GL_ONE, SAT__GL_ZERO, SAT__GL_ONE, SAT__GL_ONE);
+    s.gl.Viewport(3, 4, 50, 60);
+    s.gl.PixelStorei(SAT__GL_UNPACK_ALIGNMENT, 8);
+    sat__gl_begin(&s.gl, &before, 8);
+    sat__gl_end(&s.gl, &before);
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &o), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    EXPECT_EQ(raindrop_gl_advance(g, 0.01), SAT_OK);
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL, 0.1f, 10), SAT_OK);
+    {
+        raindrop_drop drop;
+        EXPECT_EQ(raindrop_gl_read_drops(g, &drop, 1), SAT_OK);
+    }
+    sat__gl_begin(&s.gl, &after, 8);
+    sat__gl_end(&s.gl, &after);
+    EXPECT(memcmp(&before, &after, sizeof before) == 0);
+    raindrop_gl_destroy(g);
+    sat__gl_begin(&s.gl, &scratch, 8);
+    sat__gl_end(&s.gl, &scratch);
+    EXPECT(memcmp(&before, &scratch, sizeof before) == 0);
+    s.gl.Disable(SAT__GL_CULL_FACE);
+    s.gl.Disable(SAT__GL_DEPTH_TEST);
+    s.gl.DeleteTextures(1, &texture);
+    s.gl.DeleteBuffers(1, &buffer);
+    s.gl.DeleteVertexArrays(1, &array);
+    raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
+
+static sat_gl_proc rg_no_procs(const char *name) { (void)name; return NULL; }
+
+TEST(raindrop_gl_says_what_is_wrong)
+{
+    raindrop_gl *g = NULL;
+    rg_scene s;
+    EXPECT_EQ(raindrop_gl_create(&g, rg_no_procs, NULL), SAT_ERR_GL_FUNCTION);
+    EXPECT(g && strstr(raindrop_gl_message(g), "gl") != NULL);
+    EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, NULL, 0, 0), SAT_ERR_ARGUMENT);
+    raindrop_gl_destroy(g);
+    EXPECT_EQ(raindrop_gl_create(&g, NULL, NULL), SAT_ERR_ARGUMENT);
+    EXPECT(g == NULL && raindrop_gl_message(NULL) != NULL);
+    raindrop_gl_destroy(NULL);
+    if (!rg_open(&s)) return;
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, NULL, 0, 0), SAT_ERR_ARGUMENT); /* no rain yet */
+    EXPECT_EQ(raindrop_gl_advance(g, 1), SAT_ERR_ARGUMENT);
+    {
+        raindrop_render_options o = raindrop_render_defaults();
+        raindrop_rain *rain = rg_rain(10, 1, 2);
+        EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+        o.look = RAINDROP_LOOK_MAP; /* without a map */
+        EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, &o, 0, 0), SAT_ERR_ARGUMENT);
+        raindrop_rain_destroy(rain);
+    }
+    raindrop_gl_destroy(g);
+    rg_close(&s);
+}
+
+/* The shaders are GLSL ES 3.00 too: a context that calls itself ES gets them so, and draws. */
+static const unsigned char *(SAT__GL_CALL *rg_get_string)(unsigned name);
+static sat_gl_get_proc *rg_real_procs;
+
+static const unsigned char *SAT__GL_CALL rg_es_string(unsigned name)
+{
+    return name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)" : rg_get_string(name);
+}
+
+static sat_gl_proc rg_es_procs(const char *name) { return strcmp(name, "glGetString") == 0 ? (sat_gl_proc)rg_es_string : rg_real_procs(name); }
+
+TEST(raindrop_gl_shaders_are_es)
+{
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_gl_options o = raindrop_gl_defaults();
+    raindrop_rain *rain = rg_rain(2000, 1, 2);
+    if (!rg_open(&s)) return;
+    rg_get_string = s.gl.GetString;
+    rg_real_procs = s.context.get_proc;
+    o.map = s.map;
+    o.quads = 1;
+    if (!EXPECT_EQ(raindrop_gl_create(&g, rg_es_procs, &o), SAT_OK)) puts(raindrop_gl_message(g));
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    {
+        raindrop_render_options r = raindrop_render_defaults();
+        r.sort = 0;
+        r.orders_radius = 1e9f;
+        EXPECT(rg_compare(&s, g, rain, &r) < 1e-3);
+        EXPECT_EQ(raindrop_gl_advance(g, 0.01), SAT_OK);
+    }
+    raindrop_gl_destroy(g);
+    raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
