@@ -317,10 +317,11 @@ static inline float tonemap__exp2(float v)
 #ifdef SAT__VECTOR
 static inline sat__f32x4 tonemap__log2_octave4(sat__f32x4 t)
 {
-    static const float c[4] = {-0.0959564262f, 0.18194886f, -0.275600307f, 0.442544943f};
-    sat__f32x4 q = sat__f32x4_set1(0.0258414329f);
-    int i;
-    for (i = 0; i < 4; i++) q = sat__f32x4_add(sat__f32x4_set1(c[i]), sat__f32x4_mul(t, q));
+    sat__f32x4 q = sat__f32x4_mul(t, sat__f32x4_set1(0.0258414329f));
+    q = sat__f32x4_mul(t, sat__f32x4_add(sat__f32x4_set1(-0.0959564262f), q));
+    q = sat__f32x4_mul(t, sat__f32x4_add(sat__f32x4_set1(0.18194886f), q));
+    q = sat__f32x4_mul(t, sat__f32x4_add(sat__f32x4_set1(-0.275600307f), q));
+    q = sat__f32x4_add(sat__f32x4_set1(0.442544943f), q);
     return sat__f32x4_add(t, sat__f32x4_mul(sat__f32x4_mul(t, sat__f32x4_sub(sat__f32x4_set1(1), t)), q));
 }
 
@@ -642,12 +643,24 @@ static inline float tonemap__capacity(float cd)
     return -3.56579561f + ln * (1 / 0.0556f);
 }
 
-/* Eq A.10 and A.11 with t = I^0.383: finite at I = 0, where the printed form is not. */
+/* Eq A.10 and A.11 as a polynomial of log2 of the illuminance from 2^-24 to 10 lux, within 0.001 (0.2 codes) and exactly 1
+   from 10 lux on. The printed form is not finite at 0, where this is 22 / 57. */
+#define TONEMAP__RHO_LOW 5.9604645e-8f /* 2^-24 lux */
+#define TONEMAP__RHO_CENTRE -10.339036f
+#define TONEMAP__RHO_WIDTH 0.073201276f
+
 static inline float tonemap__rho(float lux)
 {
-    float i = lux < 1e-8f ? 1e-8f : lux > 10 ? 10 : lux, t = tonemap__exp2(0.383f * tonemap__log2(i));
-    float rho = (t * (92 / 57.0f) + 22 * 2.41546083f / 57) / (t + 2.41546083f);
-    return rho < 1 ? rho : 1;
+    float i = lux > TONEMAP__RHO_LOW ? lux : TONEMAP__RHO_LOW, t, u, q;
+    uint32_t bits;
+    if (!(i < 10)) return 1;
+    bits = sat__float_bits(i);
+    t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
+    u = (float)((int32_t)bits - 0x3f800000) * 1.1920929e-7f + t * (1 - t) * (0.422865337f + t * -0.159220122f); /* log2 */
+    u = (u - TONEMAP__RHO_CENTRE) * TONEMAP__RHO_WIDTH;
+    q = u * (u * -0.0893071936f + -0.150544156f) + 0.0254077498f;
+    q = u * (u * (u * q + 0.287330944f) + 0.475713817f) + 0.582037485f;
+    return 1 + (u - 1) * q;
 }
 
 static inline void tonemap__frame_boxes(tonemap__frame *f, const tonemap_options *o, double key)
@@ -1440,14 +1453,22 @@ static inline float tonemap__cbrt(float q)
     return y * ((y3 + 2 * q) / (2 * y3 + q)); /* Halley; error below 3e-5 */
 }
 
+/* cbrt(q) - 1 for q > 1: a polynomial within 7e-5 up to 2.65, beyond the bluest colour of Rec. 709. */
+static inline float tonemap__root(float q)
+{
+    float v = q - 1;
+    if (q > 2.65f) return tonemap__cbrt(q) - 1;
+    return v * (0.331779718f + v * (-0.0999134065f + v * (0.0339404425f + v * -0.00595350893f)));
+}
+
 static inline void tonemap__shift_red_plain(float *r, float *g, float *b, float luminance, float rho)
 {
-    float x = 0.4124564f * *r + 0.3575761f * *g + 0.1804375f * *b, y = luminance > TONEMAP__DARKEST ? luminance : TONEMAP__DARKEST;
-    float q = x / (0.95047f * y), c, dx;
-    if (!(q > 1)) return;
+    float x = 0.4124564f * *r + 0.3575761f * *g + 0.1804375f * *b, y = 0.95047f * luminance, q, c, dx;
+    if (!(x > y && rho < 1)) return;
+    q = x / y;
     q = q < 1048576 ? q : 1048576;
-    c = 1 + rho * (tonemap__cbrt(q) - 1);
-    dx = (c * c * c - q) * (0.95047f * y);
+    c = 1 + rho * tonemap__root(q);
+    dx = c * c * c * y - q * y;
     *r += 3.2404542f * dx;
     *g += -0.9692660f * dx;
     *b += 0.0556434f * dx;
@@ -1457,19 +1478,29 @@ static inline void tonemap__rho_row(float *rho, const float *local, float lux, i
 {
     int x = 0;
 #ifdef SAT__VECTOR
-    sat__f32x4 ten = sat__f32x4_set1(10), least = sat__f32x4_set1(1e-8f), half = sat__f32x4_set1(2.41546083f);
+    sat__f32x4 one = sat__f32x4_set1(1), ten = sat__f32x4_set1(10), least = sat__f32x4_set1(TONEMAP__RHO_LOW);
     for (; x + 4 <= end; x += 4) {
-        sat__f32x4 i = sat__f32x4_min(sat__f32x4_max(sat__f32x4_mul(sat__f32x4_load(local + x), sat__f32x4_set1(lux)), least), ten), t;
-        if (!sat__i32x4_any(sat__f32x4_less(i, ten))) {
-            sat__f32x4_store(rho + x, sat__f32x4_set1(1));
+        sat__f32x4 i = sat__f32x4_max(sat__f32x4_mul(sat__f32x4_load(local + x), sat__f32x4_set1(lux)), least), t, u, q;
+        sat__i32x4 bits = sat__f32x4_bits(i), dim = sat__f32x4_less(i, ten);
+        if (!sat__i32x4_any(dim)) {
+            sat__f32x4_store(rho + x, one);
             continue;
         }
-        t = tonemap__exp2_4(sat__f32x4_mul(sat__f32x4_set1(0.383f), tonemap__log2_4(i)));
-        i = sat__f32x4_add(sat__f32x4_mul(t, sat__f32x4_set1(92 / 57.0f)), sat__f32x4_set1(22 * 2.41546083f / 57));
-        sat__f32x4_store(rho + x, sat__f32x4_min(sat__f32x4_div(i, sat__f32x4_add(t, half)), sat__f32x4_set1(1)));
+        t = tonemap__octave4(bits);
+        u = sat__f32x4_add(sat__f32x4_set1(0.422865337f), sat__f32x4_mul(t, sat__f32x4_set1(-0.159220122f)));
+        u = sat__f32x4_mul(sat__f32x4_mul(t, sat__f32x4_sub(one, t)), u);
+        t = sat__f32x4_mul(sat__i32x4_to_f32(sat__i32x4_sub(bits, sat__i32x4_set1(0x3f800000))), sat__f32x4_set1(1.1920929e-7f));
+        u = sat__f32x4_mul(sat__f32x4_sub(sat__f32x4_add(t, u), sat__f32x4_set1(TONEMAP__RHO_CENTRE)), sat__f32x4_set1(TONEMAP__RHO_WIDTH));
+        q = sat__f32x4_add(sat__f32x4_mul(u, sat__f32x4_set1(-0.0893071936f)), sat__f32x4_set1(-0.150544156f));
+        q = sat__f32x4_add(sat__f32x4_mul(u, q), sat__f32x4_set1(0.0254077498f));
+        q = sat__f32x4_add(sat__f32x4_mul(u, q), sat__f32x4_set1(0.287330944f));
+        q = sat__f32x4_add(sat__f32x4_mul(u, q), sat__f32x4_set1(0.475713817f));
+        q = sat__f32x4_add(sat__f32x4_mul(u, q), sat__f32x4_set1(0.582037485f));
+        q = sat__f32x4_add(one, sat__f32x4_mul(sat__f32x4_sub(u, one), q));
+        sat__f32x4_store(rho + x, sat__f32x4_select(dim, q, one));
     }
 #endif
-    for (; x < end; x++) rho[x] = local[x] * lux < 10 ? tonemap__rho(local[x] * lux) : 1;
+    for (; x < end; x++) rho[x] = tonemap__rho(local[x] * lux);
 }
 
 #ifdef SAT__VECTOR
@@ -1481,18 +1512,29 @@ static inline sat__f32x4 tonemap__cbrt4(sat__f32x4 q)
     return sat__f32x4_mul(y, sat__f32x4_div(sat__f32x4_add(y3, sat__f32x4_mul(two, q)), sat__f32x4_add(sat__f32x4_mul(two, y3), q)));
 }
 
+static inline sat__f32x4 tonemap__root4(sat__f32x4 q)
+{
+    sat__f32x4 v = sat__f32x4_sub(q, sat__f32x4_set1(1)), p;
+    sat__i32x4 far_out = sat__f32x4_less(sat__f32x4_set1(2.65f), q);
+    p = sat__f32x4_add(sat__f32x4_set1(0.0339404425f), sat__f32x4_mul(v, sat__f32x4_set1(-0.00595350893f)));
+    p = sat__f32x4_add(sat__f32x4_set1(-0.0999134065f), sat__f32x4_mul(v, p));
+    p = sat__f32x4_mul(v, sat__f32x4_add(sat__f32x4_set1(0.331779718f), sat__f32x4_mul(v, p)));
+    return sat__i32x4_any(far_out) ? sat__f32x4_select(far_out, sat__f32x4_sub(tonemap__cbrt4(q), sat__f32x4_set1(1)), p) : p;
+}
+
 static inline void tonemap__shift_red4(sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 luminance, sat__f32x4 rho)
 {
     sat__f32x4 one = sat__f32x4_set1(1), x = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(0.4124564f), *r), sat__f32x4_mul(sat__f32x4_set1(0.3575761f), *g));
-    sat__f32x4 y = sat__f32x4_mul(sat__f32x4_set1(0.95047f), sat__f32x4_max(luminance, sat__f32x4_set1(TONEMAP__DARKEST))), q, c, dx;
+    sat__f32x4 y = sat__f32x4_mul(sat__f32x4_set1(0.95047f), luminance), q, c, dx;
     sat__i32x4 red;
-    q = sat__f32x4_div(sat__f32x4_add(x, sat__f32x4_mul(sat__f32x4_set1(0.1804375f), *b)), y);
-    red = sat__i32x4_and(sat__f32x4_less(one, q), sat__f32x4_less(rho, one));
+    x = sat__f32x4_add(x, sat__f32x4_mul(sat__f32x4_set1(0.1804375f), *b));
+    red = sat__i32x4_and(sat__f32x4_less(y, x), sat__f32x4_less(rho, one));
     if (!sat__i32x4_any(red)) return;
+    q = sat__f32x4_div(x, y);
     q = sat__f32x4_min(q, sat__f32x4_set1(1048576));
-    c = sat__f32x4_add(one, sat__f32x4_mul(rho, sat__f32x4_sub(tonemap__cbrt4(q), one)));
-    dx = sat__f32x4_mul(sat__f32x4_sub(sat__f32x4_mul(sat__f32x4_mul(c, c), c), q), y);
-    dx = sat__f32x4_select(red, dx, sat__f32x4_set1(0));
+    c = sat__f32x4_add(one, sat__f32x4_mul(rho, tonemap__root4(q)));
+    dx = sat__f32x4_sub(sat__f32x4_mul(sat__f32x4_mul(sat__f32x4_mul(c, c), c), y), sat__f32x4_mul(q, y));
+    dx = sat__f32x4_from_bits(sat__i32x4_and(red, sat__f32x4_bits(dx)));
     *r = sat__f32x4_add(*r, sat__f32x4_mul(sat__f32x4_set1(3.2404542f), dx));
     *g = sat__f32x4_add(*g, sat__f32x4_mul(sat__f32x4_set1(-0.9692660f), dx));
     *b = sat__f32x4_add(*b, sat__f32x4_mul(sat__f32x4_set1(0.0556434f), dx));
@@ -1589,7 +1631,7 @@ static inline void tonemap__shade_plain(tonemap__planes out, const float *pixels
         v[0] = p[0];
         v[1] = p[channels > 1 ? 1 : 0];
         v[2] = p[channels > 1 ? 2 : 0];
-        if (rho && rho[x + i] < 1) tonemap__shift_red_plain(v, v + 1, v + 2, luminance[x + i], rho[x + i]);
+        if (rho) tonemap__shift_red_plain(v, v + 1, v + 2, luminance[x + i], rho[x + i]);
         for (c = 0; c < 3; c++) {
             float d = v[c] * gain[x + i];
             over |= d > 1;
