@@ -9,6 +9,10 @@
 
 #define _POSIX_C_SOURCE 200809L
 #define LIGHTSCAN_IMPLEMENTATION
+#define PIPELINE_GL
+#define RAINDROP_GL
+#define TONEMAP_GL
+#include "gl_context.h"
 #include "pipeline.h"
 #include "reference.h"
 
@@ -27,7 +31,7 @@ static void print_row(const char *stage, double seconds, const char *error, cons
 }
 
 /* Times, errors against the slow way, and what was left out. */
-static void print_table(const pipeline *p)
+static void print_table(const pipeline *p, const gl_context *context)
 {
     const fiv_irradiance_stats *f = &p->shadow_stats;
     const ssao_sat_stats *a = &p->ao_stats;
@@ -53,11 +57,16 @@ static void print_table(const pipeline *p)
         print_row("occlusion", p->seconds[PIPELINE_OCCLUSION], percent(error, sizeof error, reference_occlusion_error(p), "rms (all pixels)"), rest);
     }
     print_row("shade", p->seconds[PIPELINE_SHADE], "-", "");
-    if (p->options.rain) {
+    if (p->options.rain && p->gl) print_row("rain", p->seconds[PIPELINE_RAIN], "-", gl_context_renderer(context));
+    else if (p->options.rain) {
         snprintf(rest, sizeof rest, "outside %.0f %%, hidden %.0f %%, too small %.0f %% of %.0f drops; %zu as one lookup, %zu as rays",
                  100 * (double)(r->outside + r->behind + r->near_plane) / drops, 100 * (double)r->hidden / drops,
                  100 * (double)r->below_threshold / drops, drops, r->drawn_far, r->drawn_near);
         print_row("rain", p->seconds[PIPELINE_RAIN], percent(error, sizeof error, reference_rain_error(p), "rms (all rays)"), rest);
+    }
+    if (p->gl) {
+        print_row("tone", p->seconds[PIPELINE_TONE], "-", gl_context_renderer(context));
+        return;
     }
     snprintf(rest, sizeof rest, "%.1f decades; key %.3g; %.1f %% clipped; neighbourhoods searched %zu, skipped %zu",
              t->low > 0 ? log10(t->high / t->low) : 0.0, t->key, 100 * (double)t->clamped / (double)(p->hdr.width * p->hdr.height),
@@ -65,68 +74,20 @@ static void print_table(const pipeline *p)
     print_row("tone", p->seconds[PIPELINE_TONE], "0 (exact search)", rest);
 }
 
-/* ---- mosaic: tiles cut out of the picture at random, shrunk, and each used at most once ---- */
-
-enum { TILE = 16, TILE_COLUMNS = 96 };
-
-static sat_image view_u8(const unsigned char *pixels, int width, int height)
+static int save_mosaic(pipeline *p, const char *path)
 {
-    sat_image view = sat_image_f32(NULL, width, height, 3);
-    view.pixels = pixels;
-    view.stride = (ptrdiff_t)width * 3;
-    view.format = SAT_U8;
-    return view;
-}
-
-/* Tile i shows a square of 2 to 6 tiles' side; odd ones are mirrored. */
-static void cut_tile(unsigned char *sheet, int i, const unsigned char *pixels, int width, int height)
-{
-    int step = 2 + (int)(4.999f * scene_hash(i, 1)), side = step * TILE < height ? step * TILE : height, x, y, k, u, v;
-    int left = (int)(scene_hash(i, 2) * (float)(width - side)), top = (int)(scene_hash(i, 3) * (float)(height - side));
-    for (y = 0; y < TILE; ++y)
-        for (x = 0; x < TILE; ++x) {
-            unsigned char *out = sheet + 3 * (((size_t)(i / TILE_COLUMNS * TILE + y)) * TILE * TILE_COLUMNS + (size_t)(i % TILE_COLUMNS * TILE + x));
-            int sum[3] = {0, 0, 0}, from = i & 1 ? TILE - 1 - x : x, n = side / TILE;
-            for (v = 0; v < n; ++v)
-                for (u = 0; u < n; ++u)
-                    for (k = 0; k < 3; ++k)
-                        sum[k] += pixels[3 * ((size_t)(top + y * n + v) * (size_t)width + (size_t)(left + from * n + u)) + (size_t)k];
-            for (k = 0; k < 3; ++k) out[k] = (unsigned char)(sum[k] / (n * n));
-        }
-}
-
-static int make_mosaic(const pipeline *p, const char *path)
-{
-    int columns = p->options.width / TILE, rows = p->options.height / TILE, patches = columns * rows, i;
-    int tile_rows = patches * 3 / 2 / TILE_COLUMNS + 1, tiles = tile_rows * TILE_COLUMNS;
-    unsigned char *sheet = (unsigned char *)malloc((size_t)tiles * TILE * TILE * 3), *out = (unsigned char *)malloc((size_t)patches * TILE * TILE * 3);
-    float *wanted = (float *)malloc((size_t)patches * 48 * sizeof(float)), *offered = (float *)malloc((size_t)tiles * 48 * sizeof(float));
-    int *tile_of = (int *)malloc((size_t)patches * sizeof(int)), ok = sheet && out && wanted && offered && tile_of && patches > 0;
-    sat_image picture = view_u8(p->pixels, p->options.width, p->options.height), tile_view = view_u8(sheet, TILE * TILE_COLUMNS, TILE * tile_rows);
-    softassign_options so = softassign_defaults();
-    softassign_problem problem;
-    softassign_report report;
-    double start = common_clock();
-    char rest[160], error[80];
-    so.threads = p->options.threads;
-    memset(&problem, 0, sizeof problem);
-    picture.width = columns * TILE, picture.height = rows * TILE;
-    problem.rows = patches, problem.columns = tiles, problem.feature_count = 48;
-    problem.row_features = wanted, problem.column_features = offered;
-    for (i = 0; ok && i < tiles; ++i) cut_tile(sheet, i, p->pixels, p->options.width, p->options.height);
-    ok = ok && softassign_features(wanted, &picture, columns, rows, 4, 4, &so) == SAT_OK &&
-         softassign_features(offered, &tile_view, TILE_COLUMNS, tile_rows, 4, 4, &so) == SAT_OK &&
-         softassign_solve(tile_of, &problem, &so, &report) == SAT_OK &&
-         softassign_mosaic(out, (ptrdiff_t)columns * TILE * 3, &tile_view, TILE, TILE, tile_of, columns, rows, &picture, 0.25f) == SAT_OK;
-    if (ok) {
-        snprintf(rest, sizeof rest, "%d of %d tiles, none twice; %.0f %% of the distances never computed", patches, tiles,
-                 100 - 100 * (double)report.distances_computed / ((double)patches * tiles));
-        print_row("mosaic", common_clock() - start, percent(error, sizeof error, report.gap, "of the cost, at most"), rest);
-        ok = image_save_u8(path, out, columns * TILE, rows * TILE, 3);
+    const softassign_report *r = &p->mosaic_report;
+    char error[80], rest[200];
+    if (!pipeline_mosaic(p)) {
+        fprintf(stderr, "demo: %s\n", p->message);
+        return 0;
     }
-    if (!ok) fprintf(stderr, "demo: the mosaic could not be made or written to %s\n", path);
-    free(sheet), free(out), free(wanted), free(offered), free(tile_of);
-    return ok;
+    snprintf(rest, sizeof rest, "%d tiles of %d, none twice; of the distances %.0f %% never computed", p->mosaic_patches, p->mosaic_tiles,
+             fmax(0, 100 - 100 * (double)r->distances_computed / ((double)p->mosaic_patches * p->mosaic_tiles)));
+    print_row("mosaic", p->mosaic_seconds, percent(error, sizeof error, r->gap, "of the cost, at most"), rest);
+    if (image_save_u8(path, p->mosaic, p->mosaic_width, p->mosaic_height, 3)) return 1;
+    fprintf(stderr, "demo: %s cannot be written\n", path);
+    return 0;
 }
 
 /* ---- command line ---- */
@@ -162,7 +123,7 @@ static int save(pipeline *p, const char *path)
     return 0;
 }
 
-static int run(pipeline *p, int frames, const char *out, int stats, int mosaic)
+static int run(pipeline *p, const gl_context *context, int frames, const char *out, int stats, int mosaic)
 {
     double sum[PIPELINE_STAGES] = {0};
     common_progress progress = {0, 0};
@@ -180,9 +141,9 @@ static int run(pipeline *p, int frames, const char *out, int stats, int mosaic)
         common_show_progress(&progress, "frames", i + 1, frames);
     }
     for (k = PIPELINE_SCENE; k < PIPELINE_STAGES; ++k) p->seconds[k] = sum[k] / frames;
-    if (stats) print_table(p);
+    if (stats) print_table(p, context);
     path_with(path, sizeof path, out, "_mosaic", NULL);
-    return !mosaic || make_mosaic(p, path);
+    return !mosaic || save_mosaic(p, path);
 }
 
 int main(int argc, char **argv)
@@ -191,7 +152,7 @@ int main(int argc, char **argv)
     static const char *const operators[] = {"local", "global", "ashikhmin", "ashikhmin-global", "linear", NULL};
     static const char *const mesopics[] = {"off", "uniform", "local", NULL};
     const char *hour = "dusk", *operation = "local", *mesopic = "local", *rate = "150mm", *env = NULL, *shape = NULL, *out;
-    int size[2] = {1280, 720}, frames = 1, mosaic = 0, no_shadows = 0, no_occlusion = 0, no_rain = 0, no_tone = 0, first, ok;
+    int size[2] = {1280, 720}, frames = 1, gl = 0, mosaic = 0, no_shadows = 0, no_occlusion = 0, no_rain = 0, no_tone = 0, first, ok;
     pipeline_options o = pipeline_defaults();
     const common_option options[] = {
         {"env", 's', &env, "equirectangular picture of the light; without it a sky of our own"},
@@ -201,13 +162,14 @@ int main(int argc, char **argv)
         {"hour", 's', &hour, "dusk, night or noon"},
         {"turn", 'f', &o.turn, "degrees by which the light is turned"},
         {"ao-radius", 'f', &o.ao_radius, "reach of ambient occlusion, 0.12 m"},
-        {"shutter", 'f', &o.shutter, "seconds for which the drops move, 0.001"},
+        {"shutter", 'f', &o.shutter, "seconds for which the drops move, 0.0002"},
         {"operator", 's', &operation, "local, global, ashikhmin, ashikhmin-global or linear"},
         {"key", 'f', &o.key, "display value of the log-average; 0: one for the hour"},
         {"exposure", 'f', &o.exposure, "stops more light"},
         {"mesopic", 's', &mesopic, "off, uniform or local: reds fade in dim light"},
         {"samples", 'i', &o.samples, "points a pixel each way, 1 to 4; 2"},
         {"frames", 'i', &frames, "pictures, 1/30 s apart"},
+        {"gl", 'b', &gl, "rain and tone mapping on OpenGL (OSMesa; LIGHTSCAN_GL=egl: the GPU)"},
         {"mosaic", 'b', &mosaic, "the picture again, from tiles"},
         {"no-shadows", 'b', &no_shadows, "leave fiv.h out"},
         {"no-occlusion", 'b', &no_occlusion, "leave ssao_sat.h out"},
@@ -217,6 +179,7 @@ int main(int argc, char **argv)
     common_settings common;
     image light;
     mesh sculpture;
+    gl_context context;
     pipeline p;
     char *end;
     first = common_parse(&common, argc, argv, "demo [options] [out.png]", options, (int)(sizeof options / sizeof options[0]));
@@ -240,10 +203,16 @@ int main(int argc, char **argv)
     }
     o.environment = env ? &light : NULL;
     o.shape = shape ? &sculpture : NULL;
+    if (gl && !gl_context_open(&context, 3, 3)) {
+        fprintf(stderr, "demo: --gl: %s\n", context.message);
+        return 1;
+    }
+    if (gl) o.get_proc = context.get_proc;
     ok = pipeline_create(&p, &o);
     if (!ok) fprintf(stderr, "demo: %s\n", p.message);
-    ok = ok && run(&p, frames, out, common.stats, mosaic);
+    ok = ok && run(&p, &context, frames, out, common.stats, mosaic);
     pipeline_destroy(&p);
+    if (gl) gl_context_close(&context);
     image_free(&light);
     mesh_free(&sculpture);
     return !ok;

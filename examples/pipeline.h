@@ -7,7 +7,7 @@
        pipeline_frame(&p, 1 / 30.0);              every stage; p.pixels is the picture, p.stages what each one cost
        pipeline_destroy(&p);
 
-   The program defines the IMPLEMENTATION macros; pipeline_change takes other options between frames. */
+   The program defines the IMPLEMENTATION macros, and for OpenGL PIPELINE_GL and the GL macros; pipeline_change takes other options between frames. */
 
 #ifndef PIPELINE_H
 #define PIPELINE_H
@@ -19,6 +19,11 @@
 #include "../tonemap.h"
 #include "common.h"
 #include "scene.h"
+#ifdef PIPELINE_GL
+#include "pipeline_gl.h"
+#else
+typedef struct pipeline_gl pipeline_gl;
+#endif
 
 typedef enum pipeline_stage {
     PIPELINE_LIGHT,    /* sky or environment, made ready for shadows and drops; once */
@@ -44,12 +49,13 @@ typedef struct pipeline_options {
     int shadows, occlusion, rain, tone; /* 1; 0 leaves the stage out */
     float rate;                  /* 150 mm/h: a cloudburst */
     float ao_radius;             /* 0.12 m */
-    float shutter;               /* 0.001 s: open so long */
+    float shutter;               /* 0.0002 s: open so long */
     tonemap_operator operation;  /* TONEMAP_PHOTOGRAPHIC_LOCAL */
     tonemap_mesopic mesopic;     /* TONEMAP_MESOPIC_LOCAL */
     float key;                   /* 0: one that suits the hour */
     float exposure;              /* 0; stops: the key is doubled so many times */
     sat_threads threads;         /* serial */
+    sat_gl_get_proc *get_proc;   /* NULL: on the CPU; otherwise OpenGL, with PIPELINE_GL defined */
 } pipeline_options;
 
 typedef struct pipeline {
@@ -68,6 +74,7 @@ typedef struct pipeline {
     raindrop_environment *mirror;
     raindrop_rain *rain;
     tonemap *map;
+    pipeline_gl *gl;             /* NULL: on the CPU */
     fiv_environment_stats light_stats;
     fiv_occluder_stats mask_stats[SCENE_OBJECTS];
     fiv_irradiance_stats shadow_stats;
@@ -75,6 +82,10 @@ typedef struct pipeline {
     raindrop_render_stats rain_stats;
     tonemap_stats tone_stats;
     double seconds[PIPELINE_STAGES];
+    unsigned char *mosaic;       /* made by pipeline_mosaic */
+    int mosaic_width, mosaic_height, mosaic_patches, mosaic_tiles;
+    softassign_report mosaic_report;
+    double mosaic_seconds;
     char message[400];
 } pipeline;
 
@@ -86,7 +97,7 @@ static inline pipeline_options pipeline_defaults(void)
     o.shadows = o.occlusion = o.rain = o.tone = 1;
     o.rate = 150;
     o.ao_radius = 0.12f;
-    o.shutter = 0.001f;
+    o.shutter = 0.0002f;
     o.mesopic = TONEMAP_MESOPIC_LOCAL;
     return o;
 }
@@ -96,6 +107,20 @@ static inline int pipeline_check(pipeline *p, const char *what, sat_result resul
     if (result != SAT_OK) snprintf(p->message, sizeof p->message, "%s: %s", what, sat_result_text(result));
     return result == SAT_OK;
 }
+
+/* The rest of a stage is for the CPU: where there is OpenGL this call does it. */
+#ifdef PIPELINE_GL
+static inline int pipeline_gl_done(pipeline *p, int ok)
+{
+    if (!ok) snprintf(p->message, sizeof p->message, "OpenGL: %s", p->gl ? p->gl->message : "not enough memory");
+    return ok;
+}
+#define PIPELINE_ON_GL(p, call) if ((p)->gl) return pipeline_gl_done(p, call)
+#define PIPELINE_GL_FORGET(p) if ((p)->gl) (p)->gl->environment = NULL, (p)->gl->drops = NULL
+#else
+#define PIPELINE_GL_FORGET(p) ((void)0)
+#define PIPELINE_ON_GL(p, call) ((void)0)
+#endif
 
 /* ---- light: the same picture lights the ground and shines through the drops ---- */
 
@@ -111,6 +136,7 @@ static inline int pipeline_light(pipeline *p)
     fiv_environment_destroy(p->light);
     raindrop_environment_destroy(p->mirror);
     p->light = NULL, p->mirror = NULL;
+    PIPELINE_GL_FORGET(p);
     fo.threads = ro.threads = p->options.threads;
     if (!pipeline_check(p, "fiv_environment_create", fiv_environment_create(&p->light, &view, &fo, &p->light_stats))) return 0;
     if (!pipeline_check(p, "raindrop_environment_create", raindrop_environment_create(&p->mirror, &view, &ro, NULL))) return 0;
@@ -255,8 +281,8 @@ static inline void pipeline_pixel(float rgb[3], const pipeline *p, size_t i, con
     } else raindrop_environment_sample(mirrored, p->mirror, r, scene_mix(0.5f, 0.02f, wet));
     f = pipeline_fresnel(0.02f, -scene_dot(view, n), scene_mix(0.35f, 1, wet));
     for (k = 0; k < 3; ++k) rgb[k] = (1 - f) * colour[k] / 3.14159265f * p->irradiance[0][3 * i + (size_t)k] * p->open[i] + f * mirrored[k] * scene_mix(p->open[i], 1, wet);
-    view[1] = 0.015f; /* the distance fades into the horizon */
-    raindrop_environment_sample(mirrored, p->mirror, view, 0.1f);
+    view[1] = 0.035f; /* the distance fades into the horizon */
+    raindrop_environment_sample(mirrored, p->mirror, view, 0.04f);
     haze = 1 - expf(-l->depth[i] / 30);
     for (k = 0; k < 3; ++k) rgb[k] = scene_mix(rgb[k], mirrored[k], haze);
 }
@@ -322,8 +348,8 @@ static inline raindrop_camera pipeline_rain_camera(const pipeline *p)
 {
     raindrop_camera camera = p->scene.camera;
     camera.exposure = p->options.shutter;
-    camera.aperture = 0.004f;
-    camera.focus_distance = 0.5f;
+    camera.aperture = 0.002f;
+    camera.focus_distance = 0.4f;
     camera.near_distance = 0.08f;
     return camera;
 }
@@ -344,6 +370,7 @@ static inline int pipeline_rain(pipeline *p, double dt)
         ro.threads = p->options.threads;
         if (!pipeline_check(p, "raindrop_rain_create", raindrop_rain_create(&p->rain, &ro))) return 0;
     }
+    PIPELINE_ON_GL(p, pipeline_gl_rain(p->gl, p->hdr.pixels, p->depth, &camera, p->mirror, p->rain, dt));
     return pipeline_check(p, "raindrop_rain_advance", raindrop_rain_advance(p->rain, dt)) &&
            pipeline_check(p, "raindrop_render", raindrop_render(p->hdr.pixels, (ptrdiff_t)p->hdr.width * 3 * (ptrdiff_t)sizeof(float), p->hdr.width, p->hdr.height,
                                                                 p->depth, &camera, p->rain, p->mirror, NULL, &p->rain_stats));
@@ -362,9 +389,78 @@ static inline int pipeline_tone(pipeline *p, double dt)
     to.cd_per_unit = 1;
     to.white = 0;
     to.threads = p->options.threads;
+    PIPELINE_ON_GL(p, pipeline_gl_tone(p->gl, p->pixels, p->hdr.pixels, &to, dt));
     if (!p->map ? !pipeline_check(p, "tonemap_create", tonemap_create(&p->map, p->hdr.width, p->hdr.height, &to))
                 : !pipeline_check(p, "tonemap_set_options", tonemap_set_options(p->map, &to))) return 0;
     return pipeline_check(p, "tonemap_apply_u8", tonemap_apply_u8(p->map, p->pixels, (ptrdiff_t)p->hdr.width * 3, &hdr, dt, &p->tone_stats));
+}
+
+/* ---- mosaic: tiles cut out of the picture at random, shrunk, and each used at most once ---- */
+
+enum { PIPELINE_TILE = 16, PIPELINE_TILE_COLUMNS = 96, PIPELINE_FEATURES = 48 };
+
+static inline sat_image pipeline_view_u8(const unsigned char *pixels, int width, int height, int row)
+{
+    sat_image view = sat_image_f32(NULL, width, height, 3);
+    view.pixels = pixels;
+    view.stride = (ptrdiff_t)row * 3;
+    view.format = SAT_U8;
+    return view;
+}
+
+/* Tile i shows a square of 2 to 6 tiles' side; odd ones are mirrored. */
+static inline void pipeline_cut_tile(unsigned char *sheet, int i, const pipeline *p)
+{
+    int width = p->options.width, height = p->options.height, most = (width < height ? width : height) / PIPELINE_TILE;
+    int n = 2 + (int)(4.999f * scene_hash(i, 1)), x, y, k, u, v, left, top;
+    if (n > most) n = most;
+    left = (int)(scene_hash(i, 2) * (float)(width - n * PIPELINE_TILE));
+    top = (int)(scene_hash(i, 3) * (float)(height - n * PIPELINE_TILE));
+    for (y = 0; y < PIPELINE_TILE; ++y)
+        for (x = 0; x < PIPELINE_TILE; ++x) {
+            size_t row = (size_t)(i / PIPELINE_TILE_COLUMNS * PIPELINE_TILE + y), column = (size_t)(i % PIPELINE_TILE_COLUMNS * PIPELINE_TILE + x);
+            int sum[3] = {0, 0, 0}, from = i & 1 ? PIPELINE_TILE - 1 - x : x;
+            for (v = 0; v < n; ++v)
+                for (u = 0; u < n; ++u)
+                    for (k = 0; k < 3; ++k)
+                        sum[k] += p->pixels[3 * ((size_t)(top + y * n + v) * (size_t)width + (size_t)(left + from * n + u)) + (size_t)k];
+            for (k = 0; k < 3; ++k) sheet[3 * (row * PIPELINE_TILE * PIPELINE_TILE_COLUMNS + column) + (size_t)k] = (unsigned char)(sum[k] / (n * n));
+        }
+}
+
+/* The last frame again, into p->mosaic. */
+static inline int pipeline_mosaic(pipeline *p)
+{
+    int columns = p->options.width / PIPELINE_TILE, rows = p->options.height / PIPELINE_TILE, patches = columns * rows, i, ok;
+    int tile_rows = patches * 3 / 2 / PIPELINE_TILE_COLUMNS + 1, tiles = tile_rows * PIPELINE_TILE_COLUMNS, row = columns * PIPELINE_TILE;
+    size_t tile_bytes = 3 * PIPELINE_TILE * PIPELINE_TILE;
+    unsigned char *sheet = (unsigned char *)malloc((size_t)tiles * tile_bytes);
+    float *wanted = (float *)malloc((size_t)patches * PIPELINE_FEATURES * sizeof(float)), *offered = (float *)malloc((size_t)tiles * PIPELINE_FEATURES * sizeof(float));
+    int *tile_of = (int *)malloc((size_t)patches * sizeof(int));
+    sat_image picture = pipeline_view_u8(p->pixels, row, rows * PIPELINE_TILE, p->options.width);
+    sat_image tile_view = pipeline_view_u8(sheet, PIPELINE_TILE * PIPELINE_TILE_COLUMNS, PIPELINE_TILE * tile_rows, PIPELINE_TILE * PIPELINE_TILE_COLUMNS);
+    softassign_options so = softassign_defaults();
+    softassign_problem problem;
+    double start = common_clock();
+    memset(&problem, 0, sizeof problem);
+    so.threads = p->options.threads;
+    problem.rows = patches, problem.columns = tiles, problem.feature_count = PIPELINE_FEATURES;
+    problem.row_features = wanted, problem.column_features = offered;
+    free(p->mosaic);
+    p->mosaic = (unsigned char *)malloc((size_t)patches * tile_bytes);
+    ok = sheet && wanted && offered && tile_of && p->mosaic;
+    if (!ok) snprintf(p->message, sizeof p->message, "not enough memory for %d tiles", tiles);
+    for (i = 0; ok && i < tiles; ++i) pipeline_cut_tile(sheet, i, p);
+    ok = ok && pipeline_check(p, "softassign_features", softassign_features(wanted, &picture, columns, rows, 4, 4, &so)) &&
+         pipeline_check(p, "softassign_features", softassign_features(offered, &tile_view, PIPELINE_TILE_COLUMNS, tile_rows, 4, 4, &so)) &&
+         pipeline_check(p, "softassign_solve", softassign_solve(tile_of, &problem, &so, &p->mosaic_report)) &&
+         pipeline_check(p, "softassign_mosaic", softassign_mosaic(p->mosaic, (ptrdiff_t)row * 3, &tile_view, PIPELINE_TILE, PIPELINE_TILE, tile_of,
+                                                                  columns, rows, &picture, 0.25f));
+    p->mosaic_patches = patches, p->mosaic_tiles = tiles;
+    p->mosaic_width = row, p->mosaic_height = rows * PIPELINE_TILE;
+    p->mosaic_seconds = common_clock() - start;
+    free(sheet), free(wanted), free(offered), free(tile_of);
+    return ok;
 }
 
 /* ---- all of it ---- */
@@ -402,6 +498,9 @@ static inline int pipeline_create(pipeline *p, const pipeline_options *options)
     scene_place(&p->scene.objects[0], -0.17f, -0.05f, 0.24f, 0.62f, 0.3f, 0.16f, 0.04f);
     scene_place(&p->scene.objects[1], 0.3f, 0.06f, 0.23f, 0.66f, 0.64f, 0.58f, 0.04f);
     p->scene.camera = raindrop_camera_look(eye, target, up, 0.62f);
+#ifdef PIPELINE_GL
+    if (options->get_proc && !pipeline_gl_done(p, pipeline_gl_create(&p->gl, options->get_proc, options->width, options->height))) return 0;
+#endif
     return pipeline_masks(p) && pipeline_light(p);
 }
 
@@ -410,6 +509,7 @@ static inline int pipeline_change(pipeline *p, const pipeline_options *options)
 {
     pipeline_options old = p->options;
     p->options = *options;
+    PIPELINE_GL_FORGET(p);
     if (old.rate != options->rate) raindrop_rain_destroy(p->rain), p->rain = NULL;
     if (old.ao_radius != options->ao_radius) ssao_sat_destroy(p->ao), p->ao = NULL;
     if (old.ao_radius != options->ao_radius || old.shadows != options->shadows || old.occlusion != options->occlusion) p->settled = 0;
@@ -444,6 +544,9 @@ static inline int pipeline_frame(pipeline *p, double dt)
 static inline void pipeline_destroy(pipeline *p)
 {
     int i;
+#ifdef PIPELINE_GL
+    pipeline_gl_destroy(p->gl);
+#endif
     for (i = 0; i < SCENE_OBJECTS; ++i) fiv_occluder_destroy(p->occluders[i]);
     fiv_environment_destroy(p->light);
     raindrop_environment_destroy(p->mirror);
@@ -452,7 +555,7 @@ static inline void pipeline_destroy(pipeline *p)
     tonemap_destroy(p->map);
     scene_free(&p->scene);
     image_free(&p->sky), image_free(&p->dry), image_free(&p->hdr);
-    free(p->depth), free(p->pixels), free(p->irradiance[0]), free(p->irradiance[1]), free(p->open);
+    free(p->depth), free(p->pixels), free(p->mosaic), free(p->irradiance[0]), free(p->irradiance[1]), free(p->open);
     free(p->points), free(p->normals), free(p->found), free(p->where);
     memset(p, 0, sizeof *p);
 }

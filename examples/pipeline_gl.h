@@ -1,0 +1,142 @@
+/* pipeline_gl.h - stages of pipeline.h on OpenGL: upload, the header's passes, read back.
+   SPDX-License-Identifier: MIT-0 OR Unlicense
+
+   A renderer that keeps its pictures on the GPU does without both copies. Row 0 is the top of the picture, but for the
+   texture that the rain is drawn into, which is as OpenGL has it. */
+
+#ifndef PIPELINE_GL_H
+#define PIPELINE_GL_H
+
+#ifndef SAT_SIBLING
+#define SAT_SIBLING
+#endif
+#ifndef SAT_SIBLING_GL
+#define SAT_SIBLING_GL /* sat.h then lends its function table, textures and framebuffers */
+#endif
+#include "../raindrop.h"
+#include "../sat.h"
+#include "../tonemap.h"
+
+typedef struct pipeline_gl {
+    sat__gl gl;
+    sat_gl_get_proc *get_proc;
+    int width, height;
+    unsigned hdr, rainy, depth, framebuffer; /* textures of the picture's size; the last three for the rain */
+    tonemap_gl *tone;
+    tonemap_options tone_options;            /* what `tone` was made with */
+    raindrop_gl *rain;
+    const raindrop_environment *environment; /* what `rain` was given */
+    const raindrop_rain *drops;
+    float *rows;                             /* the picture as RGBA */
+    char message[320];
+} pipeline_gl;
+
+static inline int pipeline_gl_check(pipeline_gl *g, sat_result result, const char *message)
+{
+    if (result != SAT_OK) snprintf(g->message, sizeof g->message, "%s: %.200s", sat_result_text(result), message);
+    return result == SAT_OK;
+}
+
+/* 1, or 0 with *out->message (or *out NULL when there is no memory at all). */
+static inline int pipeline_gl_create(pipeline_gl **out, sat_gl_get_proc *get_proc, int width, int height)
+{
+    pipeline_gl *g = (pipeline_gl *)calloc(1, sizeof *g);
+    sat_result result;
+    *out = g;
+    if (!g) return 0;
+    g->get_proc = get_proc, g->width = width, g->height = height;
+    g->rows = (float *)malloc((size_t)width * (size_t)height * 4 * sizeof(float));
+    result = g->rows ? sat__gl_open(&g->gl, get_proc) : SAT_ERR_MEMORY;
+    if (result == SAT_OK) result = sat__gl_texture(&g->gl, &g->hdr, SAT__GL_RGBA32F, width, height, NULL);
+    if (result == SAT_OK) result = sat__gl_texture(&g->gl, &g->rainy, SAT__GL_RGBA32F, width, height, NULL);
+    if (result == SAT_OK) result = sat__gl_texture(&g->gl, &g->depth, SAT__GL_DEPTH_COMPONENT32F, width, height, NULL);
+    if (result == SAT_OK) result = sat__gl_framebuffer(&g->gl, &g->framebuffer, &g->rainy, 1, g->depth);
+    return pipeline_gl_check(g, result, g->gl.message);
+}
+
+static inline void pipeline_gl_destroy(pipeline_gl *g)
+{
+    if (!g) return;
+    tonemap_gl_destroy(g->tone);
+    raindrop_gl_destroy(g->rain);
+    if (g->framebuffer) g->gl.DeleteFramebuffers(1, &g->framebuffer);
+    if (g->hdr) g->gl.DeleteTextures(1, &g->hdr);
+    if (g->rainy) g->gl.DeleteTextures(1, &g->rainy);
+    if (g->depth) g->gl.DeleteTextures(1, &g->depth);
+    sat__gl_close(&g->gl);
+    free(g->rows);
+    free(g);
+}
+
+/* RGB rows from or to the RGBA rows, which may be upside down. */
+static inline void pipeline_gl_copy(pipeline_gl *g, float *rgb, int to_rgba, int flip)
+{
+    int x, y, k;
+    for (y = 0; y < g->height; ++y)
+        for (x = 0; x < g->width; ++x) {
+            float *a = rgb + 3 * ((size_t)y * (size_t)g->width + (size_t)x);
+            float *b = g->rows + 4 * ((size_t)(flip ? g->height - 1 - y : y) * (size_t)g->width + (size_t)x);
+            for (k = 0; k < 3; ++k)
+                if (to_rgba) b[k] = a[k];
+                else a[k] = b[k];
+            if (to_rgba) b[3] = 1;
+        }
+}
+
+/* ---- rain: falls and is drawn on the GPU, without streaks, depth of field and internal reflections ---- */
+
+/* Window depth of the usual perspective, upside down, into the depth texture. */
+static inline void pipeline_gl_depth(pipeline_gl *g, const float *depth, float near, float far)
+{
+    int x, y;
+    for (y = 0; y < g->height; ++y)
+        for (x = 0; x < g->width; ++x) {
+            float z = depth[(size_t)(g->height - 1 - y) * (size_t)g->width + (size_t)x];
+            g->rows[(size_t)y * (size_t)g->width + (size_t)x] = z > near && z < far ? (1 / near - 1 / z) / (1 / near - 1 / far) : 1;
+        }
+    sat__gl_upload(&g->gl, g->depth, SAT__GL_DEPTH_COMPONENT32F, g->width, g->height, g->rows);
+}
+
+static inline int pipeline_gl_rain(pipeline_gl *g, float *rgb, const float *depth, const raindrop_camera *camera,
+                                   const raindrop_environment *environment, const raindrop_rain *rain, double dt)
+{
+    raindrop_gl_options options = raindrop_gl_defaults();
+    sat_result result = SAT_OK;
+    const float near = 0.08f, far = 1000;
+    options.quads = 1;
+    if (!g->rain) result = raindrop_gl_create(&g->rain, g->get_proc, &options);
+    if (result == SAT_OK && g->environment != environment) result = raindrop_gl_set_environment(g->rain, g->environment = environment);
+    if (result == SAT_OK && g->drops != rain) result = raindrop_gl_set_rain(g->rain, g->drops = rain);
+    if (result == SAT_OK) result = raindrop_gl_advance(g->rain, dt);
+    pipeline_gl_depth(g, depth, near, far);
+    pipeline_gl_copy(g, rgb, 1, 1);
+    sat__gl_upload(&g->gl, g->rainy, SAT__GL_RGBA32F, g->width, g->height, g->rows);
+    g->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, g->framebuffer);
+    g->gl.Viewport(0, 0, g->width, g->height);
+    if (result == SAT_OK) result = raindrop_gl_render(g->rain, g->width, g->height, camera, NULL, near, far);
+    if (!pipeline_gl_check(g, result, g->rain ? raindrop_gl_message(g->rain) : "")) return 0;
+    result = sat__gl_read(&g->gl, g->rows, g->rainy, SAT__GL_RGBA32F, g->width, g->height);
+    pipeline_gl_copy(g, rgb, 0, 1);
+    return pipeline_gl_check(g, result, g->gl.message);
+}
+
+/* ---- tone ---- */
+
+static inline int pipeline_gl_tone(pipeline_gl *g, unsigned char *out, float *rgb, const tonemap_options *options, double dt)
+{
+    unsigned char *bytes = (unsigned char *)g->rows;
+    size_t i, pixels = (size_t)g->width * (size_t)g->height;
+    sat_result result = SAT_OK;
+    if (g->tone && memcmp(&g->tone_options, options, sizeof *options) != 0) tonemap_gl_destroy(g->tone), g->tone = NULL;
+    if (!g->tone) result = tonemap_gl_create(&g->tone, g->get_proc, g->width, g->height, options);
+    memcpy(&g->tone_options, options, sizeof *options);
+    pipeline_gl_copy(g, rgb, 1, 0);
+    sat__gl_upload(&g->gl, g->hdr, SAT__GL_RGBA32F, g->width, g->height, g->rows);
+    if (result == SAT_OK) result = tonemap_gl_apply(g->tone, 0, g->hdr, dt);
+    if (!pipeline_gl_check(g, result, g->tone ? tonemap_gl_message(g->tone) : "")) return 0;
+    result = sat__gl_read(&g->gl, bytes, tonemap_gl_texture(g->tone), SAT__GL_RGBA8, g->width, g->height);
+    for (i = 0; i < pixels; ++i) memcpy(out + 3 * i, bytes + 4 * i, 3);
+    return pipeline_gl_check(g, result, g->gl.message);
+}
+
+#endif /* PIPELINE_GL_H */
