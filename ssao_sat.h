@@ -154,6 +154,45 @@ SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao); /* NULL is fine */
 }
 #endif
 #endif /* SSAO_SAT_H */
+#if defined(SSAO_SAT_GL) && !defined(SSAO_SAT__GL_API)
+#define SSAO_SAT__GL_API
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ------------------------------------------------------------------------------------------------
+   OpenGL 3.3 core or ES 3.0 (with EXT_color_buffer_float)
+   ------------------------------------------------------------------------------------------------ */
+
+/* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL state as it was
+   (but for pending errors, which are lost). Does not wait for the GPU. All methods; band_rows, threads, float_table and skip_flat
+   mean nothing here. Textures drawn by OpenGL have the bottom row first: set options.bottom_up. */
+typedef struct ssao_sat_gl ssao_sat_gl;
+
+/* On an OpenGL error *out only answers ssao_sat_gl_message, and is to be destroyed; on the others it is NULL. */
+SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *get_proc, int width, int height, const ssao_sat_options *options);
+/* depth: a 2D texture whose red is the depth (R32F, R16F, or a depth format without comparison). normals: its red, green, blue are the
+   view-space normal, signed; 0: from depth. out: a colour-renderable texture of the caller whose red gets the accessibility, or 0 for
+   the object's own R32F, ssao_sat_gl_texture(). Of `input` only width, height, depth_kind, projection, clip_zero_to_one and sky count. */
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigned depth, unsigned normals, const ssao_sat_input *input);
+SSAO_SAT_DEF unsigned ssao_sat_gl_texture(const ssao_sat_gl *gl);
+/* What the last SAT_ERR_GL_... was about; never NULL. */
+SSAO_SAT_DEF const char *ssao_sat_gl_message(const ssao_sat_gl *gl);
+SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl); /* NULL is fine */
+
+/* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader. `view` is the 12 floats of ssao_sat_gl_view as vec4 view[3]:
+
+       float ssao_sat_distance(vec4 view[3], float d)                                          depth value -> distance, 0: nothing there
+       vec3  ssao_sat_position(vec4 view[3], ivec2 pixel, float z)                             z points forward
+       vec3  ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z)        the same axes */
+SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void);
+SSAO_SAT_DEF sat_result ssao_sat_gl_view(float *view, const ssao_sat_input *input, int bottom_up);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SSAO_SAT__GL_API */
 /* ------------------------------------------------------------------------------------------------
    Stop here if you only want to use the library.
    ------------------------------------------------------------------------------------------------ */
@@ -1673,6 +1712,13 @@ static int ssao_sat__output_is_valid(const ssao_sat *s, const float *out, ptrdif
            !ssao_sat__overlap(out, *stride, bytes, in->normals, in->normal_stride, (size_t)s->width * 12, s->height);
 }
 
+static ssao_sat__fit ssao_sat__fit_of(const ssao_sat_options *o)
+{
+    ssao_sat__fit fit = ssao_sat__fits[o->method == SSAO_SAT_PLANE && o->plane_boxes == 1 ? 5 : (int)o->method];
+    fit.gain *= (float)o->gain;
+    return fit;
+}
+
 static sat_result ssao_sat__apply(ssao_sat *s, float *out, ptrdiff_t stride, float *bent, ptrdiff_t bent_stride,
                                   const ssao_sat_input *input, ssao_sat_stats *stats, int is_signed)
 {
@@ -1691,8 +1737,7 @@ static sat_result ssao_sat__apply(ssao_sat *s, float *out, ptrdiff_t stride, flo
     s->bent_stride = bent_stride;
     s->bent_wanted = bent != NULL;
     s->is_signed = is_signed;
-    s->fit = ssao_sat__fits[s->options.method == SSAO_SAT_PLANE && s->options.plane_boxes == 1 ? 5 : (int)s->options.method];
-    s->fit.gain *= (float)s->options.gain;
+    s->fit = ssao_sat__fit_of(&s->options);
     s->radius = (float)s->options.radius;
     s->reach = is_signed ? s->radius : s->radius * s->fit.reach;
     s->range = s->radius * s->fit.range;
@@ -1821,3 +1866,671 @@ SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao)
 }
 #endif
 #endif /* SSAO_SAT_IMPLEMENTATION */
+
+/* ------------------------------------------------------------------------------------------------
+   OpenGL: depth range, slab edges, table by recursive doubling (Slomp 2012, 4.4), estimate, upsample
+
+   The tables of all slabs are tiles of one integer texture, so that one pass scans them all. Sums are those of the C code modulo
+   2^32, whatever the order; distances and edges are computed in the GPU's floats and may differ in the last bits.
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(SSAO_SAT_GL) && defined(SSAO_SAT_IMPLEMENTATION) && !defined(SSAO_SAT__GL_IMPLEMENTED)
+#define SSAO_SAT__GL_IMPLEMENTED
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void)
+{
+    return
+        "#ifndef SSAO_SAT_GLSL\n"
+        "#define SSAO_SAT_GLSL\n"
+        "float ssao_sat_distance(vec4 view[3], float d) {\n"
+        "    float z = d;\n"
+        "    if (isnan(d) || isinf(d)) return 0.0;\n"
+        "    if (view[1].z > 0.5) {\n"
+        "        if (view[1].z < 1.5 ? d < 0.0 || d >= 1.0 : d <= 0.0 || d > 1.0) return 0.0;\n"
+        "        z = view[1].x * d + view[1].y;\n"
+        "        if (!(z > 1e-30)) return 0.0;\n"
+        "        if (view[1].w < 0.5) z = 1.0 / z;\n"
+        "    } else if (view[2].x > 0.0 && d >= view[2].x) return 0.0;\n"
+        "    return z > 1e-18 && z < 1e18 ? z : 0.0;\n"
+        "}\n"
+        "vec3 ssao_sat_position(vec4 view[3], ivec2 pixel, float z) {\n"
+        "    return vec3((view[0].xz * (vec2(pixel) + 0.5) + view[0].yw) * (view[1].w > 0.5 ? 1.0 : z), z);\n"
+        "}\n"
+        "vec3 ssao_sat_tangent(vec4 view[3], sampler2D depth, ivec2 pixel, float z, ivec2 along) {\n"
+        "    vec3 p = ssao_sat_position(view, pixel, z), t = vec3(0.0);\n"
+        "    float nearest = 0.0;\n"
+        "    bool found = false;\n"
+        "    for (int side = -1; side <= 1; side += 2) {\n"
+        "        ivec2 q = pixel + side * along;\n"
+        "        if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, textureSize(depth, 0)))) continue;\n"
+        "        float zq = ssao_sat_distance(view, texelFetch(depth, q, 0).r);\n"
+        "        if (!(zq > 0.0)) continue;\n"
+        "        float off = abs(view[1].w > 0.5 ? zq - z : 1.0 / zq - 1.0 / z);\n"
+        "        if (found && off >= nearest) continue;\n"
+        "        found = true;\n"
+        "        nearest = off;\n"
+        "        t = (ssao_sat_position(view, q, zq) - p) * float(side);\n"
+        "    }\n"
+        "    return t;\n"
+        "}\n"
+        "vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z) {\n"
+        "    vec3 u = ssao_sat_tangent(view, depth, pixel, z, ivec2(1, 0)), v = ssao_sat_tangent(view, depth, pixel, z, ivec2(0, 1));\n"
+        "    float facing = view[1].w > 0.5 ? 1.0 : 0.0;\n"
+        "    if (dot(u, u) * dot(v, v) <= 0.0) return vec3(0.0, 0.0, -1.0);\n"
+        "    vec3 n = cross(normalize(u), normalize(v));\n"
+        "    if (!(dot(n, n) > 1e-24)) return vec3(0.0, 0.0, -1.0);\n"
+        "    n = normalize(n);\n"
+        "    facing = facing > 0.5 ? n.z : dot(n, ssao_sat_position(view, pixel, z));\n"
+        "    return facing > 0.0 ? -n : n;\n"
+        "}\n"
+        "#endif\n";
+}
+
+/* What the passes share. `work` is a pixel of the tables; size their columns and rows. */
+static const char ssao_sat__gl_common[] =
+    "uniform sampler2D depth, normals, edges;\n"
+    "uniform vec4 view[3];\n"
+    "uniform ivec2 size, picture;\n"
+    "float distance_at(ivec2 pixel) { return ssao_sat_distance(view, texelFetch(depth, min(pixel, picture - 1), 0).r); }\n"
+    "vec3 normal_at(ivec2 pixel, float z) {\n"
+    "#if NORMALS\n"
+    "    vec3 n = texelFetch(normals, pixel, 0).xyz * vec3(1.0, 1.0, -1.0);\n"
+    "    float square = dot(n, n);\n"
+    "    if (!isnan(square) && !isinf(square) && square > 1e-20) return n / sqrt(square);\n"
+    "#endif\n"
+    "    return ssao_sat_depth_normal(view, depth, pixel, z);\n"
+    "}\n"
+    "vec2 ray(vec2 work) { return view[0].xz * (work * float(STEP) + 0.5) + view[0].yw; }\n" /* the same in orthographic views */
+    "float pixels() { return 1.0 / (abs(view[0].x) * float(STEP)); }\n"
+    "float aspect() { return abs(view[0].x / view[0].z); }\n"
+    "bool orthographic() { return view[1].w > 0.5; }\n";
+
+/* Nearest and farthest distance of 16 x 16 pixels. */
+static const char ssao_sat__gl_range[] =
+    "uniform sampler2D finer;\n"
+    "uniform ivec2 fine;\n"
+    "out vec4 result;\n"
+    "void main() {\n"
+    "    ivec2 low = 16 * ivec2(gl_FragCoord.xy), high = min(low + 16, fine);\n"
+    "    vec2 r = vec2(1e30, 0.0);\n"
+    "    for (int y = low.y; y < high.y; y++)\n"
+    "        for (int x = low.x; x < high.x; x++) {\n"
+    "#if FIRST\n"
+    "            float z = distance_at(STEP * ivec2(x, y));\n"
+    "            if (z > 0.0) r = vec2(min(r.x, z), max(r.y, z));\n"
+    "#else\n"
+    "            vec2 v = texelFetch(finer, ivec2(x, y), 0).xy;\n"
+    "            r = vec2(min(r.x, v.x), max(r.y, v.y));\n"
+    "#endif\n"
+    "        }\n"
+    "    result = vec4(r, 0.0, 0.0);\n"
+    "}\n";
+
+/* Texel k: edge k, and low value and quantum of slab k; the number of slabs. The same cut as in C. */
+static const char ssao_sat__gl_edges[] =
+    "uniform sampler2D finer;\n"
+    "uniform vec4 region;\n" /* radius, reach, limit, bits of a box: 0 a cell, 1 the region */
+    "out vec4 result;\n"
+    "float scaled(float z) { return orthographic() ? z : log(z); }\n"
+    "float cut(int k, int slabs, vec2 range) {\n"
+    "    float low = scaled(range.x), width = scaled(range.y) - low, target = float(k) / float(slabs), a = 0.0, b = 1.0;\n"
+    "    if (k <= 0) return range.x;\n"
+    "    if (k >= slabs) return range.y;\n"
+    "    for (int i = 0; i < 16; i++) {\n"
+    "        float t = 0.5 * (a + b), z = orthographic() ? low + t * width : exp(low + t * width);\n"
+    "        float below = 0.0, all = 0.0;\n"
+    "        for (int j = 0; j < 1024; j++) {\n"
+    "            float s = distance_at(STEP * ((2 * ivec2(j % 32, j / 32) + 1) * size / 64));\n"
+    "            all += float(s > 0.0);\n"
+    "            below += float(s > 0.0 && s < z);\n"
+    "        }\n"
+    "        if (0.5 * t + 0.5 * (all > 0.0 ? below / all : t) < target) a = t; else b = t;\n"
+    "    }\n"
+    "    return clamp(orthographic() ? low + b * width : exp(low + b * width), range.x, range.y);\n"
+    "}\n"
+    "void main() {\n"
+    "    vec2 range = texelFetch(finer, ivec2(0), 0).xy;\n"
+    "    int k = int(gl_FragCoord.x), slabs = int(min(float(SLABS), floor((range.y - range.x) / region.x) + 1.0)), bits = 31;\n"
+    "    float largest = max(min(region.y * pixels() / (orthographic() ? 1.0 : range.x), region.z), 2.0) * max(aspect(), 1.0);\n"
+    "    float side = 2.0 * largest / (METHOD == 0 ? 3.0 : 1.0) + 2.0, first = cut(k, slabs, range), second = cut(k + 1, slabs, range);\n"
+    "    vec2 ends = vec2(0.0);\n"
+    "    while (bits > 1 && side * side * exp2(float(bits)) > 2147483648.0) bits--;\n"
+    "    bits = min(bits, 20);\n"
+    "    if (METHOD == 0) ends = orthographic() ? vec2(first, second) : vec2(1.0 / second, 1.0 / first);\n"
+    "    else if (METHOD == 1) ends.y = orthographic() ? range.y - range.x : 1.0 / range.x;\n"
+    "    else ends.y = INVERTED == 1 ? 1.0 / range.x : 1.05 * range.y;\n"
+    "    result = vec4(first, ends.x, (ends.y - ends.x) / (exp2(float(bits)) - 1.0), float(slabs));\n"
+    "}\n";
+
+/* One word or four for every pixel and slab. */
+static const char ssao_sat__gl_words[] =
+    "out uvec4 result;\n"
+    "uint level(float v, vec4 edge) { return edge.z > 0.0 ? uint(clamp((v - edge.y) / edge.z + 0.5, 0.0, 1048575.0)) : 0u; }\n"
+    "void main() {\n"
+    "    ivec2 at = ivec2(gl_FragCoord.xy), tile = at / size, work = at - tile * size;\n"
+    "    float z = distance_at(STEP * work);\n"
+    "    vec4 first = texelFetch(edges, ivec2(0), 0);\n"
+    "    result = uvec4(0u);\n"
+    "#if METHOD == 0\n"
+    "    int k = tile.y * TILES + tile.x, slab = 0, slabs = int(first.w);\n"
+    "    if (!(z > 0.0) || k >= slabs) return;\n"
+    "    for (int i = 1; i < slabs; i++) slab += int(z >= texelFetch(edges, ivec2(i, 0), 0).x);\n"
+    "    if (slab == k) result = uvec4(1u, level(orthographic() ? z : 1.0 / z, texelFetch(edges, ivec2(k, 0), 0)), uvec2(work));\n"
+    "#else\n"
+    "    float nearest = first.x, farthest = texelFetch(edges, ivec2(SLABS, 0), 0).x, v;\n"
+    "    if (METHOD == 1) v = z > 0.0 ? (orthographic() ? farthest - z : 1.0 / z) : 0.0;\n"
+    "    else if (INVERTED == 1) v = z > 0.0 ? 1.0 / z : 0.0;\n"
+    "    else v = z > 0.0 ? z : 1.05 * farthest;\n"
+    "    result.x = level(v, first);\n"
+    "#endif\n"
+    "}\n";
+
+/* Four texels `reach` apart, within the tile. */
+static const char ssao_sat__gl_scan[] =
+    "uniform usampler2D table;\n"
+    "uniform ivec2 reach, size;\n"
+    "out uvec4 result;\n"
+    "void main() {\n"
+    "    ivec2 at = ivec2(gl_FragCoord.xy), work = at - at / size * size;\n"
+    "    result = texelFetch(table, at, 0);\n"
+    "    for (int i = 1; i < 4; i++)\n"
+    "        if (all(greaterThanEqual(work, i * reach))) result += texelFetch(table, at - i * reach, 0);\n"
+    "}\n";
+
+static const char ssao_sat__gl_tone[] =
+    "uniform usampler2D table;\n"
+    "uniform vec4 fit, region, tone;\n" /* reach, range, bias, gain; radius, limit, min_pixels, pixels of a fixed region; power, power of the caller */
+    "out vec4 result;\n"
+    "float open(float occlusion, float gain) {\n"
+    "    return pow(clamp(1.0 - gain * occlusion, 0.0, 1.0), tone.x * tone.y);\n"
+    "}\n"
+    "float half_side(float z) {\n"
+    "    float r = region.w > 0.0 ? region.w / float(STEP) : fit.x * pixels() / (orthographic() ? 1.0 : z);\n"
+    "    return min(r, region.y);\n"
+    "}\n"
+    "float fade(float side) { return region.w > 0.0 ? 1.0 : clamp(side / region.z - 1.0, 0.0, 1.0); }\n";
+
+static const char ssao_sat__gl_slabs[] =
+    "uvec4 corner(ivec2 tile, int x, int y) {\n"
+    "    return x > 0 && y > 0 ? texelFetch(table, tile + ivec2(x - 1, y - 1), 0) : uvec4(0u);\n"
+    "}\n"
+    "float occluder(uvec4 sums, vec4 edge, vec3 p, vec3 n) {\n" /* of one slab in one cell, times its pixels */
+    "    vec4 s = vec4(ivec4(sums));\n"
+    "    if (s.x < 0.5) return 0.0;\n"
+    "    float mean = (edge.y * s.x + edge.z * s.y) / s.x, z = orthographic() ? mean : 1.0 / max(mean, 1e-30);\n"
+    "    vec3 d = vec3(ray(s.zw / s.x) * (orthographic() ? 1.0 : z), z) - p;\n"
+    "    float square = dot(d, d), height = dot(d, n), near = 1.0 - square / (fit.y * fit.y);\n"
+    "    if (height <= 0.0 || near <= 0.0) return 0.0;\n"
+    "    return max(height * inversesqrt(max(square, 1e-12 * fit.y * fit.y)) - fit.z, 0.0) * near * s.x;\n"
+    "}\n"
+    "float slab(int k, ivec2 x[4], vec3 p, vec3 n) {\n" /* x[t] = borders along both axes */
+    "    ivec2 tile = ivec2(k % TILES, k / TILES) * size;\n"
+    "    vec4 edge = texelFetch(edges, ivec2(k, 0), 0);\n"
+    "    uvec4 row[4];\n"
+    "    float sum = 0.0;\n"
+    "    if (corner(tile, x[3].x, x[3].y).x - corner(tile, x[0].x, x[3].y).x == corner(tile, x[3].x, x[0].y).x - corner(tile, x[0].x, x[0].y).x) return 0.0;\n"
+    "    for (int t = 0; t < 4; t++) row[t] = corner(tile, x[t].x, x[0].y);\n"
+    "    for (int j = 0; j < 3; j++) {\n"
+    "        uvec4 last = uvec4(0u);\n"
+    "        for (int t = 0; t < 4; t++) {\n"
+    "            uvec4 below = corner(tile, x[t].x, x[j + 1].y), band = below - row[t];\n"
+    "            row[t] = below;\n"
+    "            if (t > 0 && !(t == 2 && j == 1)) {\n"
+    "                int area = (x[t].x - x[t - 1].x) * (x[j + 1].y - x[j].y);\n"
+    "                if (area > 0) sum += occluder(band - last, edge, p, n) / float(area);\n"
+    "            }\n"
+    "            last = band;\n"
+    "        }\n"
+    "    }\n"
+    "    return sum;\n"
+    "}\n"
+    "void main() {\n"
+    "    ivec2 work = ivec2(gl_FragCoord.xy), x[4];\n"
+    "    float z = distance_at(STEP * work), side = half_side(z), strength = fade(side), sum = 0.0, total = 0.0, r = side;\n"
+    "    result = vec4(1.0);\n"
+    "    if (!(z > 0.0) || !(strength > 0.0)) return;\n"
+    "    vec3 n = normal_at(STEP * work, z), p = vec3(ray(vec2(work)) * (orthographic() ? 1.0 : z), z);\n"
+    "    int slabs = int(texelFetch(edges, ivec2(0), 0).w);\n"
+    "    for (int ring = 0; ring < RINGS; ring++, r /= 3.0) {\n"
+    "        ivec2 inner = max(ivec2(vec2(r, r * aspect()) / 3.0 + 0.5), 1), outer = max(ivec2(vec2(r, r * aspect()) + 0.5), inner + 1);\n"
+    "        float weight = ring == 0 ? WEIGHT0 : ring == 1 ? WEIGHT1 : WEIGHT2, part = 0.0;\n"
+    "        x[0] = max(work - outer, 0);\n"
+    "        x[1] = max(work - inner, 0);\n"
+    "        x[2] = min(work + inner + 1, size);\n"
+    "        x[3] = min(work + outer + 1, size);\n"
+    "        for (int k = 0; k < slabs; k++) {\n"
+    "            float near = texelFetch(edges, ivec2(k, 0), 0).x, far = texelFetch(edges, ivec2(k + 1, 0), 0).x;\n"
+    "            if (far < z - fit.y || near > z + fit.y) continue;\n"
+    "            part += slab(k, x, p, n);\n"
+    "        }\n"
+    "        sum += weight * part;\n"
+    "        total += 8.0 * weight;\n"
+    "    }\n"
+    "    result.r = open(sum / total, strength * fit.w);\n"
+    "}\n";
+
+static const char ssao_sat__gl_single[] =
+    "uniform vec4 published;\n" /* offset, refine threshold, depth gain, - */
+    "ivec4 box;\n" /* low and high corner of the region */
+    "uint corner(ivec2 at) { return at.x > 0 && at.y > 0 ? texelFetch(table, at - 1, 0).x : 0u; }\n"
+    "float mean(ivec4 b, vec4 edge) {\n"
+    "    uint sum = corner(b.zw) - corner(b.xw) - corner(b.zy) + corner(b.xy);\n"
+    "    return edge.y + edge.z * float(sum) / float((b.z - b.x) * (b.w - b.y));\n"
+    "}\n"
+    "float deficit(float m, float z) { return INVERTED == 1 ? (m * z - 1.0) * z : z - m; }\n";
+
+/* Eq 5.4 over four children. GLSL has no recursion: the text is there once for each level, under two names. */
+static const char ssao_sat__gl_refine[] =
+    "float NAME(ivec4 b, float z, vec4 edge) {\n"
+    "    float parent_mean = mean(b, edge), parent = deficit(parent_mean, z), sum = 0.0, weight = 0.0;\n"
+    "    ivec2 x[3];\n"
+    "    x[0] = b.xy; x[1] = (b.xy + b.zw) / 2; x[2] = b.zw;\n"
+    "    if (LEVEL >= LEVELS || abs(parent) >= published.y * z || any(lessThan(b.zw - b.xy, ivec2(2)))) return parent;\n"
+    "    for (int i = 0; i < 4; i++) {\n"
+    "        int u = i % 2, v = i / 2;\n"
+    "        ivec4 c = ivec4(x[u].x, x[v].y, x[u + 1].x, x[v + 1].y);\n"
+    "        float m = mean(c, edge), child = deficit(m, z), area = float((c.z - c.x) * (c.w - c.y));\n"
+    "        if (!(PRINTED == 1 ? m > parent_mean : child > parent)) continue;\n"
+    "        CHILD\n"
+    "        sum += area * child;\n"
+    "        weight += area;\n"
+    "    }\n"
+    "    return weight > 0.0 ? sum / weight : parent;\n"
+    "}\n";
+
+static const char ssao_sat__gl_single_main[] =
+    "float over_plane(vec3 n, vec2 at, float z, vec2 r, vec4 edge, float farthest) {\n"
+    "    vec2 g;\n"
+    "    float own, height, sum = 0.0;\n"
+    "    ivec2 x[3];\n"
+    "    if (orthographic()) {\n"
+    "        float facing = min(n.z, -1e-3);\n"
+    "        g = n.xy / facing * view[0].xz * float(STEP);\n"
+    "        own = farthest - z;\n"
+    "        height = -facing / region.x;\n"
+    "    } else {\n"
+    "        float facing = min(dot(n.xy, r) + n.z, -1e-3);\n"
+    "        g = n.xy * view[0].xz * float(STEP) / (facing * z);\n"
+    "        own = 1.0 / z;\n"
+    "        height = -facing * z * z / region.x;\n"
+    "    }\n"
+    "    x[0] = box.xy; x[1] = BOXES == 2 ? (box.xy + box.zw) / 2 : box.zw; x[2] = box.zw;\n"
+    "    for (int j = 0; j < BOXES; j++)\n"
+    "        for (int i = 0; i < BOXES; i++) {\n"
+    "            ivec4 c = ivec4(x[i].x, x[j].y, x[i + 1].x, x[j + 1].y);\n"
+    "            if (c.z <= c.x || c.w <= c.y) continue;\n"
+    "            float h = (mean(c, edge) - own - dot(g, 0.5 * vec2(c.xy + c.zw) - at)) * height;\n"
+    "            if (h > 0.0) sum += h / (1.0 + fit.y * h * h);\n"
+    "        }\n"
+    "    return sum / float(BOXES * BOXES);\n"
+    "}\n"
+    "void main() {\n"
+    "    ivec2 work = ivec2(gl_FragCoord.xy);\n"
+    "    float z = distance_at(STEP * work), side = half_side(z), strength = fade(side), gain = 1.0, occlusion;\n"
+    "    vec4 edge = texelFetch(edges, ivec2(0), 0);\n"
+    "    float farthest = texelFetch(edges, ivec2(SLABS, 0), 0).x;\n"
+    "    vec2 c = vec2(work) + 0.5, half_box = vec2(side, side * aspect()), r = orthographic() ? vec2(0.0) : ray(vec2(work));\n"
+    "    result = vec4(1.0);\n"
+    "    if (!(z > 0.0) || !(strength > 0.0)) return;\n"
+    "    vec3 n = normal_at(STEP * work, z);\n"
+    "    vec2 shift = METHOD == 2 ? vec2(0.0) : n.xy - (METHOD == 1 || PRINTED == 1 ? vec2(0.0) : n.z * r);\n"
+    "    if (METHOD != 1) shift *= published.x / max(length(shift), 1.0);\n"
+    "    c += shift * sign(view[0].xz) * half_box;\n"
+    "    box.xy = clamp(ivec2(floor(c - half_box + 0.5)), ivec2(0), size - 1);\n"
+    "    box.zw = clamp(ivec2(floor(c + half_box + 0.5)), box.xy + 1, size);\n"
+    "    if (METHOD == 1) occlusion = over_plane(n, vec2(work) + 0.5, z, r, edge, farthest);\n"
+    "    else {\n"
+    "        occlusion = METHOD == 4 ? refine_all(box, z, edge) : deficit(mean(box, edge), z);\n"
+    "        if (farthest > edge.x) gain += published.z * (z - edge.x) / (farthest - edge.x);\n"
+    "        occlusion = max(occlusion, 0.0) * gain / region.x;\n"
+    "    }\n"
+    "    result.r = open(occlusion, strength * fit.w);\n"
+    "}\n";
+
+/* To the picture: the 3 x 3 table pixels around, by distance to the tangent plane and angle between normals. */
+static const char ssao_sat__gl_upsample[] =
+    "uniform sampler2D coarse;\n"
+    "out vec4 result;\n"
+    "void main() {\n"
+    "    ivec2 at = ivec2(gl_FragCoord.xy);\n"
+    "    float z = distance_at(at), sum = 0.0, total = 0.0;\n"
+    "    result = vec4(1.0);\n"
+    "    if (!(z > 0.0)) return;\n"
+    "#if STEP == 1\n"
+    "    result.r = texelFetch(coarse, at, 0).r;\n"
+    "#else\n"
+    "    vec3 n = normal_at(at, z), p = ssao_sat_position(view, at, z);\n"
+    "    for (int j = -1; j <= 1; j++)\n"
+    "        for (int i = -1; i <= 1; i++) {\n"
+    "            ivec2 t = at / 2 + ivec2(i, j), off = 2 * t - at;\n"
+    "            if (any(lessThan(t, ivec2(0))) || any(greaterThanEqual(t, size))) continue;\n"
+    "            float zt = distance_at(2 * t), alike;\n"
+    "            if (!(zt > 0.0)) continue;\n"
+    "            alike = max(dot(n, normal_at(2 * t, zt)), 0.0);\n"
+    "            float plane = max(0.0, 1.0 - abs(dot(n, ssao_sat_position(view, 2 * t, zt) - p)) * SHARPNESS / z);\n"
+    "            float weight = (plane * alike * alike * alike * alike + 1e-4) / (1.0 + float(off.x * off.x + off.y * off.y));\n"
+    "            total += weight;\n"
+    "            sum += weight * texelFetch(coarse, t, 0).r;\n"
+    "        }\n"
+    "    if (total > 0.0) result.r = sum / total;\n"
+    "#endif\n"
+    "}\n";
+
+enum { SSAO_SAT__GL_RANGE, SSAO_SAT__GL_RANGE_FIRST, SSAO_SAT__GL_EDGES, SSAO_SAT__GL_WORDS, SSAO_SAT__GL_SCAN, SSAO_SAT__GL_ESTIMATE,
+       SSAO_SAT__GL_UPSAMPLE, SSAO_SAT__GL_PROGRAMS, SSAO_SAT__GL_LEVELS = 5 };
+
+typedef struct ssao_sat__gl_target { unsigned texture, framebuffer; int width, height; } ssao_sat__gl_target;
+
+struct ssao_sat_gl {
+    sat__gl gl;
+    ssao_sat_options options;
+    int width, height, step, columns, rows, tiles, levels, normals; /* normals: as the programs were built, -1 not yet */
+    unsigned programs[SSAO_SAT__GL_PROGRAMS];
+    ssao_sat__gl_target range[SSAO_SAT__GL_LEVELS], edges, table[2], open, out;
+    ssao_sat__camera camera;
+    ssao_sat__fit fit;
+    float view[12], limit;
+};
+
+static void ssao_sat__gl_pack_view(float *view, const ssao_sat__camera *c, const ssao_sat_input *in)
+{
+    int i;
+    for (i = 0; i < 4; i++) view[i] = (float)c->full[i];
+    view[4] = (float)c->depth_a;
+    view[5] = (float)c->depth_b;
+    view[6] = (float)(int)in->depth_kind;
+    view[7] = (float)c->orthographic;
+    view[8] = in->sky;
+    view[9] = view[10] = view[11] = 0;
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_gl_view(float *view, const ssao_sat_input *input, int bottom_up)
+{
+    ssao_sat__camera camera;
+    if (!view || !input || input->width < 1 || input->height < 1 || (unsigned)input->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED ||
+        !ssao_sat__read_camera(&camera, input, 1, bottom_up)) return SAT_ERR_ARGUMENT;
+    ssao_sat__gl_pack_view(view, &camera, input);
+    return SAT_OK;
+}
+
+/* Programs depend on whether there are normals; the rest is fixed at creation. */
+static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *const *fragment, int normals)
+{
+    const ssao_sat_options *o = &g->options;
+    sat__gl_shaders shaders;
+    const char *library[2];
+    library[0] = which == SSAO_SAT__GL_SCAN ? "" : ssao_sat_gl_glsl();
+    library[1] = NULL;
+    memset(&shaders, 0, sizeof shaders);
+    shaders.name = "ssao_sat";
+    shaders.library = library;
+    shaders.fragment = fragment;
+    sat__gl_define(&g->gl, "NORMALS", normals);
+    sat__gl_define(&g->gl, "STEP", g->step);
+    sat__gl_define(&g->gl, "SLABS", o->slabs);
+    sat__gl_define(&g->gl, "RINGS", o->scales);
+    sat__gl_define(&g->gl, "TILES", g->tiles);
+    sat__gl_define(&g->gl, "METHOD", (int)o->method);
+    sat__gl_define(&g->gl, "INVERTED", o->inverted_depth != 0);
+    sat__gl_define(&g->gl, "PRINTED", o->as_printed != 0);
+    sat__gl_define(&g->gl, "LEVELS", o->refine_levels);
+    sat__gl_define(&g->gl, "BOXES", o->plane_boxes);
+    sat__gl_define(&g->gl, "FIRST", which == SSAO_SAT__GL_RANGE_FIRST);
+    sat__gl_define_float(&g->gl, "SHARPNESS", SSAO_SAT__SHARPNESS);
+    sat__gl_define_float(&g->gl, "WEIGHT0", ssao_sat__ring_weights[0]);
+    sat__gl_define_float(&g->gl, "WEIGHT1", ssao_sat__ring_weights[1]);
+    sat__gl_define_float(&g->gl, "WEIGHT2", ssao_sat__ring_weights[2]);
+    return sat__gl_build(&g->gl, &g->programs[which], &shaders);
+}
+
+static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g, int normals)
+{
+    static const char last[] = "#define NAME refine_last\n#define CHILD\n#define LEVEL 1\n";
+    static const char first[] = "#undef NAME\n#undef CHILD\n#undef LEVEL\n#define NAME refine_all\n#define LEVEL 0\n"
+                                "#define CHILD child = refine_last(c, z, edge);\n";
+    const char *const single[] = {ssao_sat__gl_common, ssao_sat__gl_tone, ssao_sat__gl_single, last, ssao_sat__gl_refine, first, ssao_sat__gl_refine,
+                                  ssao_sat__gl_single_main, NULL};
+    const char *const text[SSAO_SAT__GL_PROGRAMS][4] = {
+        {ssao_sat__gl_common, ssao_sat__gl_range, NULL}, {ssao_sat__gl_common, ssao_sat__gl_range, NULL},
+        {ssao_sat__gl_common, ssao_sat__gl_edges, NULL}, {ssao_sat__gl_common, ssao_sat__gl_words, NULL},
+        {ssao_sat__gl_scan, NULL}, {ssao_sat__gl_common, ssao_sat__gl_tone, ssao_sat__gl_slabs, NULL},
+        {ssao_sat__gl_common, ssao_sat__gl_upsample, NULL}};
+    sat_result result = SAT_OK;
+    int i;
+    for (i = 0; i < SSAO_SAT__GL_PROGRAMS && result == SAT_OK; i++) {
+        if (g->programs[i]) g->gl.DeleteProgram(g->programs[i]);
+        g->programs[i] = 0;
+        result = ssao_sat__gl_program(g, i, i == SSAO_SAT__GL_ESTIMATE && g->options.method != SSAO_SAT_SLABS ? single : text[i], normals);
+    }
+    g->normals = result == SAT_OK ? normals : -1;
+    return result;
+}
+/* A texture one can draw into. */
+static sat_result ssao_sat__gl_make_target(ssao_sat_gl *g, ssao_sat__gl_target *t, unsigned internal, int width, int height)
+{
+    sat_result result = sat__gl_texture(&g->gl, &t->texture, internal, width, height, NULL);
+    t->width = width;
+    t->height = height;
+    return result == SAT_OK ? sat__gl_framebuffer(&g->gl, &t->framebuffer, &t->texture, 1, 0) : result;
+}
+
+static sat_result ssao_sat__gl_make_targets(ssao_sat_gl *g)
+{
+    int w = g->columns, h = g->rows, i, slabs = g->options.method == SSAO_SAT_SLABS;
+    int tile_rows = slabs ? (g->options.slabs + g->tiles - 1) / g->tiles : 1;
+    sat_result result = SAT_OK;
+    for (g->levels = 0; result == SAT_OK && (g->levels == 0 || w > 1 || h > 1); g->levels++) {
+        w = (w + 15) / 16;
+        h = (h + 15) / 16;
+        result = ssao_sat__gl_make_target(g, &g->range[g->levels], SAT__GL_RG32F, w, h);
+    }
+    if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->edges, SAT__GL_RGBA32F, g->options.slabs + 1, 1);
+    for (i = 0; i < 2 && result == SAT_OK; i++)
+        result = ssao_sat__gl_make_target(g, &g->table[i], slabs ? SAT__GL_RGBA32UI : SAT__GL_R32UI, g->columns * g->tiles, g->rows * tile_rows);
+    if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->open, SAT__GL_R32F, g->columns, g->rows);
+    if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->out, SAT__GL_R32F, g->width, g->height);
+    return result;
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *get_proc, int width, int height, const ssao_sat_options *options)
+{
+    ssao_sat_options o = options ? *options : ssao_sat_defaults();
+    sat_allocator allocator;
+    sat__gl_state state;
+    ssao_sat_gl *g;
+    sat_result result;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (width < 1 || height < 1 || width > 32768 || height > 32768 || !ssao_sat__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
+    g = (ssao_sat_gl *)sat__alloc(&allocator, sizeof *g);
+    if (!g) return SAT_ERR_MEMORY;
+    memset(g, 0, sizeof *g);
+    *out = g;
+    g->options = o;
+    g->options.allocator = allocator;
+    g->width = width;
+    g->height = height;
+    g->step = o.half_resolution ? 2 : 1;
+    g->columns = (width + g->step - 1) / g->step;
+    g->rows = (height + g->step - 1) / g->step;
+    g->tiles = o.method != SSAO_SAT_SLABS ? 1 : o.slabs > 4 ? 4 : o.slabs > 1 ? 2 : 1;
+    g->normals = -1;
+    result = sat__gl_open(&g->gl, get_proc);
+    if (result != SAT_OK) return result;
+    sat__gl_begin(&g->gl, &state, 5);
+    result = ssao_sat__gl_make_targets(g);
+    if (result == SAT_OK) result = ssao_sat__gl_build_programs(g, 1);
+    sat__gl_end(&g->gl, &state);
+    return result;
+}
+
+SSAO_SAT_DEF const char *ssao_sat_gl_message(const ssao_sat_gl *gl) { return gl ? gl->gl.message : ""; }
+SSAO_SAT_DEF unsigned ssao_sat_gl_texture(const ssao_sat_gl *gl) { return gl ? gl->out.texture : 0; }
+
+static void ssao_sat__gl_drop(ssao_sat_gl *g, ssao_sat__gl_target *t)
+{
+    if (t->framebuffer) g->gl.DeleteFramebuffers(1, &t->framebuffer);
+    if (t->texture) g->gl.DeleteTextures(1, &t->texture);
+}
+
+SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl)
+{
+    sat_allocator allocator;
+    int i;
+    if (!gl) return;
+    if (gl->gl.vertex_array) {
+        for (i = 0; i < SSAO_SAT__GL_PROGRAMS; i++)
+            if (gl->programs[i]) gl->gl.DeleteProgram(gl->programs[i]);
+        for (i = 0; i < SSAO_SAT__GL_LEVELS; i++) ssao_sat__gl_drop(gl, &gl->range[i]);
+        for (i = 0; i < 2; i++) ssao_sat__gl_drop(gl, &gl->table[i]);
+        ssao_sat__gl_drop(gl, &gl->edges);
+        ssao_sat__gl_drop(gl, &gl->open);
+        ssao_sat__gl_drop(gl, &gl->out);
+        sat__gl_close(&gl->gl);
+    }
+    allocator = gl->options.allocator;
+    sat__release(&allocator, gl, sizeof *gl);
+}
+
+/* Starts a pass with the uniforms that most of them share. */
+static unsigned ssao_sat__gl_pass(ssao_sat_gl *g, int which, const ssao_sat__gl_target *to, unsigned depth, unsigned normals)
+{
+    unsigned program = g->programs[which];
+    sat__gl *gl = &g->gl;
+    sat__gl_pass(gl, program, to->framebuffer, to->width, to->height);
+    gl->Uniform4fv(gl->GetUniformLocation(program, "view"), 3, g->view);
+    sat__gl_set_int2(gl, program, "size", g->columns, g->rows);
+    sat__gl_set_int2(gl, program, "picture", g->width, g->height);
+    sat__gl_set_texture(gl, program, "depth", 0, depth);
+    if (normals) sat__gl_set_texture(gl, program, "normals", 1, normals);
+    if (which >= SSAO_SAT__GL_WORDS) sat__gl_set_texture(gl, program, "edges", 2, g->edges.texture);
+    return program;
+}
+
+/* Depth range, then the edges of the slabs. */
+static void ssao_sat__gl_find_edges(ssao_sat_gl *g, unsigned depth)
+{
+    sat__gl *gl = &g->gl;
+    float region[4];
+    unsigned program;
+    int i;
+    for (i = 0; i < g->levels; i++) {
+        program = ssao_sat__gl_pass(g, i ? SSAO_SAT__GL_RANGE : SSAO_SAT__GL_RANGE_FIRST, &g->range[i], depth, 0);
+        sat__gl_set_int2(gl, program, "fine", i ? g->range[i - 1].width : g->columns, i ? g->range[i - 1].height : g->rows);
+        if (i) sat__gl_set_texture(gl, program, "finer", 3, g->range[i - 1].texture);
+        sat__gl_draw(gl);
+    }
+    program = ssao_sat__gl_pass(g, SSAO_SAT__GL_EDGES, &g->edges, depth, 0);
+    region[0] = (float)g->options.radius;
+    region[1] = g->options.region_pixels > 0 ? 1e30f : (float)g->options.radius * g->fit.reach;
+    region[2] = g->options.region_pixels > 0 ? (float)g->options.region_pixels / (float)g->step : g->limit;
+    region[3] = 0;
+    sat__gl_set_float4(gl, program, "region", region);
+    sat__gl_set_texture(gl, program, "finer", 3, g->range[g->levels - 1].texture);
+    sat__gl_draw(gl);
+}
+
+/* Words of all slabs, and their sums along x, then y; the index of the table that holds them. */
+static int ssao_sat__gl_sum(ssao_sat_gl *g, unsigned depth)
+{
+    sat__gl *gl = &g->gl;
+    unsigned program;
+    int axis, reach, now = 0;
+    ssao_sat__gl_pass(g, SSAO_SAT__GL_WORDS, &g->table[0], depth, 0);
+    sat__gl_draw(gl);
+    for (axis = 0; axis < 2; axis++)
+        for (reach = 1; reach < (axis ? g->rows : g->columns); reach *= 4, now = !now) {
+            program = ssao_sat__gl_pass(g, SSAO_SAT__GL_SCAN, &g->table[!now], depth, 0);
+            sat__gl_set_texture(gl, program, "table", 3, g->table[now].texture);
+            sat__gl_set_int2(gl, program, "reach", axis ? 0 : reach, axis ? reach : 0);
+            sat__gl_draw(gl);
+        }
+    return now;
+}
+
+static void ssao_sat__gl_estimate(ssao_sat_gl *g, unsigned depth, unsigned normals, int table)
+{
+    sat__gl *gl = &g->gl;
+    const ssao_sat_options *o = &g->options;
+    unsigned program = ssao_sat__gl_pass(g, SSAO_SAT__GL_ESTIMATE, &g->open, depth, normals);
+    float v[4];
+    v[0] = (float)o->radius * g->fit.reach;
+    v[1] = o->method == SSAO_SAT_SLABS ? (float)o->radius * g->fit.range : g->fit.range;
+    v[2] = g->fit.bias;
+    v[3] = g->fit.gain;
+    sat__gl_set_float4(gl, program, "fit", v);
+    v[0] = (float)o->radius;
+    v[1] = g->limit;
+    v[2] = (float)o->min_pixels;
+    v[3] = (float)o->region_pixels;
+    sat__gl_set_float4(gl, program, "region", v);
+    v[0] = g->fit.power;
+    v[1] = (float)o->power;
+    sat__gl_set_float4(gl, program, "tone", v);
+    v[0] = (float)(o->method == SSAO_SAT_MINIMALIST ? 0 : o->normal_offset);
+    v[1] = (float)o->refine_threshold;
+    v[2] = (float)o->depth_gain;
+    sat__gl_set_float4(gl, program, "published", v);
+    sat__gl_set_texture(gl, program, "table", 3, g->table[table].texture);
+    sat__gl_draw(gl);
+}
+
+static sat_result ssao_sat__gl_run(ssao_sat_gl *g, unsigned out, unsigned depth, unsigned normals)
+{
+    sat__gl *gl = &g->gl;
+    ssao_sat__gl_target target = g->out;
+    sat_result result = SAT_OK;
+    unsigned program;
+    int table;
+    if (g->normals != (normals != 0)) result = ssao_sat__gl_build_programs(g, normals != 0);
+    if (result == SAT_OK && out) {
+        result = sat__gl_attach(gl, gl->framebuffer, &out, 1, 0);
+        target.framebuffer = gl->framebuffer;
+    }
+    if (result != SAT_OK) return result;
+    if (g->options.radius > 0 && g->fit.gain > 0) {
+        ssao_sat__gl_find_edges(g, depth);
+        table = ssao_sat__gl_sum(g, depth);
+        ssao_sat__gl_estimate(g, depth, normals, table);
+    } else {
+        static const float open[4] = {1, 1, 1, 1};
+        gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, g->open.framebuffer);
+        gl->ClearBufferfv(SAT__GL_COLOR, 0, open);
+    }
+    program = ssao_sat__gl_pass(g, SSAO_SAT__GL_UPSAMPLE, &target, depth, normals);
+    sat__gl_set_texture(gl, program, "coarse", 3, g->open.texture);
+    sat__gl_draw(gl);
+    if (out) gl->FramebufferTexture2D(SAT__GL_FRAMEBUFFER, SAT__GL_COLOR_ATTACHMENT0, SAT__GL_TEXTURE_2D, 0, 0);
+    return SAT_OK;
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigned depth, unsigned normals, const ssao_sat_input *input)
+{
+    sat__gl_state state;
+    sat_result result;
+    double side;
+    if (!gl || !input || !depth || out == depth || (out && out == normals) || gl->normals < 0) return SAT_ERR_ARGUMENT;
+    if (input->width != gl->width || input->height != gl->height) return SAT_ERR_MISMATCH;
+    if ((unsigned)input->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED || !(input->sky >= 0)) return SAT_ERR_ARGUMENT;
+    if (!ssao_sat__read_camera(&gl->camera, input, gl->step, gl->options.bottom_up)) return SAT_ERR_ARGUMENT;
+    ssao_sat__gl_pack_view(gl->view, &gl->camera, input);
+    gl->fit = ssao_sat__fit_of(&gl->options);
+    side = 1.5 * (sqrt(2147483648.0 / sat__max_int(gl->columns, gl->rows)) - 2);
+    gl->limit = (float)(gl->options.max_pixels < side ? gl->options.max_pixels : side);
+    if (gl->camera.aspect > 1) gl->limit /= gl->camera.aspect;
+    sat__gl_begin(&gl->gl, &state, 5);
+    result = ssao_sat__gl_run(gl, out, depth, normals);
+    sat__gl_end(&gl->gl, &state);
+    return result;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SSAO_SAT__GL_IMPLEMENTED */

@@ -1,0 +1,237 @@
+/* ssao_sat.h on the GPU: equal to the C code, state left alone, errors. Needs OSMesa (or a GPU, see gl_context.h); skips without. */
+
+enum { GL_WIDTH = 97, GL_HEIGHT = 71 };
+
+static gl_context test_gl;
+static sat__gl test_f;
+
+static int open_gl(void)
+{
+    static int state;
+    if (state == 0) state = gl_context_open(&test_gl, 3, 3) && sat__gl_open(&test_f, test_gl.get_proc) == SAT_OK ? 1 : -1;
+    return state > 0;
+}
+
+static unsigned upload(unsigned internal, int w, int h, const void *pixels)
+{
+    sat__gl_state state;
+    unsigned texture = 0;
+    sat__gl_begin(&test_f, &state, 1);
+    EXPECT_EQ(sat__gl_texture(&test_f, &texture, internal, w, h, pixels), SAT_OK);
+    sat__gl_end(&test_f, &state);
+    return texture;
+}
+
+static void download(float *out, unsigned texture, int w, int h)
+{
+    sat__gl_state state;
+    sat__gl_begin(&test_f, &state, 1);
+    EXPECT_EQ(sat__gl_read(&test_f, out, texture, SAT__GL_R32F, w, h), SAT_OK);
+    sat__gl_end(&test_f, &state);
+}
+
+static ref_picture small_picture(int scene, int orthographic)
+{
+    ref_scene s;
+    ref_picture p;
+    ref_open(&s, scene);
+    p = ref_draw(&s, GL_WIDTH, GL_HEIGHT, orthographic, 0, ref_make(0, 0, 0), 1);
+    ref_close(&s);
+    return p;
+}
+
+static sat_result run_c(float *out, const ssao_sat_input *in, const ssao_sat_options *o)
+{
+    ssao_sat *ao;
+    sat_result r = ssao_sat_create(&ao, in->width, in->height, o);
+    if (r != SAT_OK) return r;
+    r = ssao_sat_apply(ao, out, 0, in, NULL);
+    ssao_sat_destroy(ao);
+    return r;
+}
+
+static void compare(const ref_picture *p, ssao_sat_options o, ref_convention convention, int with_normals, double tolerance)
+{
+    static float depth[GL_WIDTH * GL_HEIGHT], a[GL_WIDTH * GL_HEIGHT], b[GL_WIDTH * GL_HEIGHT];
+    ssao_sat_input in = ref_input(p, convention, depth);
+    ssao_sat_gl *gl = NULL;
+    unsigned textures[2] = {0, 0};
+    double off;
+    if (!with_normals) in.normals = NULL;
+    else in.normals = p->normals;
+    EXPECT_EQ(run_c(a, &in, &o), SAT_OK);
+    textures[0] = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, in.depth);
+    if (with_normals) textures[1] = upload(SAT__GL_RGB32F, GL_WIDTH, GL_HEIGHT, p->normals);
+    if (EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, &o), SAT_OK)) {
+        EXPECT_EQ(ssao_sat_gl_apply(gl, 0, textures[0], textures[1], &in), SAT_OK);
+        download(b, ssao_sat_gl_texture(gl), GL_WIDTH, GL_HEIGHT);
+        off = ref_rmse(p, a, b);
+        if (!EXPECT_NEAR(off, 0, tolerance))
+            printf("    method %d, convention %d, orthographic %d, half %d\n", (int)o.method, (int)convention, p->orthographic, o.half_resolution);
+    } else printf("%s\n", ssao_sat_gl_message(gl));
+    ssao_sat_gl_destroy(gl);
+    test_f.DeleteTextures(2, textures);
+}
+
+TEST(gpu_equals_c)
+{
+    int scene, m, orthographic;
+    if (!open_gl()) SKIP(test_gl.message);
+    for (scene = 0; scene < 2; scene++)
+        for (orthographic = 0; orthographic < 2; orthographic++) {
+            ref_picture p = small_picture(scene, orthographic);
+            for (m = 0; m < 5; m++) {
+                ssao_sat_options o = ssao_sat_defaults();
+                o.method = (ssao_sat_method)m;
+                o.radius = 0.3;
+                o.half_resolution = (m + scene) % 2 == 0;
+                compare(&p, o, REF_LINEAR, 1, m == SSAO_SAT_REFINED ? 0.01 : 2e-3); /* refined: a child on its parent's edge falls to either side */
+            }
+            ref_free(&p);
+        }
+}
+
+TEST(gpu_options_and_conventions)
+{
+    ref_picture p;
+    int c;
+    if (!open_gl()) SKIP(test_gl.message);
+    p = small_picture(1, 0);
+    for (c = 0; c < REF_CONVENTIONS; c++) {
+        ssao_sat_options o = ssao_sat_defaults();
+        o.radius = 0.3;
+        compare(&p, o, (ref_convention)c, c % 2, 0.01); /* 24 bits of depth in the GPU's floats */
+        o.slabs = 5;
+        o.scales = 2;
+        o.gain = 2;
+        o.power = 1.5;
+        o.max_pixels = 20;
+        o.half_resolution = 0;
+        compare(&p, o, REF_LINEAR, 1, 2e-3);
+        o.method = c % 2 ? SSAO_SAT_REFINED : SSAO_SAT_MINIMALIST;
+        o.as_printed = 1;
+        o.inverted_depth = c > 2;
+        o.depth_gain = 1;
+        o.region_pixels = 7;
+        compare(&p, o, REF_LINEAR, 1, 0.02);
+    }
+    ref_free(&p);
+}
+
+TEST(gpu_gets_its_radius_0)
+{
+    ref_picture p;
+    ssao_sat_options o = ssao_sat_defaults();
+    if (!open_gl()) SKIP(test_gl.message);
+    p = small_picture(0, 0);
+    o.radius = 0;
+    compare(&p, o, REF_LINEAR, 1, 0);
+    ref_free(&p);
+}
+
+TEST(gpu_state_is_restored)
+{
+    static float z[GL_WIDTH * GL_HEIGHT], out[GL_WIDTH * GL_HEIGHT];
+    static const unsigned names[] = {SAT__GL_CURRENT_PROGRAM, SAT__GL_VERTEX_ARRAY_BINDING, SAT__GL_DRAW_FRAMEBUFFER_BINDING, SAT__GL_READ_FRAMEBUFFER_BINDING,
+                                     SAT__GL_ACTIVE_TEXTURE, SAT__GL_TEXTURE_BINDING_2D, SAT__GL_UNPACK_ALIGNMENT, SAT__GL_DEPTH_FUNC};
+    int before[16], after[16], viewport[2][4], i, k;
+    ssao_sat_input in = ssao_sat_input_linear(z, GL_WIDTH, GL_HEIGHT, 1);
+    ssao_sat_gl *gl = NULL;
+    unsigned textures[2];
+    if (!open_gl()) SKIP(test_gl.message);
+    support_fill(z, GL_WIDTH * GL_HEIGHT, 1, 2, 1);
+    textures[0] = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, z);
+    textures[1] = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, NULL);
+    test_f.Enable(SAT__GL_BLEND);
+    test_f.Enable(SAT__GL_SCISSOR_TEST);
+    test_f.PixelStorei(SAT__GL_UNPACK_ALIGNMENT, 2);
+    test_f.Viewport(3, 4, 5, 6);
+    test_f.ActiveTexture(SAT__GL_TEXTURE0 + 2);
+    test_f.BindTexture(SAT__GL_TEXTURE_2D, textures[0]);
+    for (i = 0; i < 8; i++) test_f.GetIntegerv(names[i], &before[i]);
+    test_f.GetIntegerv(SAT__GL_VIEWPORT, viewport[0]);
+    EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, NULL), SAT_OK);
+    for (k = 0; k < 2; k++) {
+        EXPECT_EQ(ssao_sat_gl_apply(gl, k ? textures[1] : 0, textures[0], 0, &in), SAT_OK);
+        for (i = 0; i < 8; i++) {
+            test_f.GetIntegerv(names[i], &after[i]);
+            EXPECT_EQ(before[i], after[i]);
+        }
+        test_f.GetIntegerv(SAT__GL_VIEWPORT, viewport[1]);
+        EXPECT(memcmp(viewport[0], viewport[1], sizeof viewport[0]) == 0);
+        EXPECT(test_f.IsEnabled(SAT__GL_BLEND) && test_f.IsEnabled(SAT__GL_SCISSOR_TEST));
+        EXPECT_EQ(test_f.GetError(), 0);
+    }
+    test_f.Disable(SAT__GL_BLEND);
+    test_f.Disable(SAT__GL_SCISSOR_TEST);
+    download(out, textures[1], GL_WIDTH, GL_HEIGHT);
+    for (i = 0, k = 0; i < GL_WIDTH * GL_HEIGHT; i++) k += out[i] >= 0 && out[i] <= 1;
+    EXPECT_EQ(k, GL_WIDTH * GL_HEIGHT);
+    ssao_sat_gl_destroy(gl);
+    test_f.DeleteTextures(2, textures);
+}
+
+static const char *hidden;
+static sat_gl_proc hiding_get_proc(const char *name) { return hidden && strcmp(name, hidden) == 0 ? NULL : test_gl.get_proc(name); }
+
+TEST(gpu_errors_have_names)
+{
+    static float z[64];
+    ssao_sat_input in = ssao_sat_input_linear(z, 8, 8, 1), bad;
+    ssao_sat_options o = ssao_sat_defaults();
+    ssao_sat_gl *gl = NULL;
+    float view[12];
+    unsigned texture;
+    if (!open_gl()) SKIP(test_gl.message);
+    support_fill(z, 64, 1, 2, 1);
+    texture = upload(SAT__GL_R32F, 8, 8, z);
+    hidden = "glDrawArrays";
+    EXPECT_EQ(ssao_sat_gl_create(&gl, hiding_get_proc, 8, 8, NULL), SAT_ERR_GL_FUNCTION);
+    EXPECT(strstr(ssao_sat_gl_message(gl), "glDrawArrays") != NULL);
+    EXPECT_EQ(ssao_sat_gl_apply(gl, 0, texture, 0, &in), SAT_ERR_ARGUMENT);
+    ssao_sat_gl_destroy(gl);
+    hidden = NULL;
+    EXPECT_EQ(ssao_sat_gl_create(NULL, test_gl.get_proc, 8, 8, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, 0, 8, NULL), SAT_ERR_ARGUMENT);
+    o.slabs = 99;
+    EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, 8, 8, &o), SAT_ERR_ARGUMENT);
+    EXPECT(gl == NULL);
+    if (!EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, 8, 8, NULL), SAT_OK)) return;
+    EXPECT_EQ(ssao_sat_gl_apply(gl, 0, 0, 0, &in), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(ssao_sat_gl_apply(gl, texture, texture, 0, &in), SAT_ERR_ARGUMENT);
+    bad = in;
+    bad.width = 9;
+    EXPECT_EQ(ssao_sat_gl_apply(gl, 0, texture, 0, &bad), SAT_ERR_MISMATCH);
+    bad = in;
+    bad.projection[11] = 1;
+    EXPECT_EQ(ssao_sat_gl_apply(gl, 0, texture, 0, &bad), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(ssao_sat_gl_view(view, &bad, 0), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(ssao_sat_gl_view(view, &in, 0), SAT_OK);
+    ssao_sat_gl_destroy(gl);
+    ssao_sat_gl_destroy(NULL);
+    test_f.DeleteTextures(1, &texture);
+}
+
+/* The functions handed out compile in a shader of the caller. */
+TEST(gpu_functions_for_other_shaders)
+{
+    static const char *const text[] = {
+        "uniform vec4 view[3]; uniform sampler2D depth; out vec4 color;\n"
+        "void main() {\n"
+        "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+        "    float z = ssao_sat_distance(view, texelFetch(depth, p, 0).r);\n"
+        "    color = vec4(ssao_sat_position(view, p, z) + ssao_sat_depth_normal(view, depth, p, z), z);\n"
+        "}\n", NULL};
+    const char *library[2];
+    sat__gl_shaders shaders;
+    unsigned program = 0;
+    if (!open_gl()) SKIP(test_gl.message);
+    library[0] = ssao_sat_gl_glsl();
+    library[1] = NULL;
+    memset(&shaders, 0, sizeof shaders);
+    shaders.name = "caller";
+    shaders.library = library;
+    shaders.fragment = text;
+    if (!EXPECT_EQ(sat__gl_build(&test_f, &program, &shaders), SAT_OK)) puts(test_f.message);
+    test_f.DeleteProgram(program);
+}
