@@ -184,6 +184,38 @@ TONEMAP_DEF const char *tonemap_gl_glsl(void);
 extern "C" {
 #endif
 
+/* What TONEMAP_NO_... leaves out: the conditions below become constants, and the code behind them goes. */
+#ifdef TONEMAP_NO_ASHIKHMIN
+enum { TONEMAP__HAS_ASHIKHMIN = 0 };
+#else
+enum { TONEMAP__HAS_ASHIKHMIN = 1 };
+#endif
+#ifdef TONEMAP_NO_MESOPIC
+enum { TONEMAP__HAS_MESOPIC = 0 };
+#else
+enum { TONEMAP__HAS_MESOPIC = 1 };
+#endif
+#ifdef TONEMAP_NO_SELECTIVE
+enum { TONEMAP__HAS_SELECTIVE = 0 };
+#else
+enum { TONEMAP__HAS_SELECTIVE = 1 };
+#endif
+#ifdef TONEMAP_NO_SKIPPING
+enum { TONEMAP__HAS_SKIPPING = 0 };
+#else
+enum { TONEMAP__HAS_SKIPPING = 1 };
+#endif
+#ifdef TONEMAP_NO_SOFT
+enum { TONEMAP__HAS_SOFT = 0 };
+#else
+enum { TONEMAP__HAS_SOFT = 1 };
+#endif
+#ifdef TONEMAP_NO_WHITE
+enum { TONEMAP__HAS_WHITE = 0 };
+#else
+enum { TONEMAP__HAS_WHITE = 1 };
+#endif
+
 enum {
     TONEMAP__LENGTHS = 8,  /* box lengths of the photographic operator */
     TONEMAP__ASHIKHMIN = 10, /* neighbourhoods of Ashikhmin's operator; each is compared with the one of twice its size */
@@ -228,6 +260,16 @@ static inline int tonemap__in_range(double v, double low, double high)
     return sat__is_finite_double(v) && v >= low && v <= high;
 }
 
+/* Nothing is asked for that TONEMAP_NO_... left out. */
+static inline int tonemap__has_what_is_asked(const tonemap_options *o)
+{
+    if (!TONEMAP__HAS_ASHIKHMIN && (o->operation == TONEMAP_ASHIKHMIN || o->operation == TONEMAP_ASHIKHMIN_GLOBAL)) return 0;
+    if (!TONEMAP__HAS_MESOPIC && o->mesopic != TONEMAP_MESOPIC_OFF) return 0;
+    if (!TONEMAP__HAS_WHITE && !tonemap__is_infinite(o->white)) return 0;
+    return (TONEMAP__HAS_SELECTIVE || !(o->selective > 0)) && (TONEMAP__HAS_SKIPPING || !(o->tolerance_codes > 0)) &&
+           (TONEMAP__HAS_SOFT || !(o->soft > 0));
+}
+
 static inline int tonemap__options_are_valid(const tonemap_options *o)
 {
     if ((unsigned)o->operation > (unsigned)TONEMAP_LINEAR || (unsigned)o->mesopic > (unsigned)TONEMAP_MESOPIC_LOCAL) return 0;
@@ -236,7 +278,7 @@ static inline int tonemap__options_are_valid(const tonemap_options *o)
     if (o->scales < 1 || o->scales > TONEMAP__LENGTHS || !tonemap__in_range(o->soft, 0, 1)) return 0;
     if (!tonemap__in_range(o->cd_per_unit, 0, 1e30) || !tonemap__in_range(o->lux_per_cd, 0, 1e6)) return 0;
     if (!tonemap__in_range(o->tolerance_codes, 0, 255) || !tonemap__in_range(o->selective, 0, 1e30)) return 0;
-    return tonemap__in_range(o->adapt_seconds, 0, 1e30) && sat__threads_are_valid(&o->threads);
+    return tonemap__in_range(o->adapt_seconds, 0, 1e30) && sat__threads_are_valid(&o->threads) && tonemap__has_what_is_asked(o);
 }
 
 /* ---- the object */
@@ -486,7 +528,7 @@ typedef struct tonemap__job {
 
 static inline int tonemap__skips(const tonemap_options *o)
 {
-    return o->tolerance_codes > 0 && o->operation == TONEMAP_PHOTOGRAPHIC_LOCAL;
+    return TONEMAP__HAS_SKIPPING && o->tolerance_codes > 0 && o->operation == TONEMAP_PHOTOGRAPHIC_LOCAL;
 }
 
 /* The largest component of each tile of a row of tiles. */
@@ -557,7 +599,7 @@ static inline double tonemap__estimated_white(double low, double high)
 
 static inline int tonemap__is_ashikhmin(const tonemap_options *o)
 {
-    return o->operation == TONEMAP_ASHIKHMIN || o->operation == TONEMAP_ASHIKHMIN_GLOBAL;
+    return TONEMAP__HAS_ASHIKHMIN && (o->operation == TONEMAP_ASHIKHMIN || o->operation == TONEMAP_ASHIKHMIN_GLOBAL);
 }
 
 static inline int tonemap__needs_histogram(const tonemap_options *o, const tonemap_stats *stats)
@@ -694,7 +736,7 @@ static inline void tonemap__prepare_frame(tonemap *map)
     f->scale = (float)(key * exp2(-average));
     f->cap = TONEMAP__LOCAL_CAP;
     f->quantum = TONEMAP__QUANTUM;
-    f->inverse_white2 = tonemap__is_infinite(white) ? 0 : (float)(1 / (white * white));
+    f->inverse_white2 = !TONEMAP__HAS_WHITE || tonemap__is_infinite(white) ? 0 : (float)(1 / (white * white));
     f->epsilon = (float)o->epsilon;
     f->soft = (float)o->soft;
     if (o->operation == TONEMAP_LINEAR && !tonemap__is_infinite(white)) f->curve_factor = (float)(1 / white);
@@ -710,7 +752,7 @@ static inline void tonemap__prepare_frame(tonemap *map)
         if (!tonemap__has_range(low, high)) f->curve_low = f->curve_factor = 0; /* a flat picture has no range: it gets the key */
     }
     f->lux = (float)(cd * o->lux_per_cd / (double)f->scale);
-    f->rho = o->mesopic == TONEMAP_MESOPIC_UNIFORM ? tonemap__rho((float)(map->stats.mean * cd * o->lux_per_cd)) : 1;
+    f->rho = TONEMAP__HAS_MESOPIC && o->mesopic == TONEMAP_MESOPIC_UNIFORM ? tonemap__rho((float)(map->stats.mean * cd * o->lux_per_cd)) : 1;
     tonemap__frame_boxes(f, o, key);
     map->stats.adapted = exp2(average);
     map->stats.key = key;
@@ -1312,12 +1354,12 @@ static inline void tonemap__search(tonemap__worker *w, const float *luminance, c
     size_t *scale = w->stats.scale;
 #ifdef SAT__VECTOR
     scale[0] += (size_t)(end - x);
-    if (ashikhmin) tonemap__search_ashikhmin_vector(w->local, luminance, window, f, scale, x, end);
-    else if (f->soft > 0) tonemap__search_soft_vector(w->local, luminance, window, f, scale, x, end);
+    if (TONEMAP__HAS_ASHIKHMIN && ashikhmin) tonemap__search_ashikhmin_vector(w->local, luminance, window, f, scale, x, end);
+    else if (TONEMAP__HAS_SOFT && f->soft > 0) tonemap__search_soft_vector(w->local, luminance, window, f, scale, x, end);
     else tonemap__search_vector(w->local, luminance, window, f, scale, x, end);
 #else
-    if (ashikhmin) tonemap__search_ashikhmin_plain(w->local, luminance, window, f, scale, x, end);
-    else if (f->soft > 0) tonemap__search_soft_plain(w->local, luminance, window, f, scale, x, end);
+    if (TONEMAP__HAS_ASHIKHMIN && ashikhmin) tonemap__search_ashikhmin_plain(w->local, luminance, window, f, scale, x, end);
+    else if (TONEMAP__HAS_SOFT && f->soft > 0) tonemap__search_soft_plain(w->local, luminance, window, f, scale, x, end);
     else tonemap__search_plain(w->local, luminance, window, f, scale, x, end);
 #endif
     w->stats.searched += (size_t)(end - x);
@@ -1436,8 +1478,8 @@ static inline void tonemap__local_row(tonemap *map, tonemap__worker *w, int y)
         return;
     }
     tonemap__open_window(&window, map, w, y);
-    if (map->skipping) tonemap__search_tiles(map, w, luminance, &window, y);
-    else if (o->selective > 0) tonemap__search_edges(map, w, luminance, &window, y);
+    if (TONEMAP__HAS_SKIPPING && map->skipping) tonemap__search_tiles(map, w, luminance, &window, y);
+    else if (TONEMAP__HAS_SELECTIVE && o->selective > 0) tonemap__search_edges(map, w, luminance, &window, y);
     else tonemap__search(w, luminance, &window, &map->frame, o->operation == TONEMAP_ASHIKHMIN, 0, map->width);
 }
 
@@ -1631,7 +1673,7 @@ static inline void tonemap__shade_plain(tonemap__planes out, const float *pixels
         v[0] = p[0];
         v[1] = p[channels > 1 ? 1 : 0];
         v[2] = p[channels > 1 ? 2 : 0];
-        if (rho) tonemap__shift_red_plain(v, v + 1, v + 2, luminance[x + i], rho[x + i]);
+        if (TONEMAP__HAS_MESOPIC && rho) tonemap__shift_red_plain(v, v + 1, v + 2, luminance[x + i], rho[x + i]);
         for (c = 0; c < 3; c++) {
             float d = v[c] * gain[x + i];
             over |= d > 1;
@@ -1653,7 +1695,7 @@ static inline int tonemap__shade_vector(tonemap__planes out, const float *pixels
     for (i = 0; i + 4 <= n; i += 4) {
         sat__f32x4 r, g, b, factor = sat__f32x4_load(gain + x + i);
         tonemap__load_pixels(pixels + (size_t)(x + i) * (size_t)channels, channels, &r, &g, &b);
-        if (rho) tonemap__shift_red4(&r, &g, &b, sat__f32x4_load(luminance + x + i), sat__f32x4_load(rho + x + i));
+        if (TONEMAP__HAS_MESOPIC && rho) tonemap__shift_red4(&r, &g, &b, sat__f32x4_load(luminance + x + i), sat__f32x4_load(rho + x + i));
         r = sat__f32x4_max(sat__f32x4_mul(r, factor), least);
         g = sat__f32x4_max(sat__f32x4_mul(g, factor), least);
         b = sat__f32x4_max(sat__f32x4_mul(b, factor), least);
@@ -1746,9 +1788,9 @@ static void tonemap__map_bands(int begin, int end, int worker, void *context)
     tonemap__worker *w = &map->worker[worker];
     const tonemap__frame *f = &map->frame;
     int y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height), next = sat__max_int(y - f->reach, 0), x;
-    int mesopic = map->options.mesopic != TONEMAP_MESOPIC_OFF && job->hdr->channels > 1;
-    if (map->options.mesopic == TONEMAP_MESOPIC_UNIFORM) {
-        mesopic = mesopic && f->rho < 1;
+    int mesopic = TONEMAP__HAS_MESOPIC && map->options.mesopic != TONEMAP_MESOPIC_OFF && job->hdr->channels > 1;
+    if (mesopic && map->options.mesopic == TONEMAP_MESOPIC_UNIFORM) {
+        mesopic = f->rho < 1;
         for (x = 0; x < map->width; x++) w->rho[x] = f->rho;
     }
     if (f->reach > 0) memset(tonemap__ring_row(map, w, next), 0, (size_t)map->ring_row * sizeof(uint32_t));
