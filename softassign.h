@@ -118,6 +118,7 @@ typedef struct softassign_options {
     double alpha;              /* PUBLISHED: bias of eq 3.9, times the largest cost */
     double outlier;            /* PUBLISHED: element of the outlier row, >= 0 */
     int outlier_evolves;       /* PUBLISHED: 0 constant in the Sinkhorn loop, as printed; 1 normalised as a row of M */
+    int gold;                  /* PUBLISHED: 0; 1: M = exp(-(D - alpha) / t), the update of Gold et al. 1997 */
     int double_precision;      /* PUBLISHED: 0 float, exponents clamped to +-70; 1 double, +-650 */
     int gather;                /* 4; 2..64: values a reduction step sums */
     int ants;                  /* 30 */
@@ -1696,6 +1697,8 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
    Greedy search (Slomp 2012, section 3.4.2), and moves and swaps while they help
    ------------------------------------------------------------------------------------------------ */
 
+#if !defined(SOFTASSIGN_NO_HEURISTICS) || !defined(SOFTASSIGN_NO_MATRIX)
+
 /* The nearest slot with room, through lists that see full slots as infinitely dear. */
 static int softassign__nearest_free(softassign *s, int row, float *cost)
 {
@@ -1720,6 +1723,10 @@ static void softassign__greedy_take(softassign *s, int row, int slot, float cost
     if (!softassign__is_free(s, slot)) softassign__set_price(s, slot, SOFTASSIGN__FULL_PRICE);
 }
 
+#endif /* SOFTASSIGN_NO_HEURISTICS and SOFTASSIGN_NO_MATRIX */
+
+#ifndef SOFTASSIGN_NO_HEURISTICS
+
 /* Every row takes its best match; rows of a slot that was chosen too often then move, in order, to their best free one.
    Returns the number of rows that found none. */
 static int softassign__greedy(softassign *s)
@@ -1743,6 +1750,8 @@ static int softassign__greedy(softassign *s)
     }
     return lost;
 }
+
+#endif /* SOFTASSIGN_NO_HEURISTICS */
 
 /* What changes when `row` goes to `slot`: into a place, or in exchange with the row that gains most by it. */
 static double softassign__move_gain(softassign *s, int row, int slot, float cost, int *partner, float *partner_cost)
@@ -1823,6 +1832,8 @@ static int softassign__improve_row(softassign *s, int row)
     return to >= 0;
 }
 
+#ifndef SOFTASSIGN_NO_HEURISTICS
+
 static void softassign__two_opt(softassign *s, int passes)
 {
     int pass, i, changed = 1, j;
@@ -1831,12 +1842,9 @@ static void softassign__two_opt(softassign *s, int passes)
         for (changed = i = 0; i < s->rows; i++) changed += softassign__improve_row(s, i);
 }
 
-/* ------------------------------------------------------------------------------------------------
-   Simulated annealing (Slomp 2012, eq 3.7 and 3.8). alpha cancels, as every state has one element a row. A slot is
-   drawn at random: free, the row moves; taken, the two rows swap, which section 3.4.3 does for square problems only.
-   ------------------------------------------------------------------------------------------------ */
+#endif /* SOFTASSIGN_NO_HEURISTICS */
 
-/* Keeps the best assignment in s->closed (slots of rows) and returns its cost. */
+/* Assignments are kept as the slots of rows. */
 static void softassign__keep_best(softassign *s, int *best)
 {
     int i;
@@ -1850,6 +1858,15 @@ static void softassign__take_back(softassign *s, const int *best)
     for (i = 0; i < s->rows; i++) softassign__assign(s, i, best[i], softassign__cost(s, i, best[i]));
 }
 
+static int softassign__progress(softassign *s, const int *slots);
+
+/* ------------------------------------------------------------------------------------------------
+   Simulated annealing (Slomp 2012, eq 3.7 and 3.8). alpha cancels, as every state has one element a row. A slot is
+   drawn at random: free, the row moves; taken, the two rows swap, which section 3.4.3 does for square problems only.
+   ------------------------------------------------------------------------------------------------ */
+
+#ifndef SOFTASSIGN_NO_HEURISTICS
+
 static double softassign__cost_now(const softassign *s)
 {
     softassign__sum sum = {0, 0, 0};
@@ -1857,8 +1874,6 @@ static double softassign__cost_now(const softassign *s)
     for (i = 0; i < s->rows; i++) softassign__add(&sum, (double)s->cost_of_row[i]);
     return softassign__total(&sum);
 }
-
-static int softassign__progress(softassign *s, const int *slots);
 
 static void softassign__anneal(softassign *s, int *best)
 {
@@ -2014,6 +2029,10 @@ static void softassign__run_ants(softassign *s, int *best, int *leader, int *sho
     softassign__take_back(s, best);
 }
 
+#endif /* SOFTASSIGN_NO_HEURISTICS */
+
+#ifndef SOFTASSIGN_NO_MATRIX
+
 /* ------------------------------------------------------------------------------------------------
    Softassign with inequality columns over the whole matrix
 
@@ -2160,7 +2179,7 @@ static void softassign__entropic(softassign *s, softassign__sweep *w, double *be
 /* ------------------------------------------------------------------------------------------------
    The published softassign, statement by statement (Slomp 2012, section 3.6; D = cost / largest |cost|):
 
-       Q = M .* (D - alpha);  M = exp(clamp(-Q / t)) / sqrt(t)
+       Q = M .* (D - alpha);  M = exp(clamp(-Q / t)) / sqrt(t)          (Gold et al. 1997: exp(clamp(-(D - alpha) / t)))
        repeat: M = M ./ (sum_cols(M) + outlier);  M = M ./ sum_rows(M)
        once a temperature: cost = sum_all(Q); if (cost < lowest) S = M
 
@@ -2209,7 +2228,7 @@ static inline double softassign__exp_clamped_f64(double x) { return exp(x < -650
     {                                                                                                                  \
         softassign__published *p = (softassign__published *)context;                                                   \
         const softassign *s = p->s;                                                                                    \
-        int i, j, n = s->columns;                                                                                      \
+        int i, j, n = s->columns, gold = s->options.gold;                                                              \
         T alpha = (T)s->options.alpha, scale = (T)(1 / p->largest), inverse = (T)(1 / p->t), factor = (T)(1 / sqrt(p->t)); \
         (void)worker;                                                                                                  \
         for (i = begin; i < end; i++) {                                                                                \
@@ -2221,6 +2240,7 @@ static inline double softassign__exp_clamped_f64(double x) { return exp(x < -650
                 if (!(cost[j] < SOFTASSIGN__INFINITY) || s->capacity[j] == 0) continue;                                \
                 q = m[j] * ((T)cost[j] * scale - alpha);                                                               \
                 sum += (double)q;                                                                                      \
+                if (gold) q = (T)cost[j] * scale - alpha;                                                              \
                 m[j] = (T)softassign__exp_clamped_##suffix((double)(-q * inverse)) * factor;                           \
             }                                                                                                          \
             p->row_cost[i] = sum;                                                                                      \
@@ -2339,6 +2359,8 @@ static int softassign__extract(softassign *s, const int *wanted)
     }
     return lost;
 }
+
+#endif /* SOFTASSIGN_NO_MATRIX */
 
 /* ------------------------------------------------------------------------------------------------
    Reports
@@ -2469,7 +2491,7 @@ static void softassign__check_range(int begin, int end, int worker, void *contex
         if (copy && stay >= 0) copy[stay] -= s->bonus;
         for (j = 0; largest > 0x7149f2cau && j < s->columns && *wrong != SAT_ERR_NON_FINITE; j++) { /* 1e30 */
             sat_result found = softassign__check_cost(softassign__pair(p, i, j));
-            if (found != SAT_OK) *wrong = found;
+            if (found != SAT_OK) *wrong = (int)found;
         }
     }
 }
@@ -2800,6 +2822,8 @@ static sat_result softassign__solve_fast(softassign *s)
     return softassign__solve_from_prices(s);
 }
 
+#ifndef SOFTASSIGN_NO_MATRIX
+
 static sat_result softassign__solve_entropic(softassign *s, softassign__sweep *w, double *best_price)
 {
     sat_result result;
@@ -2821,6 +2845,10 @@ static sat_result softassign__solve_entropic(softassign *s, softassign__sweep *w
     return SAT_OK;
 }
 
+#endif /* SOFTASSIGN_NO_MATRIX */
+
+#if !defined(SOFTASSIGN_NO_HEURISTICS) || !defined(SOFTASSIGN_NO_MATRIX)
+
 /* Rows that a greedy search could not place get an augmenting path, which exists if any assignment does. */
 static sat_result softassign__place_rest(softassign *s, int lost)
 {
@@ -2836,6 +2864,10 @@ static sat_result softassign__place_rest(softassign *s, int lost)
     softassign__reset_prices(s);
     return SAT_OK;
 }
+
+#endif
+
+#ifndef SOFTASSIGN_NO_MATRIX
 
 static sat_result softassign__solve_published(softassign *s, softassign__published *p)
 {
@@ -2856,6 +2888,10 @@ static sat_result softassign__solve_published(softassign *s, softassign__publish
     return softassign__place_rest(s, softassign__extract(s, s->shown));
 }
 
+#endif /* SOFTASSIGN_NO_MATRIX */
+
+#ifndef SOFTASSIGN_NO_HEURISTICS
+
 static sat_result softassign__solve_heuristic(softassign *s)
 {
     const softassign_options *o = &s->options;
@@ -2874,6 +2910,10 @@ static sat_result softassign__solve_heuristic(softassign *s)
     }
     return SAT_OK;
 }
+
+#endif /* SOFTASSIGN_NO_HEURISTICS */
+
+#if !defined(SOFTASSIGN_NO_HEURISTICS) || !defined(SOFTASSIGN_NO_MATRIX)
 
 /* A bound for the methods that have no prices: from the auction, or from the optimum where slots hold more than one. */
 static sat_result softassign__buy_bound(softassign *s)
@@ -2900,6 +2940,8 @@ static sat_result softassign__buy_bound(softassign *s)
     softassign__take_back(s, s->kept);
     return result;
 }
+
+#endif
 
 /* Undoes pairs of rows that have one column too close: each such row moves to its best column without conflict; then
    moves and swaps that create none. The bound is that of the problem without distances, so it holds. */
@@ -2935,19 +2977,22 @@ static void softassign__separate(softassign *s)
 
 /* Scratch of the matrix methods, in one block of its own. */
 typedef struct softassign__matrix_work {
+#ifndef SOFTASSIGN_NO_MATRIX
     softassign__sweep sweep;
     softassign__published published;
     double *best_price;
+#endif
     void *block;
     size_t bytes;
 } softassign__matrix_work;
+
+#ifndef SOFTASSIGN_NO_MATRIX
 
 static sat_result softassign__allocate_matrix_work(softassign *s, softassign__matrix_work *w)
 {
     sat__arena a = {NULL, 0, 0};
     size_t columns = (size_t)s->columns, cells, element = s->options.double_precision ? sizeof(double) : sizeof(float);
     int pass;
-    memset(w, 0, sizeof *w);
     if (s->options.method != SOFTASSIGN_ENTROPIC && s->options.method != SOFTASSIGN_PUBLISHED) return SAT_OK;
     if (!sat__multiply_size(&cells, (size_t)s->rows, columns)) return SAT_ERR_SIZE;
     for (pass = 0; pass < 2; pass++) {
@@ -2977,17 +3022,33 @@ static sat_result softassign__allocate_matrix_work(softassign *s, softassign__ma
     return SAT_OK;
 }
 
+#endif /* SOFTASSIGN_NO_MATRIX */
+
+/* The method itself: from here on the assignment stands in s->shown for the methods with prices, else in the solver. */
+static sat_result softassign__run_method(softassign *s, softassign__matrix_work *w)
+{
+    int method = (int)s->options.method;
+    (void)w;
+    if (method <= SOFTASSIGN_EXACT) return softassign__solve_exact(s);
+    if (method == SOFTASSIGN_FAST) return softassign__solve_fast(s);
+#ifndef SOFTASSIGN_NO_MATRIX
+    if (method == SOFTASSIGN_ENTROPIC) return softassign__solve_entropic(s, &w->sweep, w->best_price);
+    if (method == SOFTASSIGN_PUBLISHED) return softassign__solve_published(s, &w->published);
+#endif
+#ifndef SOFTASSIGN_NO_HEURISTICS
+    if (method >= SOFTASSIGN_GREEDY) return softassign__solve_heuristic(s);
+#endif
+    return SAT_ERR_ARGUMENT; /* left out */
+}
+
 static sat_result softassign__run(softassign *s, softassign__matrix_work *w)
 {
-    sat_result result;
+    sat_result result = softassign__run_method(s, w);
     int method = (int)s->options.method, has_prices = method <= SOFTASSIGN_ENTROPIC;
-    if (method <= SOFTASSIGN_EXACT) result = softassign__solve_exact(s);
-    else if (method == SOFTASSIGN_FAST) result = softassign__solve_fast(s);
-    else if (method == SOFTASSIGN_ENTROPIC) result = softassign__solve_entropic(s, &w->sweep, w->best_price);
-    else if (method == SOFTASSIGN_PUBLISHED) result = softassign__solve_published(s, &w->published);
-    else result = softassign__solve_heuristic(s);
     if (result != SAT_OK) return result;
+#if !defined(SOFTASSIGN_NO_HEURISTICS) || !defined(SOFTASSIGN_NO_MATRIX)
     if (!has_prices && s->options.certify) result = softassign__buy_bound(s);
+#endif
     if (method > SOFTASSIGN_FAST) {
         s->report.method = s->options.method;
         s->report.complete = 1;
@@ -2996,8 +3057,8 @@ static sat_result softassign__run(softassign *s, softassign__matrix_work *w)
         if (s->dense_paths) softassign__dense_publish(s);
         if (has_prices) softassign__take_back(s, s->shown);
         softassign__separate(s);
-        softassign__keep_best(s, s->shown);
-    } else if (!has_prices) softassign__keep_best(s, s->shown);
+    }
+    if (s->options.min_distance > 0 || !has_prices) softassign__keep_best(s, s->shown);
     softassign__report_slots(s, s->shown);
     return result;
 }
@@ -3026,7 +3087,10 @@ SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_
     features = problem->cost || problem->cost_fn ? 0 : sat__min_int(problem->feature_count, SOFTASSIGN__BOUND_FEATURES);
     result = softassign__allocate(&s, problem->rows, problem->columns, softassign__mandatory_count(problem), features, 1, &o);
     if (result != SAT_OK) return result;
+    memset(&work, 0, sizeof work);
+#ifndef SOFTASSIGN_NO_MATRIX
     result = softassign__allocate_matrix_work(s, &work);
+#endif
     if (result == SAT_OK) result = softassign__start(s, problem);
     if (result == SAT_OK) result = softassign__run(s, &work);
     if (report) *report = s->report;
@@ -3036,6 +3100,8 @@ SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_
     softassign_destroy(s);
     return result;
 }
+
+#ifndef SOFTASSIGN_NO_MOSAIC
 
 /* ------------------------------------------------------------------------------------------------
    Public: photomosaics
@@ -3124,6 +3190,9 @@ SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride
     }
     return SAT_OK;
 }
+
+#endif /* SOFTASSIGN_NO_MOSAIC */
+
 #ifdef __cplusplus
 }
 #endif
@@ -3192,13 +3261,18 @@ static const char softassign__glsl_update[] =
     "#endif\n"
     "}\n";
 
-/* The sum of K texels along an axis. */
+/* The sum of K texels along an axis, or their largest finite |value|. */
 static const char softassign__glsl_reduce[] =
     "void main() {\n"
     "    float sum = 0.0;\n"
     "    ivec2 p = VERTICAL == 1 ? ivec2(here().x, here().y * K) : ivec2(here().x * K, here().y);\n"
     "    for (int k = 0; k < K; k++) {\n"
-    "        if (p.x < size.x && p.y < size.y) sum += at(source, p);\n"
+    "        float x = p.x < size.x && p.y < size.y ? at(source, p) : 0.0;\n"
+    "#if TAKES_MAX\n"
+    "        if (abs(x) < 1e37) sum = max(sum, abs(x));\n"
+    "#else\n"
+    "        sum += x;\n"
+    "#endif\n"
     "        p += VERTICAL == 1 ? ivec2(0, 1) : ivec2(1, 0);\n"
     "    }\n"
     "    result = vec4(sum);\n"
@@ -3264,6 +3338,7 @@ static const char softassign__glsl_copy[] = "void main() { result = vec4(at(sour
 
 enum {
     SOFTASSIGN__DISTANCE, SOFTASSIGN__UPDATE_Q, SOFTASSIGN__UPDATE_M, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__SUM_ACROSS,
+    SOFTASSIGN__MAX_DOWN, SOFTASSIGN__MAX_ACROSS,
     SOFTASSIGN__DIVIDE_COLUMNS, SOFTASSIGN__DIVIDE_ROWS, SOFTASSIGN__OUTLIER, SOFTASSIGN__ROWS_FIRST, SOFTASSIGN__ROWS_NEXT,
     SOFTASSIGN__COLUMNS, SOFTASSIGN__UPDATE_PRICES, SOFTASSIGN__COPY, SOFTASSIGN__PROGRAMS
 };
@@ -3318,6 +3393,7 @@ static sat_result softassign__gl_make_program(softassign_gl *g, int which, const
     sat__gl_define(&g->gl, "VERTICAL", vertical);
     sat__gl_define(&g->gl, "FIRST_LEVEL", first);
     sat__gl_define(&g->gl, "WRITES_Q", first);
+    sat__gl_define(&g->gl, "TAKES_MAX", first);
     result = sat__gl_build(&g->gl, &p->program, &shaders);
     if (result != SAT_OK) return result;
     p->size = g->gl.GetUniformLocation(p->program, "size");
@@ -3340,6 +3416,8 @@ static sat_result softassign__gl_make_programs(softassign_gl *g)
         {SOFTASSIGN__UPDATE_M, "softassign: M", softassign__glsl_update, 0, 0},
         {SOFTASSIGN__SUM_DOWN, "softassign: sum_cols", softassign__glsl_reduce, 1, 0},
         {SOFTASSIGN__SUM_ACROSS, "softassign: sum_rows", softassign__glsl_reduce, 0, 0},
+        {SOFTASSIGN__MAX_DOWN, "softassign: largest of columns", softassign__glsl_reduce, 1, 1},
+        {SOFTASSIGN__MAX_ACROSS, "softassign: largest of rows", softassign__glsl_reduce, 0, 1},
         {SOFTASSIGN__DIVIDE_COLUMNS, "softassign: columns", softassign__glsl_divide, 1, 0},
         {SOFTASSIGN__DIVIDE_ROWS, "softassign: rows", softassign__glsl_divide, 0, 0},
         {SOFTASSIGN__OUTLIER, "softassign: outliers", softassign__glsl_outlier, 0, 0},
@@ -3455,6 +3533,35 @@ static void softassign__gl_values(softassign_gl *g, int program, float alpha, fl
     g->gl.Uniform1f(p->scale, scale);
 }
 
+/* ---- sums */
+
+/* Sums (or takes the largest of) a texture of width x height down to one row or column; returns the texture that holds it. */
+static int softassign__gl_reduce(softassign_gl *g, int program, int from, int width, int height)
+{
+    int k = g->options.gather, vertical = program == SOFTASSIGN__SUM_DOWN || program == SOFTASSIGN__MAX_DOWN;
+    int a = vertical ? SOFTASSIGN__DOWN : SOFTASSIGN__ACROSS;
+    while ((vertical ? height : width) > 1) {
+        int to = from == a ? a + 1 : a, w = vertical ? width : (width + k - 1) / k, h = vertical ? (height + k - 1) / k : height;
+        softassign__gl_run(g, program, to, w, h, g->texture[from], 0, 0, width, height);
+        from = to;
+        width = w;
+        height = h;
+    }
+    return from;
+}
+
+/* One texel of a texture. */
+static sat_result softassign__gl_texel(softassign_gl *g, int from, float *value)
+{
+    unsigned internal = from == SOFTASSIGN__ACROSS || from == SOFTASSIGN__ACROSS_2 ? SAT__GL_RG32F : SAT__GL_R32F;
+    float texel[2] = {0, 0};
+    sat_result result = sat__gl_read(&g->gl, texel, g->texture[from], internal, 1, 1);
+    *value = texel[0];
+    return result;
+}
+
+/* ---- distances from features */
+
 /* Packs features four to a texel, zeros behind. */
 static sat_result softassign__gl_feature_texture(softassign_gl *g, unsigned *texture, const float *features, int count, int n)
 {
@@ -3497,18 +3604,31 @@ static sat_result softassign__gl_upload_costs(softassign_gl *g, const softassign
     return SAT_OK;
 }
 
-/* The largest |cost| that is finite; -1 after a NaN or minus infinity. */
-static float softassign__gl_largest(const softassign_problem *p)
+/* Features, or the costs themselves: finite where they must be. */
+static sat_result softassign__gl_check_costs(const softassign_problem *p)
 {
-    float largest = 0;
+    size_t k, n = (size_t)p->feature_count;
+    sat_result result = SAT_OK;
     int i, j;
-    for (i = 0; i < p->rows; i++)
-        for (j = 0; j < p->columns; j++) {
-            float cost = softassign__pair(p, i, j);
-            if (sat__is_nan(cost) || cost < -1e30f || (cost > 1e30f && sat__is_finite(cost))) return -1;
-            if (sat__is_finite(cost) && fabsf(cost) > largest) largest = fabsf(cost);
-        }
-    return largest > 1e-30f ? largest : 1;
+    if (p->cost || p->cost_fn) {
+        for (i = 0; i < p->rows && result == SAT_OK; i++)
+            for (j = 0; j < p->columns && result == SAT_OK; j++) result = softassign__check_cost(softassign__pair(p, i, j));
+        return result;
+    }
+    for (k = 0; k < n * (size_t)p->rows && result == SAT_OK; k++) result = softassign__check_feature(p->row_features[k]);
+    for (k = 0; k < n * (size_t)p->columns && result == SAT_OK; k++) result = softassign__check_feature(p->column_features[k]);
+    return result;
+}
+
+/* The scale of D. */
+static sat_result softassign__gl_find_largest(softassign_gl *g)
+{
+    int at = softassign__gl_reduce(g, SOFTASSIGN__MAX_DOWN, SOFTASSIGN__D, g->columns, g->rows);
+    sat_result result;
+    at = softassign__gl_reduce(g, SOFTASSIGN__MAX_ACROSS, at, g->columns, 1);
+    result = softassign__gl_texel(g, at, &g->largest);
+    g->largest = fabsf(g->largest) > 1e-30f ? fabsf(g->largest) : 1;
+    return result;
 }
 
 SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softassign_problem *problem)
@@ -3517,8 +3637,8 @@ SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softa
     sat_result result = SAT_OK;
     float *row;
     if (!gl || !softassign__problem_is_valid(problem)) return SAT_ERR_ARGUMENT;
-    gl->largest = softassign__gl_largest(problem);
-    if (gl->largest < 0) return SAT_ERR_NON_FINITE;
+    result = softassign__gl_check_costs(problem);
+    if (result != SAT_OK) return result;
     sat__gl_begin(&gl->gl, &state, 3);
     if (gl->rows != problem->rows || gl->columns != problem->columns) result = softassign__gl_make_textures(gl, problem->rows, problem->columns);
     if (result == SAT_OK && !problem->cost && !problem->cost_fn) result = softassign__gl_distances(gl, problem);
@@ -3528,35 +3648,9 @@ SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softa
         result = row ? softassign__gl_upload_costs(gl, problem, row) : SAT_ERR_MEMORY;
         sat__release(&gl->allocator, row, size);
     }
+    if (result == SAT_OK) result = softassign__gl_find_largest(gl);
     if (result == SAT_OK) result = sat__gl_check(&gl->gl, "OpenGL refused the costs");
     sat__gl_end(&gl->gl, &state);
-    return result;
-}
-
-/* ---- sums */
-
-/* Sums a texture of width x height down to one row (vertical) or column; returns the texture that holds it. `ready`
-   levels were done before: `from` is then one of the two that take turns. */
-static int softassign__gl_reduce(softassign_gl *g, int from, int width, int height, int vertical)
-{
-    int k = g->options.gather, a = vertical ? SOFTASSIGN__DOWN : SOFTASSIGN__ACROSS;
-    while ((vertical ? height : width) > 1) {
-        int to = from == a ? a + 1 : a, w = vertical ? width : (width + k - 1) / k, h = vertical ? (height + k - 1) / k : height;
-        softassign__gl_run(g, vertical ? SOFTASSIGN__SUM_DOWN : SOFTASSIGN__SUM_ACROSS, to, w, h, g->texture[from], 0, 0, width, height);
-        from = to;
-        width = w;
-        height = h;
-    }
-    return from;
-}
-
-/* One texel of a texture. */
-static sat_result softassign__gl_texel(softassign_gl *g, int from, float *value)
-{
-    unsigned internal = from == SOFTASSIGN__ACROSS || from == SOFTASSIGN__ACROSS_2 ? SAT__GL_RG32F : SAT__GL_R32F;
-    float texel[2] = {0, 0};
-    sat_result result = sat__gl_read(&g->gl, texel, g->texture[from], internal, 1, 1);
-    *value = texel[0];
     return result;
 }
 
@@ -3585,14 +3679,14 @@ static sat_result softassign__gl_start_matrix(softassign_gl *g)
 /* One Sinkhorn iteration, A to A by way of M. */
 static void softassign__gl_sinkhorn(softassign_gl *g, int *outlier)
 {
-    int w = g->columns, h = g->rows, sums = softassign__gl_reduce(g, SOFTASSIGN__A, w, h, 1);
+    int w = g->columns, h = g->rows, sums = softassign__gl_reduce(g, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__A, w, h);
     softassign__gl_run(g, SOFTASSIGN__DIVIDE_COLUMNS, SOFTASSIGN__M, w, h, g->texture[SOFTASSIGN__A], g->texture[sums], g->texture[*outlier], w, h);
     if (g->options.outlier_evolves) {
         int to = *outlier == SOFTASSIGN__V ? SOFTASSIGN__OUTLIERS_2 : SOFTASSIGN__V;
         softassign__gl_run(g, SOFTASSIGN__OUTLIER, to, w, 1, g->texture[*outlier], g->texture[sums], 0, w, 1);
         *outlier = to;
     }
-    sums = softassign__gl_reduce(g, SOFTASSIGN__M, w, h, 0);
+    sums = softassign__gl_reduce(g, SOFTASSIGN__SUM_ACROSS, SOFTASSIGN__M, w, h);
     softassign__gl_run(g, SOFTASSIGN__DIVIDE_ROWS, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M], g->texture[sums], 0, w, h);
 }
 
@@ -3610,8 +3704,8 @@ static sat_result softassign__gl_cool(softassign_gl *g, double t, float *cost)
         int outlier = SOFTASSIGN__OUTLIERS;
         if (steady == o->iterations[1] - 1) {
             softassign__gl_run(g, SOFTASSIGN__UPDATE_Q, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M], g->texture[SOFTASSIGN__D], 0, w, h);
-            q = softassign__gl_reduce(g, SOFTASSIGN__A, w, h, 1);
-            q = softassign__gl_reduce(g, q, w, 1, 0);
+            q = softassign__gl_reduce(g, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__A, w, h);
+            q = softassign__gl_reduce(g, SOFTASSIGN__SUM_ACROSS, q, w, 1);
             result = softassign__gl_texel(g, q, cost);
             if (result != SAT_OK) return result;
         }
@@ -3706,7 +3800,7 @@ SOFTASSIGN_DEF sat_result softassign_gl_sweep(softassign_gl *gl, float *price, d
         }
         softassign__gl_run(g, SOFTASSIGN__COLUMNS, SOFTASSIGN__DOWN, g->columns, height, g->texture[SOFTASSIGN__D], g->texture[rows],
                            g->texture[v], g->columns, g->rows);
-        sums = softassign__gl_reduce(g, SOFTASSIGN__DOWN, g->columns, height, 1);
+        sums = softassign__gl_reduce(g, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__DOWN, g->columns, height);
         softassign__gl_run(g, SOFTASSIGN__UPDATE_PRICES, next, g->columns, 1, g->texture[v], g->texture[sums], 0, g->columns, 1);
         v = next;
     }

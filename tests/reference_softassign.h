@@ -145,9 +145,10 @@ static inline void reference_greedy(const float *cost, int rows, int columns, in
     free(uses);
 }
 
-/* Section 3.6 in double, statement by statement, from the given M; returns the lowest cost, S in soft. */
+/* Section 3.6 in double, statement by statement, from the given M; returns the lowest cost, S in soft.
+   gold: the update of Gold et al. instead, exp(-(D - alpha) / t). */
 static inline double reference_published(const float *cost, int rows, int columns, double *m, double *soft, double t,
-                                         double cooling, double alpha, double outlier, const int *iterations, double clamp)
+                                         double cooling, double alpha, double outlier, const int *iterations, double clamp, int gold)
 {
     size_t n = (size_t)columns, k;
     double lowest = HUGE_VAL, largest = 0, *q = (double *)malloc((size_t)rows * n * sizeof *q);
@@ -160,7 +161,7 @@ static inline double reference_published(const float *cost, int rows, int column
             for (k = 0; k < (size_t)rows * n; k++) {
                 double e;
                 q[k] = m[k] * ((double)cost[k] / largest - alpha);
-                e = -q[k] / t;
+                e = -(gold ? (double)cost[k] / largest - alpha : q[k]) / t;
                 m[k] = exp(e < -clamp ? -clamp : e > clamp ? clamp : e) / sqrt(t);
             }
             for (c = 0; c < iterations[2]; c++) {

@@ -925,14 +925,15 @@ TEST(softassign_published_is_the_pseudo_code)
 {
     static const int iterations[3] = {14, 3, 4};
     problem q = make_features(30, 70, 12, 70);
-    int i, wide, x[30], k, n = 30 * 70;
+    int i, turn, x[30], k, n = 30 * 70;
     double *m = (double *)malloc(2 * (size_t)n * sizeof *m), *soft = m + n, lowest;
     float *out = (float *)malloc((size_t)n * sizeof *out);
-    for (wide = 0; wide < 2; wide++) {
+    for (turn = 0; turn < 4; turn++) {
         softassign_options o = softassign_method_defaults(SOFTASSIGN_PUBLISHED);
         softassign_report r;
         uint64_t seed = 5;
         double worst = 0, column, widest = 0, sharpest = 0;
+        int wide = turn % 2, gold = turn / 2;
         for (i = 0; i < 3; i++) o.iterations[i] = iterations[i];
         o.seed = 5;
         o.temperature = 0.02;
@@ -940,17 +941,18 @@ TEST(softassign_published_is_the_pseudo_code)
         o.alpha = 1;
         o.outlier = 100;
         o.double_precision = wide;
+        o.gold = gold;
         o.soft = out;
         o.soft_stride = 70;
         for (k = 0; k < n; k++) m[k] = 1e-6 + 1e-3 * support_uniform(&seed);
-        lowest = reference_published(q.cost, 30, 70, m, soft, 0.02, 0.7, 1, 100, iterations, wide ? 650 : 70);
+        lowest = reference_published(q.cost, 30, 70, m, soft, 0.02, 0.7, 1, 100, iterations, wide ? 650 : 70, gold);
         EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
         EXPECT_REL(r.soft_cost, lowest, wide ? 1e-6 : 1e-4); /* costs are floats in both */
         for (k = 0; k < n; k++) {
             worst = fmax(worst, fabs((double)out[k] - soft[k]));
             sharpest = fmax(sharpest, soft[k]);
         }
-        EXPECT(sharpest > 0.9); /* the run went from blur to decision */
+        EXPECT(sharpest > (gold ? 0.2 : 0.9)); /* the run went from blur to decision */
         EXPECT(worst < (wide ? 1e-5 : 2e-3));
         REPORT(wide ? "PUBLISHED, double against the pseudo-code" : "PUBLISHED, float against the pseudo-code", worst, "largest difference of S");
         for (k = 0; k < 70; k++) {

@@ -549,22 +549,24 @@ static void table_published(void)
     static const double alphas[] = {0.3, 1, 1.5};
     instance q;
     size_t o, a;
-    int evolves, wide;
-    bench_table("The published method's parameters, 100 x 500", "alpha\toutlier\tevolves\tdouble\texcess\tduplicate_rows\tcolumn_sum_max\tdefault");
+    int evolves, wide, gold;
+    bench_table("The published method's parameters, 100 x 500", "alpha\toutlier\tevolves\tdouble\tgold\texcess\tduplicate_rows\tcolumn_sum_max\tdefault");
     open_instance(&q, "fig_bowl", 10, 10, 500, 1);
     run_lapjv(&q);
     for (a = 0; a < 3; a++)
         for (o = 0; o < 5; o++)
             for (evolves = 0; evolves < 2; evolves++)
-                for (wide = 0; wide < 2; wide++) {
+                for (wide = 0; wide < 3; wide++) { /* float, double, and Gold's update in float */
                     if (bench_quick() && (wide || evolves || a != 1)) continue;
+                    gold = wide == 2;
                     set_method(&q, SOFTASSIGN_PUBLISHED);
                     q.options.alpha = alphas[a];
                     q.options.outlier = outliers[o];
                     q.options.outlier_evolves = evolves;
-                    q.options.double_precision = wide;
+                    q.options.double_precision = wide == 1;
+                    q.options.gold = gold;
                     run_solver(&q);
-                    bench_row("%g\t%g\t%d\t%d\t%.4f\t%d\t%.3g\t%d", alphas[a], outliers[o], evolves, wide, excess(&q), q.report.duplicate_rows,
+                    bench_row("%g\t%g\t%d\t%d\t%d\t%.4f\t%d\t%.3g\t%d", alphas[a], outliers[o], evolves, wide == 1, gold, excess(&q), q.report.duplicate_rows,
                               q.report.column_sum_max, alphas[a] == 1 && outliers[o] == 1e6 && !evolves && !wide);
                 }
     close_instance(&q);
