@@ -1142,7 +1142,7 @@ static void fiv__make_clusters(fiv__mesh *mesh, const uint64_t *order, const uns
     size_t i, vertex = 0;
     for (i = 0; i < mesh->triangle_count; i += FIV__CLUSTER) {
         fiv__cluster *c = &mesh->clusters[i / FIV__CLUSTER];
-        size_t n = mesh->triangle_count - i < FIV__CLUSTER ? mesh->triangle_count - i : FIV__CLUSTER, t;
+        size_t left = mesh->triangle_count - i, n = left < FIV__CLUSTER ? left : (size_t)FIV__CLUSTER, t;
         int k, v;
         c->vertex = vertex;
         c->triangle = i;
@@ -1584,6 +1584,7 @@ static void fiv__integrate(double sum[FIV__TERMS], const double *sums, const uin
     }
 }
 
+#ifndef FIV_NO_MASKS
 /* The same for what lies above the horizon of N. */
 static void fiv__integrate_above(double sum[FIV__TERMS], const double *sums, const uint16_t *words, size_t count, int size,
                                  const float normal[3])
@@ -1605,21 +1606,20 @@ static void fiv__integrate_above(double sum[FIV__TERMS], const double *sums, con
         if (begin < end) fiv__add_span(sum, sums + (size_t)row * (size_t)(size + 1) * FIV__TERMS, begin, end);
     }
 }
+#endif
 
 /* ---- the positions of the samples: shells of logarithmic radii, on each a grid of directions */
+
+enum { FIV__MAX_SHELLS = 256 };
 
 typedef struct fiv__grid {
     int theta, phi, rho; /* octahedral: theta == phi == the side of the square */
     int octahedral;
     float first, last, log_first, per_log; /* shell = (log2 r - log_first) per_log */
+    float shell[FIV__MAX_SHELLS];          /* radii */
 } fiv__grid;
 
 static size_t fiv__grid_samples(const fiv__grid *g) { return (size_t)g->theta * (size_t)g->phi * (size_t)g->rho; }
-
-static float fiv__shell_radius(const fiv__grid *g, int k)
-{
-    return (float)((double)g->first * pow((double)g->last / (double)g->first, (double)k / (g->rho - 1)));
-}
 
 /* Octahedral square (Cigolle et al. 2014): u, v in -1..1; the y axis in the middle, -y at the four corners. */
 static inline void fiv__octahedron_direction(float d[3], float u, float v)
@@ -1645,7 +1645,7 @@ static inline void fiv__octahedron_square(float *u, float *v, const float d[3])
 static void fiv__sample_offset(float offset[3], const fiv__grid *g, size_t sample)
 {
     int i = (int)(sample % (size_t)g->theta), j = (int)(sample / (size_t)g->theta % (size_t)g->phi), k;
-    float radius = fiv__shell_radius(g, (int)(sample / ((size_t)g->theta * (size_t)g->phi)));
+    float radius = g->shell[sample / ((size_t)g->theta * (size_t)g->phi)];
     if (g->octahedral) {
         fiv__octahedron_direction(offset, 2 * (float)i / (float)(g->theta - 1) - 1, 2 * (float)j / (float)(g->phi - 1) - 1);
     } else {
@@ -1765,6 +1765,9 @@ struct fiv_occluder {
     uint16_t *words;
 };
 
+/* Ten half floats. One stands before the first sample, so that fiv__upper_halves may start there. */
+static inline uint16_t *fiv__half_sample(const fiv_occluder *o, size_t sample) { return o->half_table + 1 + FIV__TERMS * sample; }
+
 FIV_DEF fiv_occluder_options fiv_occluder_defaults(void)
 {
     fiv_occluder_options o;
@@ -1796,6 +1799,7 @@ static int fiv__occluder_options_are_valid(const fiv_occluder_options *o)
 static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
 {
     fiv__grid *g = &o->grid;
+    int k;
     g->octahedral = options->storage == FIV_STORAGE_HALF_OCTAHEDRAL;
     g->theta = g->octahedral ? options->theta / 2 + 1 : options->theta;
     g->phi = g->octahedral ? g->theta : options->phi;
@@ -1804,6 +1808,7 @@ static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
     g->last = options->last_shell;
     g->log_first = (float)(log((double)g->first) / log(2.0));
     g->per_log = (float)((g->rho - 1) * log(2.0) / log((double)g->last / (double)g->first));
+    for (k = 0; k < g->rho; k++) g->shell[k] = (float)((double)g->first * pow((double)g->last / (double)g->first, (double)k / (g->rho - 1)));
     o->half_floats = g->octahedral;
     o->face = options->face;
     o->keep_masks = options->keep_masks != 0;
@@ -1817,7 +1822,7 @@ static void fiv__occluder_layout(fiv_occluder *o, sat__arena *arena)
     size_t n = fiv__grid_samples(&o->grid), face = (size_t)o->face;
     o->sums = (double *)sat__carve(arena, 6 * face * (face + 1) * FIV__TERMS, sizeof(double));
     o->table = (float *)sat__carve(arena, o->half_floats ? 0 : n, FIV__TERMS * sizeof(float));
-    o->half_table = (uint16_t *)sat__carve(arena, o->half_floats ? n : 0, FIV__TERMS * sizeof(uint16_t));
+    o->half_table = (uint16_t *)sat__carve(arena, o->half_floats ? FIV__TERMS * n + 8 : 0, sizeof(uint16_t));
     o->distance = (signed char *)sat__carve(arena, n, (size_t)o->max_lights);
     if (o->share) return;
     o->state = (unsigned char *)sat__carve(arena, n, 1);
@@ -1999,7 +2004,7 @@ static sat_result fiv__precompute(fiv_occluder *o, const fiv_occluder_options *o
     if (!b.rows) return SAT_ERR_MEMORY;
     o->first[0] = 0;
     for (b.first = 0; b.first < n && !result; b.first += FIV__BATCH) {
-        size_t count = n - b.first < FIV__BATCH ? n - b.first : FIV__BATCH;
+        size_t left = n - b.first, count = left < FIV__BATCH ? left : (size_t)FIV__BATCH;
         if (options->progress && options->progress((float)((double)b.first / (double)n), options->progress_user)) {
             result = SAT_ERR_CANCELLED;
             break;
@@ -2191,14 +2196,14 @@ typedef struct fiv__lighting {
 
 static void fiv__store_vector(fiv_occluder *o, size_t sample, const double sum[FIV__TERMS])
 {
-    double radius = (double)fiv__shell_radius(&o->grid, (int)(sample / ((size_t)o->grid.theta * (size_t)o->grid.phi)));
+    double radius = (double)o->grid.shell[sample / ((size_t)o->grid.theta * (size_t)o->grid.phi)];
     double square = radius * radius, scale = square * (double)o->table_scale;
     int k, valid = o->state[sample] == FIV__VALID;
     float v[FIV__TERMS];
     for (k = 0; k < 9; k++) v[k] = (float)(sum[k] * scale);
     v[9] = (float)(valid ? sum[9] * square : -sum[9] * square - 1e-6);
     for (k = 0; k < FIV__TERMS; k++)
-        if (o->half_floats) o->half_table[FIV__TERMS * sample + (size_t)k] = sat__half_from_float(v[k]);
+        if (o->half_floats) fiv__half_sample(o, sample)[k] = sat__half_from_float(v[k] > 65504 ? 65504 : v[k] < -65504 ? -65504 : v[k]);
         else o->table[FIV__TERMS * sample + (size_t)k] = v[k];
 }
 
@@ -2248,9 +2253,9 @@ static void fiv__light_wanted(int begin, int end, int worker, void *context)
 
 static void fiv__copy_sample(fiv_occluder *o, size_t to, size_t from)
 {
-    size_t n = FIV__TERMS * (o->half_floats ? sizeof *o->half_table : sizeof *o->table), lights = (size_t)o->max_lights;
-    unsigned char *table = o->half_floats ? (unsigned char *)o->half_table : (unsigned char *)o->table;
-    memcpy(table + to * n, table + from * n, n);
+    size_t lights = (size_t)o->max_lights;
+    if (o->half_floats) memcpy(fiv__half_sample(o, to), fiv__half_sample(o, from), FIV__TERMS * sizeof *o->half_table);
+    else memcpy(o->table + FIV__TERMS * to, o->table + FIV__TERMS * from, FIV__TERMS * sizeof *o->table);
     if (lights) memcpy(o->distance + to * lights, o->distance + from * lights, lights);
     o->state[to] = o->state[from];
 }
@@ -2296,17 +2301,27 @@ static void fiv__prepare_lighting(fiv__lighting *l, fiv_occluder *o)
     }
 }
 
+/* rho^2 times a vector is at most the flux within one radius, and pi times the largest radiance beyond. A factor of four is left
+   for texels that turning makes brighter; small values stay clear of subnormal half floats. */
+static float fiv__half_scale(const fiv_environment *e)
+{
+    double bound = 0;
+    int c;
+    for (c = 0; c < 3; c++) {
+        bound = e->flux[c] > bound ? e->flux[c] : bound;
+        bound = 4 * (double)e->largest[c] > bound ? 4 * (double)e->largest[c] : bound;
+    }
+    return bound > 1e-20 ? (float)(16000 / bound) : 1;
+}
+
 FIV_DEF sat_result fiv_occluder_light(fiv_occluder *o, const fiv_environment *e, const float rotation[9])
 {
     fiv__gather g;
     fiv__lighting l;
-    double flux;
     if (!o || !e || e->face != o->face) return SAT_ERR_ARGUMENT;
     if (e->light_count > o->max_lights) return SAT_ERR_LIMIT;
     if (!fiv__set_rotation(o->rotation, rotation)) return SAT_ERR_ARGUMENT;
-    flux = e->flux[0] > e->flux[1] ? e->flux[0] : e->flux[1];
-    flux = flux > e->flux[2] ? flux : e->flux[2];
-    o->table_scale = (float)(o->half_floats && flux > 0 ? 1 / flux : 1);
+    o->table_scale = o->half_floats ? fiv__half_scale(e) : 1;
     o->environment = e;
     o->stamp = e->stamp;
     o->light_count = e->light_count;
@@ -2356,63 +2371,118 @@ FIV_DEF fiv_irradiance_options fiv_irradiance_defaults(void)
     return o;
 }
 
-static inline void fiv__read_sample(float v[FIV__TERMS], const fiv_occluder *o, size_t sample)
+/* Half floats of this table are finite, so that one multiplication does for normal and subnormal numbers. */
+static inline float fiv__half(uint16_t half)
+{
+    float magnitude = sat__float_from_bits((uint32_t)(half & 0x7fffu) << 13) * 5.192296858534828e33f; /* 2^112 */
+    return half & 0x8000u ? -magnitude : magnitude;
+}
+
+/* The solid angle of a sample; < 0: not valid. */
+static inline float fiv__sample_angle(const fiv_occluder *o, size_t sample)
+{
+    return o->half_floats ? fiv__half(fiv__half_sample(o, sample)[9]) : o->table[FIV__TERMS * sample + 9];
+}
+
+/* out += weight * sample, with the absolute value of the solid angle */
+static inline void fiv__add_sample_plain(float out[FIV__TERMS], float weight, const fiv_occluder *o, size_t sample)
 {
     int k;
+    for (k = 0; k < 9; k++)
+        out[k] += weight * (o->half_floats ? fiv__half(fiv__half_sample(o, sample)[k]) : o->table[FIV__TERMS * sample + (size_t)k]);
+    out[9] += weight * fabsf(fiv__sample_angle(o, sample));
+}
+
+#ifdef SAT__VECTOR
+/* The upper half of each lane; the lower one is masked out. */
+static inline sat__f32x4 fiv__upper_halves(const uint16_t *p)
+{
+    sat__i32x4 v = sat__i32x4_load((const int32_t *)(const void *)p);
+    sat__i32x4 magnitude = sat__i32x4_and(sat__i32x4_shift_right(v, 3), sat__i32x4_set1(0x0fffe000));
+    sat__f32x4 value = sat__f32x4_mul(sat__f32x4_from_bits(magnitude), sat__f32x4_set1(5.192296858534828e33f));
+    return sat__f32x4_from_bits(sat__i32x4_or(sat__f32x4_bits(value), sat__i32x4_and(v, sat__i32x4_set1(-0x7fffffff - 1))));
+}
+
+static inline void fiv__add_sample(float out[FIV__TERMS], float weight, const fiv_occluder *o, size_t sample)
+{
+    sat__f32x4 w = sat__f32x4_set1(weight);
     if (o->half_floats) {
-        const uint16_t *h = o->half_table + FIV__TERMS * sample;
-        float scale = 1 / o->table_scale;
-        for (k = 0; k < 9; k++) v[k] = sat__half_to_float(h[k]) * scale;
-        v[9] = sat__half_to_float(h[9]);
-    } else memcpy(v, o->table + FIV__TERMS * sample, FIV__TERMS * sizeof *v);
+        const uint16_t *h = fiv__half_sample(o, sample);
+        float even[4], odd[4];
+        int k;
+        sat__f32x4_store(even, sat__f32x4_mul(w, fiv__upper_halves(h - 1)));
+        sat__f32x4_store(odd, sat__f32x4_mul(w, fiv__upper_halves(h)));
+        for (k = 0; k < 4; k++) out[2 * k] += even[k], out[2 * k + 1] += odd[k];
+        out[8] += weight * fiv__half(h[8]);
+        out[9] += weight * fabsf(fiv__half(h[9]));
+    } else {
+        const float *v = o->table + FIV__TERMS * sample;
+        sat__f32x4_store(out, sat__f32x4_add(sat__f32x4_load(out), sat__f32x4_mul(w, sat__f32x4_load(v))));
+        sat__f32x4_store(out + 4, sat__f32x4_add(sat__f32x4_load(out + 4), sat__f32x4_mul(w, sat__f32x4_load(v + 4))));
+        out[8] += weight * v[8];
+        out[9] += weight * fabsf(v[9]);
+    }
+}
+#else
+#define fiv__add_sample fiv__add_sample_plain
+#endif
+
+/* Vectors come back from the scale in which they are stored. */
+static inline void fiv__unscale(float v[FIV__TERMS], const fiv_occluder *o, float factor)
+{
+    float scale = factor / o->table_scale;
+    int k;
+    for (k = 0; k < 9; k++) v[k] *= scale;
+    v[9] *= factor;
 }
 
 /* Published: the vectors themselves are interpolated, and fall with the square of the distance beyond the last shell. */
 static void fiv__lookup_published(float out[FIV__TERMS], const fiv_occluder *o, const fiv__cell *cell)
 {
-    float v[FIV__TERMS], near_shell = fiv__shell_radius(&o->grid, cell->shell), far_shell = fiv__shell_radius(&o->grid, cell->shell + 1);
-    int q, k;
+    float near_shell = o->grid.shell[cell->shell], far_shell = o->grid.shell[cell->shell + 1];
+    int q;
     near_shell = 1 / (near_shell * near_shell);
     far_shell = 1 / (far_shell * far_shell);
     if (cell->radius > o->grid.last) far_shell = 1 / (cell->radius * cell->radius);
     memset(out, 0, FIV__TERMS * sizeof *out);
-    for (q = 0; q < 8; q++) {
-        float weight = cell->weight[q] * (q & 4 ? far_shell : near_shell);
-        if (weight == 0) continue;
-        fiv__read_sample(v, o, cell->index[q]);
-        v[9] = fabsf(v[9]);
-        for (k = 0; k < FIV__TERMS; k++) out[k] += weight * v[k];
-    }
+    for (q = 0; q < 8; q++)
+        if (cell->weight[q] > 0)
+            fiv__add_sample(out, cell->weight[q] * (q & 4 ? far_shell : near_shell), o, cell->index[q]);
+    fiv__unscale(out, o, 1);
 }
 
 /* rho^2 times the vector changes slowly with the distance; samples inside the mesh see everything dark and are left out.
-   Returns the weight of the valid samples. */
+   Returns the weight of the valid samples; 0 when the receiver is inside, too. */
 static float fiv__lookup_scaled(float out[FIV__TERMS], const fiv_occluder *o, const fiv__cell *cell)
 {
-    float v[FIV__TERMS], total = 0, scale;
-    int q, k, pass;
-    for (pass = 0; pass < 2; pass++) { /* the second: all eight lie inside, and so does the receiver */
+    float total = 0;
+    int q;
+    memset(out, 0, FIV__TERMS * sizeof *out);
+    for (q = 0; q < 8; q++) {
+        if (fiv__sample_angle(o, cell->index[q]) < 0) continue;
+        fiv__add_sample(out, cell->weight[q], o, cell->index[q]);
+        total += cell->weight[q];
+    }
+    if (!(total > 1e-4f)) {
         memset(out, 0, FIV__TERMS * sizeof *out);
-        for (q = 0; q < 8; q++) {
-            fiv__read_sample(v, o, cell->index[q]);
-            if (v[9] < 0 && pass == 0) continue;
-            v[9] = fabsf(v[9]);
-            for (k = 0; k < FIV__TERMS; k++) out[k] += cell->weight[q] * v[k];
-            total += cell->weight[q];
-        }
-        if (total > 1e-4f) break;
+        for (q = 0; q < 8; q++) fiv__add_sample(out, cell->weight[q], o, cell->index[q]);
         total = 0;
     }
-    scale = total > 0 ? 1 / (total * cell->radius * cell->radius) : 0;
-    for (k = 0; k < FIV__TERMS; k++) out[k] *= scale;
-    return pass ? 0 : total;
+    fiv__unscale(out, o, 1 / ((total > 0 ? total : 1) * cell->radius * cell->radius));
+    return total;
 }
 
-static void fiv__take_nearest(fiv__cell *cell)
+static int fiv__nearest(const fiv__cell *cell)
 {
     int q, best = 0;
     for (q = 1; q < 8; q++)
         if (cell->weight[q] > cell->weight[best]) best = q;
+    return best;
+}
+
+static void fiv__take_nearest(fiv__cell *cell)
+{
+    int q, best = fiv__nearest(cell);
     for (q = 0; q < 8; q++) cell->weight[q] = q == best ? 1.0f : 0.0f;
 }
 
@@ -2527,7 +2597,7 @@ static void fiv__shade_masks(float rgb[3], const fiv_occluder *o, const fiv__cel
     int q, c, k;
     for (q = 0; q < 8; q++) {
         size_t s = cell->index[q];
-        double radius = (double)fiv__shell_radius(&o->grid, cell->shell + (q >> 2)), weight = (double)cell->weight[q];
+        double radius = (double)o->grid.shell[cell->shell + (q >> 2)], weight = (double)cell->weight[q];
         if (weight < 1e-4 || o->state[s] != FIV__VALID) continue;
         fiv__integrate_above(sum, o->sums, o->words + o->first[s], o->first[s + 1] - o->first[s], o->face, normal);
         ++*masks;
@@ -2580,9 +2650,7 @@ static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], const f
         shadow->direction[k] = world[k] / (distance > 0 ? distance : 1);
         shadow->rgb[k] = shadow->rgb[k] < r->diffuse[k] ? shadow->rgb[k] : r->diffuse[k];
     }
-    fiv__take_nearest(&cell);
-    for (k = 0; k < 8; k++)
-        if (cell.weight[k] > 0) shadow->nearest = cell.index[k];
+    if (r->options->accuracy == FIV_MASK && r->instance_count > 1) shadow->nearest = cell.index[fiv__nearest(&cell)];
     return 1;
 }
 
@@ -2939,13 +3007,12 @@ static void fiv__self_diffuse(float rgb[3], const fiv__receiver *r, const fiv_oc
     int c, k, q;
     memset(v, 0, sizeof v);
     for (q = 0; q < 8; q++) { /* whole vectors, not rho^2 times them: what is open does not fall with the distance */
-        float s[FIV__TERMS], radius = fiv__shell_radius(&o->grid, cell->shell + (q >> 2)), weight;
+        float radius = o->grid.shell[cell->shell + (q >> 2)];
         if (o->state[cell->index[q]] != FIV__VALID) continue;
-        fiv__read_sample(s, o, cell->index[q]);
-        weight = cell->weight[q] / (radius * radius);
-        for (k = 0; k < FIV__TERMS; k++) v[k] += weight * s[k];
+        fiv__add_sample(v, cell->weight[q] / (radius * radius), o, cell->index[q]);
         total += cell->weight[q];
     }
+    fiv__unscale(v, o, 1);
     for (c = 0; c < 3; c++) {
         for (k = 0; k < 3; k++) world[k] = (float)r->environment->vector[3 * c + k];
         fiv__turn_back(open + 3 * c, o->rotation, world);
