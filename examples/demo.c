@@ -11,6 +11,7 @@
 #define LIGHTSCAN_IMPLEMENTATION
 #define PIPELINE_GL
 #define RAINDROP_GL
+#define SSAO_SAT_GL
 #define TONEMAP_GL
 #include "gl_context.h"
 #include "pipeline.h"
@@ -38,6 +39,7 @@ static void print_table(const pipeline *p, const gl_context *context)
     const raindrop_render_stats *r = &p->rain_stats;
     const tonemap_stats *t = &p->tone_stats;
     double pairs = (double)(f->below_horizon + f->below_cutoff + f->whole + f->clipped), drops = (double)r->drops;
+    const char *gpu = gl_context_renderer(context);
     char error[80], rest[240];
     printf("%-10s %9s  %-28s %s\n", "stage", "ms", "error (reference)", "what was left out");
     snprintf(rest, sizeof rest, "%d lights split off with %.0f %% of the light", p->light_stats.lights, 100 * (double)p->light_stats.light_share);
@@ -51,13 +53,15 @@ static void print_table(const pipeline *p, const gl_context *context)
                  100 * (double)f->below_horizon / pairs, 100 * (double)f->below_cutoff / pairs, pairs);
         print_row("shadows", p->seconds[PIPELINE_SHADOWS], percent(error, sizeof error, reference_shadow_error(p, 24), "rms (ray casting)"), rest);
     }
-    if (p->options.occlusion) {
+    if (p->options.occlusion && p->gl)
+        print_row("occlusion", p->seconds[PIPELINE_OCCLUSION], percent(error, sizeof error, reference_occlusion_error(p), "rms (CPU, all pixels)"), gpu);
+    else if (p->options.occlusion) {
         snprintf(rest, sizeof rest, "sky %.0f %%, flat %.0f %%, too small %.0f %% of %zu pixels", 100 * (double)a->sky / (double)a->pixels,
                  100 * (double)a->flat / (double)a->pixels, 100 * (double)a->small / (double)a->pixels, a->pixels);
         print_row("occlusion", p->seconds[PIPELINE_OCCLUSION], percent(error, sizeof error, reference_occlusion_error(p), "rms (all pixels)"), rest);
     }
     print_row("shade", p->seconds[PIPELINE_SHADE], "-", "");
-    if (p->options.rain && p->gl) print_row("rain", p->seconds[PIPELINE_RAIN], "-", gl_context_renderer(context));
+    if (p->options.rain && p->gl) print_row("rain", p->seconds[PIPELINE_RAIN], "-", gpu);
     else if (p->options.rain) {
         snprintf(rest, sizeof rest, "outside %.0f %%, hidden %.0f %%, too small %.0f %% of %.0f drops; %zu as one lookup, %zu as rays",
                  100 * (double)(r->outside + r->behind + r->near_plane) / drops, 100 * (double)r->hidden / drops,
@@ -65,7 +69,7 @@ static void print_table(const pipeline *p, const gl_context *context)
         print_row("rain", p->seconds[PIPELINE_RAIN], percent(error, sizeof error, reference_rain_error(p), "rms (all rays)"), rest);
     }
     if (p->gl) {
-        print_row("tone", p->seconds[PIPELINE_TONE], "-", gl_context_renderer(context));
+        print_row("tone", p->seconds[PIPELINE_TONE], "-", gpu);
         return;
     }
     snprintf(rest, sizeof rest, "%.1f decades; key %.3g; %.1f %% clipped; neighbourhoods searched %zu, skipped %zu",
@@ -169,7 +173,7 @@ int main(int argc, char **argv)
         {"mesopic", 's', &mesopic, "off, uniform or local: reds fade in dim light"},
         {"samples", 'i', &o.samples, "points a pixel each way, 1 to 4; 2"},
         {"frames", 'i', &frames, "pictures, 1/30 s apart"},
-        {"gl", 'b', &gl, "rain and tone mapping on OpenGL (OSMesa; LIGHTSCAN_GL=egl: the GPU)"},
+        {"gl", 'b', &gl, "occlusion, rain and tone on OpenGL (OSMesa; LIGHTSCAN_GL=egl: the GPU)"},
         {"mosaic", 'b', &mosaic, "the picture again, from tiles"},
         {"no-shadows", 'b', &no_shadows, "leave fiv.h out"},
         {"no-occlusion", 'b', &no_occlusion, "leave ssao_sat.h out"},

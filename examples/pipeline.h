@@ -146,15 +146,24 @@ static inline int pipeline_light(pipeline *p)
     return 1;
 }
 
+static inline int pipeline_tell(float done, void *user)
+{
+    common_show_progress((common_progress *)user, "masks", (double)done, 1);
+    return 0;
+}
+
 static inline int pipeline_masks(pipeline *p)
 {
     double start = common_clock();
+    common_progress progress = {0, 0};
     int i;
     for (i = 0; i < SCENE_OBJECTS; ++i) {
         const scene_object *o = &p->scene.objects[i];
         fiv_occluder_options fo = fiv_occluder_defaults();
         fo.first_shell = 0.15f;
         fo.rho = 17;
+        fo.progress = pipeline_tell;
+        fo.progress_user = &progress;
         fo.threads = p->options.threads;
         if (!pipeline_check(p, "fiv_occluder_create", fiv_occluder_create(&p->occluders[i], o->positions, o->vertices, o->indices, o->triangles,
                                                                          &fo, &p->mask_stats[i]))) return 0;
@@ -214,19 +223,18 @@ static inline int pipeline_shadows(pipeline *p)
 static inline int pipeline_occlusion(pipeline *p)
 {
     ssao_sat_input input = ssao_sat_input_linear(p->scene.layers[0].depth, p->scene.width, p->scene.height, (double)p->scene.camera.fov_y);
+    ssao_sat_options so = ssao_sat_defaults();
     size_t i, pixels = (size_t)p->scene.width * (size_t)p->scene.height;
     if (!p->options.occlusion) {
         for (i = 0; i < pixels; ++i) p->open[i] = 1;
         return 1;
     }
-    if (!p->ao) {
-        ssao_sat_options so = ssao_sat_defaults();
-        so.radius = (double)p->options.ao_radius;
-        so.threads = p->options.threads;
-        if (!pipeline_check(p, "ssao_sat_create", ssao_sat_create(&p->ao, p->scene.width, p->scene.height, &so))) return 0;
-    }
-    input.sky = PIPELINE_SKY_DISTANCE;
+    so.radius = (double)p->options.ao_radius;
+    so.threads = p->options.threads;
     input.normals = p->scene.layers[0].view_normals;
+    input.sky = PIPELINE_SKY_DISTANCE;
+    PIPELINE_ON_GL(p, pipeline_gl_occlusion(p->gl, p->open, &input, &so));
+    if (!p->ao && !pipeline_check(p, "ssao_sat_create", ssao_sat_create(&p->ao, p->scene.width, p->scene.height, &so))) return 0;
     return pipeline_check(p, "ssao_sat_apply", ssao_sat_apply(p->ao, p->open, 0, &input, &p->ao_stats));
 }
 

@@ -15,6 +15,7 @@
 #endif
 #include "../raindrop.h"
 #include "../sat.h"
+#include "../ssao_sat.h"
 #include "../tonemap.h"
 
 typedef struct pipeline_gl {
@@ -27,6 +28,9 @@ typedef struct pipeline_gl {
     raindrop_gl *rain;
     const raindrop_environment *environment; /* what `rain` was given */
     const raindrop_rain *drops;
+    ssao_sat_gl *ao;
+    double ao_radius;                        /* what `ao` was made with */
+    unsigned scene_depth, scene_normals;     /* textures of the scene's size */
     float *rows;                             /* the picture as RGBA */
     char message[320];
 } pipeline_gl;
@@ -59,10 +63,13 @@ static inline void pipeline_gl_destroy(pipeline_gl *g)
     if (!g) return;
     tonemap_gl_destroy(g->tone);
     raindrop_gl_destroy(g->rain);
+    ssao_sat_gl_destroy(g->ao);
     if (g->framebuffer) g->gl.DeleteFramebuffers(1, &g->framebuffer);
     if (g->hdr) g->gl.DeleteTextures(1, &g->hdr);
     if (g->rainy) g->gl.DeleteTextures(1, &g->rainy);
     if (g->depth) g->gl.DeleteTextures(1, &g->depth);
+    if (g->scene_depth) g->gl.DeleteTextures(1, &g->scene_depth);
+    if (g->scene_normals) g->gl.DeleteTextures(1, &g->scene_normals);
     sat__gl_close(&g->gl);
     free(g->rows);
     free(g);
@@ -81,6 +88,25 @@ static inline void pipeline_gl_copy(pipeline_gl *g, float *rgb, int to_rgba, int
                 else a[k] = b[k];
             if (to_rgba) b[3] = 1;
         }
+}
+
+/* ---- ambient occlusion, of the scene's size ---- */
+
+static inline int pipeline_gl_occlusion(pipeline_gl *g, float *open, const ssao_sat_input *input, const ssao_sat_options *options)
+{
+    sat_result result = SAT_OK;
+    if (g->ao && g->ao_radius != options->radius) ssao_sat_gl_destroy(g->ao), g->ao = NULL;
+    if (!g->ao) result = ssao_sat_gl_create(&g->ao, g->get_proc, input->width, input->height, options);
+    g->ao_radius = options->radius;
+    if (!pipeline_gl_check(g, result, g->ao ? ssao_sat_gl_message(g->ao) : "")) return 0;
+    if (!g->scene_depth) result = sat__gl_texture(&g->gl, &g->scene_depth, SAT__GL_R32F, input->width, input->height, NULL);
+    if (result == SAT_OK && !g->scene_normals) result = sat__gl_texture(&g->gl, &g->scene_normals, SAT__GL_RGB32F, input->width, input->height, NULL);
+    if (!pipeline_gl_check(g, result, g->gl.message)) return 0;
+    sat__gl_upload(&g->gl, g->scene_depth, SAT__GL_R32F, input->width, input->height, input->depth);
+    sat__gl_upload(&g->gl, g->scene_normals, SAT__GL_RGB32F, input->width, input->height, input->normals);
+    result = ssao_sat_gl_apply(g->ao, 0, g->scene_depth, g->scene_normals, input);
+    if (!pipeline_gl_check(g, result, ssao_sat_gl_message(g->ao))) return 0;
+    return pipeline_gl_check(g, sat__gl_read(&g->gl, open, ssao_sat_gl_texture(g->ao), SAT__GL_R32F, input->width, input->height), g->gl.message);
 }
 
 /* ---- rain: falls and is drawn on the GPU, without streaks, depth of field and internal reflections ---- */
