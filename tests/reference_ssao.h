@@ -92,31 +92,37 @@ static inline void ref_knot(ref_scene *s, float scale, ref_vec at, float turn)
         }
 }
 
-/* The mesh standing on y = 0 of its place, or a knot when the file is not there. */
+/* A mesh, scaled and turned, standing on the y of its place. */
+static inline void ref_add_mesh(ref_scene *s, const mesh *m, float scale, ref_vec at, float turn)
+{
+    ref_vec centre = ref_make(0, 0, 0);
+    float lowest = 1e30f;
+    int i, base = s->m.vertex_count;
+    for (i = 0; i < m->vertex_count; i++) {
+        const float *p = m->positions + 3 * (size_t)i;
+        centre = ref_add(centre, ref_scale(ref_make(p[0], p[1], p[2]), 1 / (float)m->vertex_count));
+        if (p[1] < lowest) lowest = p[1];
+    }
+    for (i = 0; i < m->vertex_count; i++) {
+        const float *p = m->positions + 3 * (size_t)i;
+        float x = (p[0] - centre.x) * scale, y = (p[1] - lowest) * scale, z = (p[2] - centre.z) * scale;
+        ref_add_vertex(s, ref_add(at, ref_make(cosf(turn) * x + sinf(turn) * z, y, -sinf(turn) * x + cosf(turn) * z)));
+    }
+    for (i = 0; i < m->triangle_count; i++)
+        mesh_add_triangle(&s->m, base + m->indices[3 * i], base + m->indices[3 * i + 1], base + m->indices[3 * i + 2]);
+}
+
+/* The mesh of a data file, or a knot when it is not there. */
 static inline void ref_object(ref_scene *s, const char *file, float scale, ref_vec at, float turn)
 {
     mesh m;
     const char *path = support_data(file);
-    ref_vec centre = ref_make(0, 0, 0);
-    float lowest = 1e30f;
-    int i, base = s->m.vertex_count;
     memset(&m, 0, sizeof m);
     if (!path || !mesh_load(&m, path)) {
-        ref_knot(s, scale / 5, at, turn);
+        ref_knot(s, scale > 1 ? scale / 5 : 1, at, turn);
         return;
     }
-    for (i = 0; i < m.vertex_count; i++) {
-        const float *p = m.positions + 3 * (size_t)i;
-        centre = ref_add(centre, ref_scale(ref_make(p[0], p[1], p[2]), 1 / (float)m.vertex_count));
-        if (p[1] < lowest) lowest = p[1];
-    }
-    for (i = 0; i < m.vertex_count; i++) {
-        const float *p = m.positions + 3 * (size_t)i;
-        float x = (p[0] - centre.x) * scale, y = (p[1] - lowest) * scale, z = (p[2] - centre.z) * scale;
-        ref_add_vertex(s, ref_add(at, ref_make(cosf(turn) * x + sinf(turn) * z, y, -sinf(turn) * x + cosf(turn) * z)));
-    }
-    for (i = 0; i < m.triangle_count; i++)
-        mesh_add_triangle(&s->m, base + m.indices[3 * i], base + m.indices[3 * i + 1], base + m.indices[3 * i + 2]);
+    ref_add_mesh(s, &m, scale, at, turn);
     mesh_free(&m);
 }
 
@@ -168,8 +174,7 @@ static inline void ref_field(ref_scene *s)
     s->at = ref_make(0, 0.35f, 0);
 }
 
-/* 3: other meshes than those of 0 to 2, for parameters that were not fitted to them: a bunny, a teapot and a chess queen on a table
-   between two walls. */
+/* 3: other objects than those of 0 to 2, for parameters that were not fitted to them: two bunnies and a knot on a table before a wall. */
 static inline void ref_table(ref_scene *s)
 {
     ref_object(s, "mesh/bunny_small.ply", 0.09f, ref_make(-0.45f, 0.05f, 0), 0.3f);
@@ -235,13 +240,10 @@ static inline void ref_split(ref_scene *s, int node, int first, int end, int dep
     ref_split(s, child + 1, i, end, depth + 1);
 }
 
-static inline void ref_open(ref_scene *s, int which)
+/* Vertex normals and boxes, when all triangles are there. */
+static inline void ref_finish(ref_scene *s)
 {
-    void (*const make[REF_SCENES])(ref_scene *) = {ref_corner, ref_room, ref_field, ref_table};
-    int i, k, n;
-    memset(s, 0, sizeof *s);
-    make[which](s);
-    n = s->m.triangle_count;
+    int i, k, n = s->m.triangle_count;
     s->normals = (ref_vec *)calloc((size_t)s->m.vertex_count, sizeof *s->normals);
     for (i = 0; i < s->smooth; i++) {
         const int *v = s->m.indices + 3 * (size_t)i;
@@ -253,6 +255,14 @@ static inline void ref_open(ref_scene *s, int which)
     for (i = 0; i < n; i++) s->order[i] = i;
     s->node_count = 1;
     ref_split(s, 0, 0, n, 0);
+}
+
+static inline void ref_open(ref_scene *s, int which)
+{
+    void (*const make[REF_SCENES])(ref_scene *) = {ref_corner, ref_room, ref_field, ref_table};
+    memset(s, 0, sizeof *s);
+    make[which](s);
+    ref_finish(s);
 }
 
 static inline void ref_close(ref_scene *s)
@@ -401,10 +411,9 @@ static inline void ref_render_rows(int begin, int end, int worker, void *context
         }
 }
 
-/* rays = 0: depth and normals only. `moved` shifts eye and target, for a camera in motion. */
-static inline ref_picture ref_draw(const ref_scene *scene, int width, int height, int orthographic, int rays, ref_vec moved, int workers)
+/* rays = 0: depth and normals only. `moved` shifts eye and target, for a camera in motion. The radii are 0.4, 1 and 2.4 `radius`. */
+static inline ref_picture ref_draw_radii(const ref_scene *scene, int width, int height, int orthographic, int rays, ref_vec moved, int workers, float radius)
 {
-    static const float radii[REF_RADII] = {0.1f, 0.25f, 0.6f};
     ref_picture p;
     ref_render c;
     sat_threads threads = support_threads(workers);
@@ -418,7 +427,7 @@ static inline ref_picture ref_draw(const ref_scene *scene, int width, int height
     p.z = (float *)malloc(n * 4);
     p.normals = (float *)calloc(n, 12);
     for (r = 0; r < REF_RADII; r++) {
-        p.radius[r] = radii[r];
+        p.radius[r] = radius * (r == 0 ? 0.4f : r == 1 ? 1 : 2.4f);
         p.ao[r] = (float *)malloc(n * 4);
         p.bent[r] = (float *)calloc(n, 12);
     }
@@ -432,6 +441,12 @@ static inline ref_picture ref_draw(const ref_scene *scene, int width, int height
     p.half_height = tan(0.5 * p.fov) * sqrt((double)ref_dot(ref_sub(scene->at, scene->eye), ref_sub(scene->at, scene->eye)));
     threads.parallel_for(height, ref_render_rows, &c, threads.user);
     return p;
+}
+
+/* Radii 0.1, 0.25 and 0.6 for objects about 0.7 high. */
+static inline ref_picture ref_draw(const ref_scene *scene, int width, int height, int orthographic, int rays, ref_vec moved, int workers)
+{
+    return ref_draw_radii(scene, width, height, orthographic, rays, moved, workers, 0.25f);
 }
 
 /* ---- measures, over what is not sky ---- */
@@ -713,8 +728,8 @@ static const char *const ref_method_names[REF_METHODS] = {
 /* Fitted for each method by bench_ssao_sat: radius, second parameter, gain, power, and the sharpness of the blur. */
 typedef struct ref_fit { float parameters[2], sharp, gain, power; } ref_fit;
 static const ref_fit ref_fits[REF_METHODS] = {
-    {{1.0f, 0.01f}, 0.04f, 1.0f, 1.0f}, {{1.4f, 0.15f}, 0.04f, 1.5f, 1.5f}, {{2.0f, 0.3f}, 0.02f, 1.0f, 1.0f},
-    {{1.0f, 0.05f}, 0.04f, 1.0f, 1.0f}, {{1.4f, 0.15f}, 0.04f, 1.5f, 1.5f}, {{2.0f, 0.3f}, 0.02f, 1.0f, 1.0f}};
+    {{1.4f, 0.01f}, 0.04f, 0.818f, 2.0f}, {{1.4f, 0.25f}, 0.04f, 1.646f, 1.5f}, {{2.0f, 0.3f}, 0.02f, 0.468f, 4.0f},
+    {{1.4f, 0.01f}, 0.04f, 0.818f, 2.0f}, {{1.4f, 0.25f}, 0.04f, 1.646f, 1.5f}, {{2.0f, 0.3f}, 0.02f, 0.468f, 4.0f}};
 
 /* The whole method: occlusion in out, `other` is scratch of the same size. */
 static inline void ref_run(ref_method method, const ref_fit *fit, const ref_picture *p, float radius, float *out, float *other)

@@ -1,6 +1,6 @@
 /* Error against run time of ssao_sat.h, and of what others use, against a ray tracer.
 
-   FIT=1 in the environment fits the parameters of all methods first (minutes) and prints them as a table. The ray-traced pictures are
+   FIT=1 in the environment fits the parameters of the comparators first (minutes) and prints them as a table; FIT=only does no more. The ray-traced pictures are
    kept in build/, so that only the first run draws them. */
 #define SAT_IMPLEMENTATION
 #define SSAO_SAT_IMPLEMENTATION
@@ -141,13 +141,13 @@ static float gain_of(int g) { return 0.05f * powf(1.15f, (float)g); }
 typedef struct error_table { double rmse[GAINS][POWERS]; } error_table;
 static float *occlusions[REF_SCENES * REF_RADII];
 
-/* Occlusion before the tone curve of the method, all scenes and radii. */
-static void occlude(const method *m)
+/* Occlusion before the tone curve of the method, all radii. */
+static void occlude(const method *m, int scenes)
 {
     const ssao_sat__fit *fit = &ssao_sat__fits[m->options.method == SSAO_SAT_PLANE && m->options.plane_boxes == 1 ? 5 : (int)m->options.method];
     int scene, r;
     size_t i;
-    for (scene = 0; scene < REF_SCENES; scene++)
+    for (scene = 0; scene < scenes; scene++)
         for (r = 0; r < REF_RADII; r++) {
             float *o = occlusions[scene * REF_RADII + r];
             apply(m, &pictures[scene], (double)pictures[scene].radius[r]);
@@ -193,19 +193,19 @@ static double best_tone(const error_table *t, int left_out, int *gain, int *powe
 
 static void fit_comparators(void)
 {
-    static const float first[4] = {1, 1.4f, 2, 2.8f}, second[3][4] = {{0.01f, 0.05f, 0.1f, 0.2f}, {0.05f, 0.15f, 0.25f, 0.4f}, {0, 0.15f, 0.3f, 0.5f}};
+    static const float first[3][2] = {{1, 1.4f}, {1.4f, 2}, {1.4f, 2}}, second[3][3] = {{0.01f, 0.05f, 0.1f}, {0.05f, 0.15f, 0.25f}, {0, 0.15f, 0.3f}};
     static error_table t[IMAGES];
     int i, a, b, k, g, p;
     bench_table("Fit of the comparators", "method\tradius\tsecond\tgain\tpower\trmse");
     for (i = OURS; i < ALL; i++) {
         ref_fit best = methods[i].fit;
         double least = 1e9;
-        for (a = 0; a < 4; a++)
-            for (b = 0; b < 4; b++) {
+        for (a = 0; a < 2; a++)
+            for (b = 0; b < 3; b++) {
                 double e;
-                methods[i].fit.parameters[0] = first[a];
+                methods[i].fit.parameters[0] = first[methods[i].theirs % 3][a];
                 methods[i].fit.parameters[1] = second[methods[i].theirs % 3][b];
-                occlude(&methods[i]);
+                occlude(&methods[i], FITTED);
                 for (k = 0; k < IMAGES; k++) tabulate(&t[k], k);
                 e = best_tone(t, -1, &g, &p);
                 if (e >= least) continue;
@@ -231,7 +231,7 @@ static void measure_errors(const method *m, score *s)
     int i, scene, g, p;
     size_t k;
     memset(s, 0, sizeof *s);
-    occlude(m);
+    occlude(m, FITTED);
     for (i = 0; i < IMAGES; i++) tabulate(&t[i], i);
     for (scene = 0; scene < FITTED; scene++) {
         best_tone(t, scene, &g, &p);
@@ -519,6 +519,7 @@ int main(void)
     draw_pictures(bench_quick() ? 64 : 256);
     list_methods();
     if (fit && *fit) fit_comparators();
+    if (fit && strcmp(fit, "only") == 0) return 0;
     error_against_time();
     radius_table();
     leave_out_table();
