@@ -1544,6 +1544,7 @@ static sat_result softassign__list_phase(softassign *s, size_t budget)
     s->next = 0;
     if (s->phase == SOFTASSIGN__RELIST || s->prices_known) s->phase = SOFTASSIGN__PATHS;
     else {
+        softassign__certify(s); /* row minima: a bound to show until prices stand still again */
         s->phase = SOFTASSIGN__PRICES;
         s->temperature = 0.3 * softassign__mean_least(s);
         s->schedule[0] = s->schedule[1] = 0;
@@ -2786,7 +2787,7 @@ static sat_result softassign__list_all(softassign *s)
 
 static sat_result softassign__solve_exact(softassign *s)
 {
-    size_t budget = s->options.progress ? 2 * (size_t)s->rows : (size_t)-1 / 4;
+    size_t budget = s->options.progress ? 8 * (size_t)s->rows : (size_t)-1 / 4;
     sat_result result;
     do {
         result = softassign__step_slots(s, budget, s->shown);
