@@ -228,6 +228,51 @@ FIV_DEF int fiv_version(void);
 }
 #endif
 #endif /* FIV_H */
+
+/* ------------------------------------------------------------------------------------------------
+   OpenGL: the receiver pass (FIV_SCALED). Masks and vectors stay the CPU's work.
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(FIV_GL) && !defined(FIV__GL_API)
+#define FIV__GL_API
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct fiv_gl_options {
+    int max_instances;       /* 8; 1..64: of one scene; the shader keeps an array of so many */
+    sat_allocator allocator; /* malloc; used by create, destroy and, when tables grow, by fiv_gl_set_scene */
+} fiv_gl_options;
+FIV_DEF fiv_gl_options fiv_gl_defaults(void);
+
+typedef struct fiv_gl fiv_gl;
+
+/* For the current context (3.3 core, or ES 3.0 with EXT_color_buffer_float) and pictures of this size. On an error
+   *out still is an object, for its message alone. */
+FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int width, int height, const fiv_gl_options *options);
+/* Uploads the environment and the vectors of the occluders: after each fiv_occluder_light. */
+FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *gl, const fiv_environment *environment, const fiv_instance *instances, size_t count);
+/* Only places and scales differ from the last fiv_gl_set_scene: what moving occluders cost a frame. */
+FIV_DEF sat_result fiv_gl_move(fiv_gl *gl, const fiv_instance *instances, size_t count);
+/* Irradiance of every pixel: `points` and `normals` are float textures of world coordinates; a normal of 0 gives 0. State that
+   is touched is put back. */
+FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *gl, unsigned points, unsigned normals);
+/* The result, RGBA32F; belongs to the object. */
+FIV_DEF unsigned fiv_gl_texture(const fiv_gl *gl);
+FIV_DEF const char *fiv_gl_message(const fiv_gl *gl);
+FIV_DEF void fiv_gl_destroy(fiv_gl *gl); /* NULL is fine */
+
+/* For a shader of one's own: `vec3 fiv_irradiance(vec3 point, vec3 normal)`, a list of strings that ends with NULL. Define
+   FIV_INSTANCES as max_instances in front of it. fiv_gl_bind uses the program and sets its uniforms; it takes three
+   texture units and leaves them bound. */
+FIV_DEF const char *const *fiv_gl_glsl(void);
+FIV_DEF sat_result fiv_gl_bind(fiv_gl *gl, unsigned program, int first_unit);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* FIV_GL */
 /* ------------------------------------------------------------------------------------------------
    Stop here if you only want to use the library.
    ------------------------------------------------------------------------------------------------ */
@@ -3284,3 +3329,464 @@ FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, siz
 }
 #endif
 #endif /* FIV_IMPLEMENTATION */
+
+/* ------------------------------------------------------------------------------------------------
+   OpenGL
+   ------------------------------------------------------------------------------------------------ */
+
+#if defined(FIV_IMPLEMENTATION) && defined(FIV_GL) && !defined(FIV__GL_IMPLEMENTED)
+#define FIV__GL_IMPLEMENTED
+
+#ifndef SAT_SIBLING_GL
+#define SAT_SIBLING_GL
+#endif
+#include "sat.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Texels of fiv_tables: of each sample the vector and the solid angle in ten components, then the distances of the lights, two
+   in the third texel and four in each further one; then the support function, one a texel. fiv_scene: eight texels an instance,
+   two a light in the row behind them. fiv_diffuse: I_tot at the corners of the cube. */
+static const char fiv__glsl_cube[] =
+    "#ifndef FIV_GLSL\n"
+    "#define FIV_GLSL\n"
+    "uniform highp sampler2D fiv_tables, fiv_scene, fiv_diffuse;\n"
+    "uniform ivec4 fiv_counts;\n" /* instances, lights, texels a sample, face */
+    "uniform vec3 fiv_x, fiv_y, fiv_z;\n" /* columns of the environment's rotation */
+    "vec4 fiv_at(int base, int texel) {\n"
+    "    int i = base + texel;\n"
+    "    return texelFetch(fiv_tables, ivec2(i & 2047, i >> 11), 0);\n"
+    "}\n"
+    "vec3 fiv_corner(int face, int x, int y) {\n"
+    "    return texelFetch(fiv_diffuse, ivec2(x, face * (fiv_counts.w + 1) + y), 0).rgb;\n"
+    "}\n"
+    "vec3 fiv_total(vec3 normal) {\n"
+    "    vec3 d = vec3(dot(fiv_x, normal), dot(fiv_y, normal), dot(fiv_z, normal)), a = abs(d);\n"
+    "    int k = a.x >= a.y ? (a.x >= a.z ? 0 : 2) : (a.y >= a.z ? 1 : 2);\n"
+    "    bool back = d[k] < 0.0;\n"
+    "    vec2 p = k == 0 ? d.yz : k == 1 ? d.zx : d.xy;\n"
+    "    p = ((back ? p.yx : p) / a[k] + 1.0) * 0.5 * float(fiv_counts.w);\n"
+    "    ivec2 i = clamp(ivec2(p), 0, fiv_counts.w - 1);\n"
+    "    int face = 2 * k + (back ? 1 : 0);\n"
+    "    p -= vec2(i);\n"
+    "    return mix(mix(fiv_corner(face, i.x, i.y), fiv_corner(face, i.x + 1, i.y), p.x),\n"
+    "               mix(fiv_corner(face, i.x, i.y + 1), fiv_corner(face, i.x + 1, i.y + 1), p.x), p.y);\n"
+    "}\n"
+    "vec2 fiv_square(vec3 d) {\n"
+    "    vec2 p = d.xz / (abs(d.x) + abs(d.y) + abs(d.z));\n"
+    "    vec2 folded = (1.0 - abs(p.yx)) * vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);\n"
+    "    return d.y < 0.0 ? folded : p;\n"
+    "}\n"
+    "float fiv_reach(int base, vec3 d) {\n"
+    "    vec2 p = (fiv_square(d) + 1.0) * 16.0;\n"
+    "    ivec2 i = clamp(ivec2(p), 0, 31);\n"
+    "    int at = i.y * 33 + i.x;\n"
+    "    p -= vec2(i);\n"
+    "    return mix(mix(fiv_at(base, at).x, fiv_at(base, at + 1).x, p.x), mix(fiv_at(base, at + 33).x, fiv_at(base, at + 34).x, p.x), p.y);\n"
+    "}\n"
+    "float fiv_cap(float c, float h) {\n"
+    "    float s = 1.0 - h * h;\n"
+    "    if (c * c >= s) return max(c, 0.0);\n"
+    "    float w = sqrt(1.0 - c * c), x = h / sqrt(s), y = clamp(-x * c / w, -1.0, 1.0), q = sqrt(1.0 - y * y);\n"
+    "    return ((c * acos(y) - x * w * q) * s + atan(w * q / x)) / (3.14159265 * s);\n"
+    "}\n";
+
+/* One occluder: what it takes, its solid angle in w, and in `light` how much of each light it covers. */
+static const char fiv__glsl_occluder[] =
+    "vec4 fiv_occluder(int instance, vec3 world, vec3 normal, float cut, inout float light[8]) {\n"
+    "    vec4 a = texelFetch(fiv_scene, ivec2(1, instance), 0), b = texelFetch(fiv_scene, ivec2(2, instance), 0);\n"
+    "    vec4 c = texelFetch(fiv_scene, ivec2(3, instance), 0), grid = texelFetch(fiv_scene, ivec2(4, instance), 0);\n"
+    "    vec4 shells = texelFetch(fiv_scene, ivec2(5, instance), 0);\n"
+    "    vec3 d = vec3(a.x * world.x + b.x * world.y + c.x * world.z, a.y * world.x + b.y * world.y + c.y * world.z,\n"
+    "                  a.z * world.x + b.z * world.y + c.z * world.z);\n"
+    "    vec3 n = vec3(a.x * normal.x + b.x * normal.y + c.x * normal.z, a.y * normal.x + b.y * normal.y + c.y * normal.z,\n"
+    "                  a.z * normal.x + b.z * normal.y + c.z * normal.z);\n"
+    "    int base = int(a.w), theta = int(grid.x), phi = int(grid.y);\n"
+    "    float r = max(length(d), shells.x), f = clamp((log2(r) - grid.w) * shells.y, 0.0, grid.z - 1.0);\n"
+    "    bool octahedral = b.w > 0.5;\n"
+    "    vec2 p = octahedral ? (fiv_square(d) + 1.0) * 0.5 * (grid.xy - 1.0)\n"
+    "        : vec2(atan(d.z, d.x == 0.0 && d.z == 0.0 ? 1.0 : d.x) * 0.159154943 * grid.x, acos(clamp(d.y / max(length(d), 1e-30), -1.0, 1.0)) * 0.318309886 * (grid.y - 1.0));\n"
+    "    if (p.x < 0.0) p.x += grid.x;\n"
+    "    ivec3 i = ivec3(clamp(int(p.x), 0, octahedral ? theta - 2 : theta - 1), clamp(int(p.y), 0, phi - 2), min(int(f), int(grid.z) - 2));\n"
+    "    vec3 w = clamp(vec3(p, f) - vec3(i), 0.0, 1.0), v[3], whole[3];\n"
+    "    float angle = 0.0, all = 0.0, total = 0.0, far[8];\n"
+    "    for (int k = 0; k < 8; k++) far[k] = 0.0;\n"
+    "    for (int k = 0; k < 3; k++) v[k] = whole[k] = vec3(0.0);\n"
+    "    for (int q = 0; q < 8; q++) {\n"
+    "        ivec3 e = ivec3(q & 1, (q >> 1) & 1, q >> 2);\n"
+    "        vec3 share = mix(1.0 - w, w, vec3(e));\n"
+    "        float weight = share.x * share.y * share.z;\n"
+    "        int x = i.x + e.x, at = (((i.z + e.z) * phi + i.y + e.y) * theta + (x == theta ? 0 : x)) * fiv_counts.z;\n"
+    "        vec4 s = fiv_at(base, at), t = fiv_at(base, at + 1), u = fiv_at(base, at + 2);\n"
+    "        vec3 red = s.xyz, green = vec3(s.w, t.xy), blue = vec3(t.zw, u.x);\n"
+    "        whole[0] += weight * red; whole[1] += weight * green; whole[2] += weight * blue;\n"
+    "        all += weight * abs(u.y);\n"
+    "        if (u.y < 0.0) continue;\n"
+    "        v[0] += weight * red; v[1] += weight * green; v[2] += weight * blue;\n"
+    "        angle += weight * u.y;\n"
+    "        total += weight;\n"
+    "        far[0] += weight * u.z; far[1] += weight * u.w;\n"
+    "        for (int k = 2; k < fiv_counts.y; k += 4) {\n"
+    "            vec4 more = fiv_at(base, at + 3 + (k - 2) / 4);\n"
+    "            far[k] += weight * more.x; if (k + 1 < 8) far[k + 1] += weight * more.y;\n"
+    "            if (k + 2 < 8) { far[k + 2] += weight * more.z; far[k + 3] += weight * more.w; }\n"
+    "        }\n"
+    "    }\n"
+    "    bool inside = !(total > 1e-4);\n"
+    "    for (int k = 0; k < fiv_counts.y; k++)\n"
+    "        light[k] = max(light[k], inside ? 1.0 : clamp(0.5 + far[k] / max(total, 1e-4), 0.0, 1.0));\n"
+    "    float scale = 1.0 / ((inside ? 1.0 : total) * r * r);\n"
+    "    angle = (inside ? all : angle) * scale;\n"
+    "    vec4 taken = vec4(0.0, 0.0, 0.0, angle);\n"
+    "    for (int k = 0; k < 3; k++) {\n"
+    "        vec3 whole_or_valid = (inside ? whole[k] : v[k]) * scale;\n"
+    "        float along = dot(whole_or_valid, n), size = length(whole_or_valid);\n"
+    "        if (cut > 0.0 && size > 0.0)\n"
+    "            along = mix(along, size * fiv_cap(along / size, clamp(1.0 - angle * 0.159154943, 0.01, 0.999999)), min(4.0 * cut, 1.0));\n"
+    "        taken[k] = max(along, 0.0);\n"
+    "    }\n"
+    "    return taken;\n"
+    "}\n";
+
+static const char fiv__glsl_receiver[] =
+    "float fiv_lens(float r, float s, float d) {\n"
+    "    if (d >= r + s) return 0.0;\n"
+    "    if (d <= abs(r - s)) return 3.14159265 * min(r, s) * min(r, s);\n"
+    "    float a = acos(clamp((d * d + r * r - s * s) / (2.0 * d * r), -1.0, 1.0));\n"
+    "    float b = acos(clamp((d * d + s * s - r * r) / (2.0 * d * s), -1.0, 1.0));\n"
+    "    return r * r * (a - 0.5 * sin(2.0 * a)) + s * s * (b - 0.5 * sin(2.0 * b));\n"
+    "}\n"
+    "vec3 fiv_irradiance(vec3 point, vec3 normal) {\n"
+    "    if (!(dot(normal, normal) > 0.0)) return vec3(0.0);\n"
+    "    normal = normalize(normal);\n"
+    "    vec3 open = fiv_total(normal), sum = vec3(0.0), shared_sum = vec3(0.0), largest = vec3(0.0);\n"
+    "    vec4 discs[FIV_INSTANCES];\n"
+    "    vec3 takes[FIV_INSTANCES];\n"
+    "    float light[8];\n"
+    "    int count = 0;\n"
+    "    for (int k = 0; k < 8; k++) light[k] = 0.0;\n"
+    "    for (int i = 0; i < FIV_INSTANCES; i++) {\n"
+    "        if (i >= fiv_counts.x) break;\n"
+    "        vec4 place = texelFetch(fiv_scene, ivec2(0, i), 0);\n"
+    "        vec3 world = (place.xyz - point) * place.w;\n"
+    "        float r = length(world), height = dot(world, normal), cut = 0.0;\n"
+    "        if (!(place.w > 0.0) || !(r < 1e9) || height <= -1.0) continue;\n"
+    "        if (height < 1.0) {\n"
+    "            vec4 a = texelFetch(fiv_scene, ivec2(1, i), 0), b = texelFetch(fiv_scene, ivec2(2, i), 0), c = texelFetch(fiv_scene, ivec2(3, i), 0);\n"
+    "            vec3 n = a.xyz * normal.x + b.xyz * normal.y + c.xyz * normal.z;\n"
+    "            float below = fiv_reach(int(c.w), -n), above = fiv_reach(int(c.w), n);\n"
+    "            if (height <= -above) continue;\n"
+    "            if (height < below - 1e-4) cut = (below - height) / (below + above);\n"
+    "        }\n"
+    "        vec4 taken = fiv_occluder(i, world, normal, cut, light);\n"
+    "        vec3 own = min(taken.rgb, open);\n"
+    "        discs[count] = vec4(world / max(r, 1e-30), sqrt(taken.w * 0.318309886));\n"
+    "        takes[count] = own;\n"
+    "        sum += own;\n"
+    "        largest = max(largest, own);\n"
+    "        for (int j = 0; j < count; j++) {\n"
+    "            float area = fiv_lens(discs[j].w, discs[count].w, length(discs[j].xyz - discs[count].xyz)), less = min(discs[j].w, discs[count].w);\n"
+    "            if (area > 0.0) shared_sum += area / (3.14159265 * less * less) * min(takes[j], own);\n"
+    "        }\n"
+    "        count++;\n"
+    "    }\n"
+    "    vec3 result = clamp(open - max(sum - shared_sum, largest), vec3(0.0), open);\n"
+    "    for (int k = 0; k < fiv_counts.y; k++) {\n"
+    "        vec3 direction = texelFetch(fiv_scene, ivec2(2 * k, FIV_INSTANCES), 0).xyz, power = texelFetch(fiv_scene, ivec2(2 * k + 1, FIV_INSTANCES), 0).rgb;\n"
+    "        result += power * max(dot(normal, direction), 0.0) * (1.0 - light[k]);\n"
+    "    }\n"
+    "    return result;\n"
+    "}\n"
+    "#endif\n";
+
+static const char *const fiv__glsl[] = {fiv__glsl_cube, fiv__glsl_occluder, fiv__glsl_receiver, NULL};
+
+FIV_DEF const char *const *fiv_gl_glsl(void) { return fiv__glsl; }
+
+static const char fiv__glsl_main[] =
+    "uniform highp sampler2D fiv_points, fiv_normals;\n"
+    "out vec4 value;\n"
+    "void main() {\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+    "    value = vec4(fiv_irradiance(texelFetch(fiv_points, p, 0).xyz, texelFetch(fiv_normals, p, 0).xyz), 1.0);\n"
+    "}\n";
+
+enum { FIV__GL_WIDTH = 2048, FIV__GL_UNITS = 5, FIV__SCENE_WIDTH = 16, FIV__SUPPORT_TEXELS = FIV__SUPPORT * FIV__SUPPORT };
+
+struct fiv_gl {
+    sat__gl gl;
+    sat_allocator allocator;
+    int width, height, max_instances;
+    int count, lights, texels, face, table_rows; /* what the textures hold */
+    int base[64];                                /* texel where the tables of each instance begin */
+    float rotation[9];
+    unsigned program, target, out, tables, scene, diffuse;
+    const fiv_occluder *occluders[64];
+    float rows[65][FIV__SCENE_WIDTH][4];         /* fiv_scene */
+};
+
+FIV_DEF fiv_gl_options fiv_gl_defaults(void)
+{
+    fiv_gl_options o;
+    memset(&o, 0, sizeof o);
+    o.max_instances = 8;
+    return o;
+}
+
+FIV_DEF const char *fiv_gl_message(const fiv_gl *g) { return g ? g->gl.message : "no object"; }
+FIV_DEF unsigned fiv_gl_texture(const fiv_gl *g) { return g ? g->out : 0; }
+
+static void fiv__gl_delete_textures(fiv_gl *g)
+{
+    unsigned textures[4];
+    textures[0] = g->out, textures[1] = g->tables, textures[2] = g->scene, textures[3] = g->diffuse;
+    g->gl.DeleteTextures(4, textures);
+}
+
+FIV_DEF void fiv_gl_destroy(fiv_gl *g)
+{
+    sat_allocator allocator;
+    if (!g) return;
+    if (g->out || g->program) {
+        if (g->target) g->gl.DeleteFramebuffers(1, &g->target);
+        if (g->program) g->gl.DeleteProgram(g->program);
+        fiv__gl_delete_textures(g);
+    }
+    sat__gl_close(&g->gl);
+    allocator = g->allocator;
+    sat__release(&allocator, g, sizeof *g);
+}
+
+static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
+{
+    sat__gl *gl = &g->gl;
+    sat__gl_state state;
+    sat__gl_shaders shaders;
+    const char *body[2];
+    sat_result r = sat__gl_open(gl, get_proc);
+    if (r) return r;
+    body[0] = fiv__glsl_main, body[1] = NULL;
+    memset(&shaders, 0, sizeof shaders);
+    shaders.name = "fiv: receivers";
+    shaders.library = fiv__glsl;
+    shaders.fragment = body;
+    sat__gl_define(gl, "FIV_INSTANCES", g->max_instances);
+    r = sat__gl_build(gl, &g->program, &shaders);
+    if (r) return r;
+    sat__gl_begin(gl, &state, 1);
+    r = sat__gl_texture(gl, &g->out, SAT__GL_RGBA32F, g->width, g->height, NULL);
+    if (!r) r = sat__gl_framebuffer(gl, &g->target, &g->out, 1, 0);
+    if (!r) r = sat__gl_texture(gl, &g->scene, SAT__GL_RGBA32F, FIV__SCENE_WIDTH, g->max_instances + 1, NULL);
+    sat__gl_end(gl, &state);
+    return r;
+}
+
+FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int width, int height, const fiv_gl_options *options)
+{
+    fiv_gl_options o = options ? *options : fiv_gl_defaults();
+    sat_allocator allocator;
+    fiv_gl *g;
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    if (!sat__version_matches()) return SAT_ERR_VERSION;
+    if (!get_proc || width < 1 || height < 1 || width > 16384 || height > 16384) return SAT_ERR_ARGUMENT;
+    if (o.max_instances < 1 || o.max_instances > 64 || !sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
+    g = (fiv_gl *)sat__alloc(&allocator, sizeof *g);
+    if (!g) return SAT_ERR_MEMORY;
+    memset(g, 0, sizeof *g);
+    g->allocator = allocator;
+    g->width = width, g->height = height, g->max_instances = o.max_instances;
+    *out = g;
+    return fiv__gl_start(g, get_proc);
+}
+
+/* The texels of one occluder's samples and support function. */
+static void fiv__gl_fill(float *out, const fiv_occluder *o, int texels)
+{
+    size_t s, i;
+    for (s = 0; s < o->stats.samples; s++, out += 4 * texels) {
+        float v[FIV__TERMS];
+        int k;
+        memset(v, 0, sizeof v);
+        memset(out, 0, (size_t)(4 * texels) * sizeof *out);
+        fiv__add_sample_plain(v, 1, o, s);
+        fiv__unscale(v, o, 1);
+        if (fiv__sample_angle(o, s) < 0) v[9] = -v[9];
+        memcpy(out, v, sizeof v);
+        for (k = 0; k < o->light_count; k++) out[10 + k] = (float)o->distance[s * (size_t)o->max_lights + (size_t)k] / 21;
+    }
+    for (i = 0; i < FIV__SUPPORT_TEXELS; i++) out[4 * i] = o->support[i];
+}
+
+/* Where each instance's tables begin; instances of one occluder share them. Returns the number of texels. */
+static size_t fiv__gl_bases(fiv_gl *g, const fiv_instance *instances, size_t count)
+{
+    size_t i, j, used = 0;
+    for (i = 0; i < count; i++) {
+        const fiv_occluder *o = instances[i].occluder;
+        for (j = 0; j < i && instances[j].occluder != o; j++) {}
+        g->occluders[i] = o;
+        g->base[i] = j < i ? g->base[j] : (int)used;
+        if (j == i) used += o->stats.samples * (size_t)g->texels + FIV__SUPPORT_TEXELS;
+        if (used > ((size_t)1 << 24)) return used;
+    }
+    return used;
+}
+
+static sat_result fiv__gl_upload_tables(fiv_gl *g, size_t used)
+{
+    size_t bytes, i, j;
+    int rows = (int)((used + FIV__GL_WIDTH - 1) / FIV__GL_WIDTH);
+    float *texels;
+    sat_result r = SAT_OK;
+    if (rows < 1) rows = 1;
+    bytes = (size_t)rows * FIV__GL_WIDTH * 4 * sizeof *texels;
+    texels = (float *)sat__alloc(&g->allocator, bytes);
+    if (!texels) return SAT_ERR_MEMORY;
+    memset(texels, 0, bytes);
+    for (i = 0; i < (size_t)g->count; i++) {
+        for (j = 0; j < i && g->occluders[j] != g->occluders[i]; j++) {}
+        if (j == i) fiv__gl_fill(texels + 4 * (size_t)g->base[i], g->occluders[i], g->texels);
+    }
+    if (g->tables && rows != g->table_rows) {
+        g->gl.DeleteTextures(1, &g->tables);
+        g->tables = 0;
+    }
+    g->table_rows = rows;
+    if (g->tables) sat__gl_upload(&g->gl, g->tables, SAT__GL_RGBA32F, FIV__GL_WIDTH, rows, texels);
+    else r = sat__gl_texture(&g->gl, &g->tables, SAT__GL_RGBA32F, FIV__GL_WIDTH, rows, texels);
+    sat__release(&g->allocator, texels, bytes);
+    return r;
+}
+
+static sat_result fiv__gl_upload_diffuse(fiv_gl *g, const fiv_environment *e)
+{
+    size_t side = (size_t)e->face + 1, i, bytes = 24 * side * side * sizeof(float);
+    float *texels = (float *)sat__alloc(&g->allocator, bytes);
+    sat_result r = SAT_OK;
+    if (!texels) return SAT_ERR_MEMORY;
+    for (i = 0; i < 6 * side * side; i++) {
+        memcpy(texels + 4 * i, e->irradiance + 3 * i, 3 * sizeof *texels);
+        texels[4 * i + 3] = 1;
+    }
+    if (g->diffuse && g->face != e->face) {
+        g->gl.DeleteTextures(1, &g->diffuse);
+        g->diffuse = 0;
+    }
+    g->face = e->face;
+    if (g->diffuse) sat__gl_upload(&g->gl, g->diffuse, SAT__GL_RGBA32F, (int)side, (int)(6 * side), texels);
+    else r = sat__gl_texture(&g->gl, &g->diffuse, SAT__GL_RGBA32F, (int)side, (int)(6 * side), texels);
+    sat__release(&g->allocator, texels, bytes);
+    return r;
+}
+
+/* The scene's row of one instance, see fiv__glsl_occluder. */
+static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *instance, int base, int texels)
+{
+    const fiv_occluder *o = instance->occluder;
+    float centre[3];
+    int k;
+    fiv__turn(centre, o->rotation, o->centre);
+    for (k = 0; k < 3; k++) row[0][k] = instance->position[k] + instance->scale * centre[k];
+    row[0][3] = o->radius > 0 && instance->scale > 0 ? 1 / (o->radius * instance->scale) : 0;
+    for (k = 0; k < 9; k++) row[1 + k / 3][k % 3] = o->rotation[k];
+    row[1][3] = (float)base;
+    row[2][3] = (float)o->grid.octahedral;
+    row[3][3] = (float)base + (float)texels * (float)o->stats.samples;
+    row[4][0] = (float)o->grid.theta, row[4][1] = (float)o->grid.phi, row[4][2] = (float)o->grid.rho, row[4][3] = o->grid.log_first;
+    row[5][0] = o->grid.first, row[5][1] = o->grid.per_log;
+}
+
+FIV_DEF sat_result fiv_gl_move(fiv_gl *g, const fiv_instance *instances, size_t count)
+{
+    sat__gl_state state;
+    size_t i;
+    int k;
+    if (!g || !g->tables || count != (size_t)g->count || (count && !instances)) return SAT_ERR_ARGUMENT;
+    for (i = 0; i < count; i++) {
+        if (instances[i].occluder != g->occluders[i] || !sat__is_finite(instances[i].scale) || !(instances[i].scale >= 0)) return SAT_ERR_ARGUMENT;
+        for (k = 0; k < 3; k++)
+            if (!sat__is_finite(instances[i].position[k])) return SAT_ERR_ARGUMENT;
+    }
+    for (i = 0; i < count; i++) fiv__gl_row(g->rows[i], &instances[i], g->base[i], g->texels);
+    sat__gl_begin(&g->gl, &state, 1);
+    sat__gl_upload(&g->gl, g->scene, SAT__GL_RGBA32F, FIV__SCENE_WIDTH, g->max_instances + 1, g->rows);
+    sat__gl_end(&g->gl, &state);
+    return SAT_OK;
+}
+
+FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *g, const fiv_environment *e, const fiv_instance *instances, size_t count)
+{
+    sat__gl_state state;
+    fiv_irradiance_options o = fiv_irradiance_defaults();
+    size_t i, used;
+    sat_result r;
+    int k;
+    if (!g || !g->program || !e || (count && !instances)) return SAT_ERR_ARGUMENT;
+    if (count > (size_t)g->max_instances) return SAT_ERR_LIMIT;
+    for (i = 0; i < count; i++)
+        if (!fiv__instance_is_valid(&instances[i], e, &o)) return SAT_ERR_ARGUMENT;
+    g->count = (int)count;
+    g->lights = e->light_count;
+    g->texels = 3 + (e->light_count > 2 ? (e->light_count + 1) / 4 : 0);
+    memcpy(g->rotation, e->rotation, sizeof g->rotation);
+    used = fiv__gl_bases(g, instances, count);
+    if (used > ((size_t)1 << 24)) return SAT_ERR_LIMIT;
+    memset(g->rows, 0, sizeof g->rows);
+    for (k = 0; k < e->light_count; k++) {
+        fiv__turn(g->rows[g->max_instances][2 * k], e->rotation, e->lights[k].direction);
+        memcpy(g->rows[g->max_instances][2 * k + 1], e->lights[k].power, sizeof e->lights[k].power);
+    }
+    sat__gl_clear_errors(&g->gl);
+    sat__gl_begin(&g->gl, &state, 1);
+    r = fiv__gl_upload_tables(g, used);
+    if (!r) r = fiv__gl_upload_diffuse(g, e);
+    sat__gl_end(&g->gl, &state);
+    if (!r) r = sat__gl_check(&g->gl, "fiv: textures");
+    return r ? r : fiv_gl_move(g, instances, count);
+}
+
+static void fiv__gl_uniforms(fiv_gl *g, unsigned program, int unit)
+{
+    sat__gl *gl = &g->gl;
+    float column[3];
+    int counts = gl->GetUniformLocation(program, "fiv_counts"), k;
+    static const char *const names[3] = {"fiv_x", "fiv_y", "fiv_z"};
+    sat__gl_set_texture(gl, program, "fiv_tables", unit, g->tables);
+    sat__gl_set_texture(gl, program, "fiv_scene", unit + 1, g->scene);
+    sat__gl_set_texture(gl, program, "fiv_diffuse", unit + 2, g->diffuse);
+    for (k = 0; k < 3; k++) {
+        column[0] = g->rotation[k], column[1] = g->rotation[3 + k], column[2] = g->rotation[6 + k];
+        sat__gl_set_float3(gl, program, names[k], column);
+    }
+    if (counts >= 0) gl->Uniform4i(counts, g->count, g->lights, g->texels, g->face);
+}
+
+FIV_DEF sat_result fiv_gl_bind(fiv_gl *g, unsigned program, int first_unit)
+{
+    if (!g || !g->tables || first_unit < 0) return SAT_ERR_ARGUMENT;
+    g->gl.UseProgram(program);
+    fiv__gl_uniforms(g, program, first_unit);
+    return SAT_OK;
+}
+
+FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *g, unsigned points, unsigned normals)
+{
+    sat__gl_state state;
+    if (!g || !g->tables || !points || !normals) return SAT_ERR_ARGUMENT;
+    sat__gl_begin(&g->gl, &state, FIV__GL_UNITS);
+    sat__gl_pass(&g->gl, g->program, g->target, g->width, g->height);
+    fiv__gl_uniforms(g, g->program, 0);
+    sat__gl_set_texture(&g->gl, g->program, "fiv_points", 3, points);
+    sat__gl_set_texture(&g->gl, g->program, "fiv_normals", 4, normals);
+    sat__gl_draw(&g->gl);
+    sat__gl_end(&g->gl, &state);
+    return SAT_OK;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* FIV_IMPLEMENTATION && FIV_GL */

@@ -1,0 +1,280 @@
+/* fiv.h on the GPU: the receiver pass against the CPU, state, errors. Needs OSMesa (or a GPU, see gl_context.h). */
+
+#include "fiv.h"
+#include "expect.h"
+#include "support.h"
+#include "gl_context.h"
+#include "reference_fiv.h"
+
+enum { WIDTH = 40, HEIGHT = 24, COUNT = WIDTH * HEIGHT };
+
+typedef struct test_scene {
+    gl_context context;
+    reference_mesh mesh;
+    fiv_environment *environment;
+    fiv_occluder *upright, *turned;
+    fiv_instance instances[3];
+    float points[4 * COUNT], normals[4 * COUNT];
+    unsigned point_texture, normal_texture;
+    fiv_gl *gl;
+    support_memory memory;
+} test_scene;
+
+static test_scene scene;
+
+/* A sky with `suns` bright texels. */
+static void test_sky(int suns)
+{
+    static float pixels[64 * 32 * 3];
+    sat_image image = sat_image_f32(pixels, 64, 32, 3);
+    fiv_environment_options o = fiv_environment_defaults();
+    int i;
+    o.delta_ratio = 100;
+    for (i = 0; i < 64 * 32 * 3; i++) pixels[i] = (i / 3 / 64 < 16 ? 1.0f : 0.2f) * (1 + 0.5f * sinf(0.1f * (float)(i / 3 % 64) + (float)(i % 3)));
+    for (i = 0; i < suns; i++) pixels[3 * (64 * (4 + 2 * i) + 9 * i) + i % 3] = 3000;
+    fiv_environment_destroy(scene.environment);
+    EXPECT_EQ(fiv_environment_create(&scene.environment, &image, &o, NULL), SAT_OK);
+}
+
+static void test_light(void)
+{
+    float turn[9] = {0.6f, 0, 0.8f, 0, 1, 0, -0.8f, 0, 0.6f}, sky_turn[9] = {1, 0, 0, 0, 0.8f, -0.6f, 0, 0.6f, 0.8f};
+    EXPECT_EQ(fiv_environment_update(scene.environment, NULL, sky_turn), SAT_OK);
+    EXPECT_EQ(fiv_occluder_light(scene.upright, scene.environment, NULL), SAT_OK);
+    EXPECT_EQ(fiv_occluder_light(scene.turned, scene.environment, turn), SAT_OK);
+}
+
+static void test_receivers(void)
+{
+    uint64_t seed = 8;
+    int i, k;
+    for (i = 0; i < COUNT; i++) {
+        float n[3];
+        for (k = 0; k < 3; k++) n[k] = (float)support_gaussian(&seed);
+        if (i < COUNT / 2) n[0] = n[2] = 0, n[1] = 1;
+        fiv__normalise(n, n);
+        if (i == 5) n[1] = 0;
+        for (k = 0; k < 3; k++) {
+            scene.points[4 * i + k] = (float)(k == 1 ? (i < COUNT / 2 ? -0.9 : 2 * support_uniform(&seed) - 1) : 8 * support_uniform(&seed) - 4);
+            scene.normals[4 * i + k] = n[k];
+        }
+        scene.points[4 * i + 3] = scene.normals[4 * i + 3] = 1;
+    }
+}
+
+static int test_open(fiv_storage storage)
+{
+    fiv_occluder_options o = fiv_occluder_defaults();
+    fiv_gl_options options = fiv_gl_defaults();
+    sat__gl_state state;
+    sat_result result;
+    int i;
+    memset(&scene, 0, sizeof scene);
+    if (!gl_context_open(&scene.context, 3, 3)) return 0;
+    scene.mesh = reference_knot(2, 3, 40, 8, 0.25);
+    o.theta = 16, o.phi = 9, o.rho = 8;
+    o.storage = storage;
+    EXPECT_EQ(fiv_occluder_create(&scene.upright, scene.mesh.positions, scene.mesh.vertices, scene.mesh.indices, scene.mesh.triangles, &o, NULL), SAT_OK);
+    EXPECT_EQ(fiv_occluder_share(&scene.turned, scene.upright), SAT_OK);
+    test_sky(1);
+    test_light();
+    for (i = 0; i < 3; i++) {
+        scene.instances[i].occluder = i == 1 ? scene.turned : scene.upright;
+        scene.instances[i].position[0] = 1.5f * (float)i - 1.2f, scene.instances[i].position[1] = 0.3f * (float)i;
+        scene.instances[i].position[2] = 0.4f * (float)(i * i);
+        scene.instances[i].scale = 1 - 0.2f * (float)i;
+    }
+    test_receivers();
+    options.allocator = support_allocator(&scene.memory);
+    result = fiv_gl_create(&scene.gl, scene.context.get_proc, WIDTH, HEIGHT, &options);
+    if (result) printf("%s\n", fiv_gl_message(scene.gl));
+    if (!EXPECT_EQ(result, SAT_OK)) return 0;
+    sat__gl_begin(&scene.gl->gl, &state, 1);
+    EXPECT_EQ(sat__gl_texture(&scene.gl->gl, &scene.point_texture, SAT__GL_RGBA32F, WIDTH, HEIGHT, scene.points), SAT_OK);
+    EXPECT_EQ(sat__gl_texture(&scene.gl->gl, &scene.normal_texture, SAT__GL_RGBA32F, WIDTH, HEIGHT, scene.normals), SAT_OK);
+    sat__gl_end(&scene.gl->gl, &state);
+    return 1;
+}
+
+static void test_close(void)
+{
+    if (scene.gl) {
+        scene.gl->gl.DeleteTextures(1, &scene.point_texture);
+        scene.gl->gl.DeleteTextures(1, &scene.normal_texture);
+    }
+    fiv_gl_destroy(scene.gl);
+    EXPECT(support_memory_clean(&scene.memory));
+    fiv_occluder_destroy(scene.turned);
+    fiv_occluder_destroy(scene.upright);
+    fiv_environment_destroy(scene.environment);
+    reference_mesh_free(&scene.mesh);
+    gl_context_close(&scene.context);
+}
+
+/* The largest and the root-mean-square difference between both sides, as parts of the largest irradiance. */
+static void test_difference(double *worst, double *rms, size_t count)
+{
+    static float gpu[4 * COUNT], cpu[3 * COUNT], points[3 * COUNT], normals[3 * COUNT];
+    fiv_irradiance_options o = fiv_irradiance_defaults();
+    sat__gl_state state;
+    double largest = 0;
+    int i, k;
+    o.cutoff = 0;
+    for (i = 0; i < COUNT; i++)
+        for (k = 0; k < 3; k++) points[3 * i + k] = scene.points[4 * i + k], normals[3 * i + k] = scene.normals[4 * i + k];
+    EXPECT_EQ(fiv_irradiance(cpu, points, normals, COUNT, scene.environment, scene.instances, count, &o, NULL), SAT_OK);
+    EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
+    sat__gl_begin(&scene.gl->gl, &state, 1);
+    EXPECT_EQ(sat__gl_read(&scene.gl->gl, gpu, fiv_gl_texture(scene.gl), SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
+    sat__gl_end(&scene.gl->gl, &state);
+    *worst = *rms = 0;
+    for (i = 0; i < COUNT; i++)
+        for (k = 0; k < 3; k++) {
+            double off = fabs((double)gpu[4 * i + k] - (double)cpu[3 * i + k]);
+            EXPECT(!expect_is_nan((double)gpu[4 * i + k]));
+            if (off > *worst) *worst = off;
+            if ((double)cpu[3 * i + k] > largest) largest = (double)cpu[3 * i + k];
+            *rms += off * off / (3 * COUNT);
+        }
+    EXPECT(largest > 1);
+    *worst /= largest;
+    *rms = sqrt(*rms) / largest;
+}
+
+TEST(receiver_pass_equals_the_cpu)
+{
+    int storage, suns;
+    size_t count;
+    for (storage = 0; storage < 2; storage++) {
+        if (!test_open((fiv_storage)storage)) SKIP(scene.context.message);
+        for (suns = 0; suns < 5; suns += suns < 2 ? 1 : 2) {
+            test_sky(suns);
+            EXPECT_EQ(fiv_environment_get_stats(scene.environment).lights, suns);
+            test_light();
+            for (count = 0; count < 4; count += suns == 1 ? 1 : 3) {
+                double worst, rms;
+                EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, count), SAT_OK);
+                test_difference(&worst, &rms, count);
+                EXPECT(worst < 2e-3);
+                EXPECT(rms < 1e-4);
+                if (suns == 1 && count == 3) REPORT("GPU against CPU, three occluders: worst", worst, "of the largest");
+                if (suns == 1 && count == 3) REPORT("GPU against CPU, three occluders: rms", rms, "of the largest");
+            }
+        }
+        test_close();
+    }
+}
+
+TEST(moving_needs_no_tables)
+{
+    double worst, rms;
+    long calls;
+    if (!test_open(FIV_STORAGE_FLOAT)) SKIP(scene.context.message);
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
+    scene.instances[0].position[0] += 0.7f;
+    scene.instances[2].scale = 0;
+    calls = scene.memory.calls;
+    EXPECT_EQ(fiv_gl_move(scene.gl, scene.instances, 3), SAT_OK);
+    test_difference(&worst, &rms, 3);
+    EXPECT(worst < 2e-3 && rms < 1e-4);
+    EXPECT_EQ(scene.memory.calls, calls);
+    EXPECT_EQ(fiv_gl_move(scene.gl, scene.instances, 2), SAT_ERR_ARGUMENT);
+    scene.instances[0].occluder = scene.turned;
+    EXPECT_EQ(fiv_gl_move(scene.gl, scene.instances, 3), SAT_ERR_ARGUMENT);
+    test_close();
+}
+
+TEST(state_is_put_back)
+{
+    enum { VIEWPORT = 0x0BA2, PROGRAM = 0x8B8D, DRAW_FRAMEBUFFER = 0x8CA6, VERTEX_ARRAY = 0x85B5, TEXTURE_2D = 0x8069, ACTIVE = 0x84E0 };
+    static const unsigned names[6] = {VIEWPORT, PROGRAM, DRAW_FRAMEBUFFER, VERTEX_ARRAY, TEXTURE_2D, ACTIVE};
+    int before[6][4], after[6][4], i;
+    unsigned texture = 0;
+    if (!test_open(FIV_STORAGE_FLOAT)) SKIP(scene.context.message);
+    scene.gl->gl.GenTextures(1, &texture);
+    scene.gl->gl.ActiveTexture(0x84C0 + 1);
+    scene.gl->gl.BindTexture(0x0DE1, texture);
+    scene.gl->gl.Viewport(1, 2, 3, 4);
+    memset(before, 0, sizeof before);
+    memset(after, 0, sizeof after);
+    for (i = 0; i < 6; i++) scene.gl->gl.GetIntegerv(names[i], before[i]);
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
+    EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
+    for (i = 0; i < 6; i++) scene.gl->gl.GetIntegerv(names[i], after[i]);
+    EXPECT(memcmp(before, after, sizeof before) == 0);
+    EXPECT_EQ(scene.gl->gl.GetError(), 0);
+    scene.gl->gl.DeleteTextures(1, &texture);
+    test_close();
+}
+
+/* A shader of one's own calls fiv_irradiance. */
+TEST(own_shader)
+{
+    static const char *const body[] = {"uniform sampler2D p, n;\nout vec4 value;\n"
+        "void main() { ivec2 i = ivec2(gl_FragCoord.xy);\n"
+        "    value = vec4(fiv_irradiance(texelFetch(p, i, 0).xyz, texelFetch(n, i, 0).xyz), 1.0); }\n", NULL};
+    static float mine[4 * COUNT], theirs[4 * COUNT];
+    sat__gl_shaders shaders;
+    sat__gl_state state;
+    unsigned program = 0, target = 0, out = 0;
+    sat__gl *gl;
+    if (!test_open(FIV_STORAGE_FLOAT)) SKIP(scene.context.message);
+    gl = &scene.gl->gl;
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
+    EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
+    memset(&shaders, 0, sizeof shaders);
+    shaders.name = "own";
+    shaders.library = fiv_gl_glsl();
+    shaders.fragment = body;
+    sat__gl_define(gl, "FIV_INSTANCES", 8);
+    EXPECT_EQ(sat__gl_build(gl, &program, &shaders), SAT_OK);
+    sat__gl_begin(gl, &state, 6);
+    EXPECT_EQ(sat__gl_texture(gl, &out, SAT__GL_RGBA32F, WIDTH, HEIGHT, NULL), SAT_OK);
+    EXPECT_EQ(sat__gl_framebuffer(gl, &target, &out, 1, 0), SAT_OK);
+    sat__gl_pass(gl, program, target, WIDTH, HEIGHT);
+    EXPECT_EQ(fiv_gl_bind(scene.gl, program, 2), SAT_OK);
+    sat__gl_set_texture(gl, program, "p", 0, scene.point_texture);
+    sat__gl_set_texture(gl, program, "n", 1, scene.normal_texture);
+    sat__gl_draw(gl);
+    EXPECT_EQ(sat__gl_read(gl, mine, out, SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
+    EXPECT_EQ(sat__gl_read(gl, theirs, fiv_gl_texture(scene.gl), SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
+    sat__gl_end(gl, &state);
+    EXPECT(memcmp(mine, theirs, sizeof mine) == 0);
+    gl->DeleteFramebuffers(1, &target);
+    gl->DeleteTextures(1, &out);
+    gl->DeleteProgram(program);
+    test_close();
+}
+
+static sat_gl_proc test_nothing(const char *name)
+{
+    (void)name;
+    return NULL;
+}
+
+TEST(bad_arguments)
+{
+    fiv_gl *gl = NULL;
+    fiv_gl_options o = fiv_gl_defaults();
+    fiv_instance many[9];
+    int i;
+    EXPECT_EQ(o.max_instances, 8);
+    EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 4, 4, NULL), SAT_ERR_GL_FUNCTION);
+    EXPECT(strlen(fiv_gl_message(gl)) > 3);
+    EXPECT_EQ(fiv_gl_irradiance(gl, 1, 2), SAT_ERR_ARGUMENT);
+    fiv_gl_destroy(gl);
+    fiv_gl_destroy(NULL);
+    EXPECT_EQ(fiv_gl_create(NULL, test_nothing, 4, 4, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_gl_create(&gl, NULL, 4, 4, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 0, 4, NULL), SAT_ERR_ARGUMENT);
+    o.max_instances = 65;
+    EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 4, 4, &o), SAT_ERR_ARGUMENT);
+    if (!test_open(FIV_STORAGE_FLOAT)) SKIP(scene.context.message);
+    EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_ERR_ARGUMENT); /* no scene */
+    for (i = 0; i < 9; i++) many[i] = scene.instances[0];
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, many, 9), SAT_ERR_LIMIT);
+    many[0].scale = -1;
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, many, 1), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, NULL, many, 1), SAT_ERR_ARGUMENT);
+    test_close();
+}
