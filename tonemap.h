@@ -743,12 +743,12 @@ static inline void tonemap__prepare_frame(tonemap *map)
     else f->curve_factor = 1;
     if (tonemap__is_ashikhmin(o)) {
         double low = map->state[TONEMAP__LOW], high = map->state[TONEMAP__HIGH];
-        f->scale = (float)exp2(-high);
+        f->scale = (float)exp2(-ceil(high)); /* whole octaves: a firefly does not round every pixel anew */
         f->cap = 1;
         f->quantum = TONEMAP__ASHIKHMIN_QUANTUM;
-        f->cd = (float)(cd * exp2(high));
+        f->cd = (float)(cd * exp2(ceil(high)));
         f->curve_low = tonemap__capacity((float)(cd * exp2(low)));
-        f->curve_factor = 1 / (tonemap__capacity(f->cd) - f->curve_low);
+        f->curve_factor = 1 / (tonemap__capacity((float)(cd * exp2(high))) - f->curve_low);
         if (!tonemap__has_range(low, high)) f->curve_low = f->curve_factor = 0; /* a flat picture has no range: it gets the key */
     }
     f->lux = (float)(cd * o->lux_per_cd / (double)f->scale);
@@ -2135,13 +2135,13 @@ static const char tonemap__glsl_state[] =
     "    value = gl_FragCoord.x < 1.0 ? first : second;\n"
     "}\n";
 
-/* What a pass reads from the state. Ashikhmin's unit is the upper end of its range. */
+/* What a pass reads from the state. Ashikhmin's unit is the octave above the upper end of its range. */
 static const char tonemap__glsl_frame[] =
     "uniform sampler2D luminance, state;\n"
     "float tonemap_key() { vec4 s = texelFetch(state, ivec2(0), 0); return s.w > 0.0 ? exp2(s.y) : 0.18; }\n"
     "float tonemap_scale() {\n"
     "#if TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 3\n"
-    "    return exp2(-texelFetch(state, ivec2(1, 0), 0).y);\n"
+    "    return exp2(-ceil(texelFetch(state, ivec2(1, 0), 0).y));\n"
     "#else\n"
     "    return tonemap_key() * exp2(-texelFetch(state, ivec2(0), 0).x);\n"
     "#endif\n"
@@ -2224,8 +2224,8 @@ static const char tonemap__glsl_map[] =
     "    rgb = tonemap_mesopic(rgb, y, tonemap_rho(la / scale * cd * lux_per_cd));\n"
     "#endif\n"
     "#if TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 3\n"
-    "    float unit = cd / scale, low = tonemap_capacity(cd * exp2(second.x)), display = key;\n"
-    "    if (second.y - second.x > 0.125) display = (tonemap_capacity(la * unit) - low) / (tonemap_capacity(unit) - low);\n"
+    "    float low = tonemap_capacity(cd * exp2(second.x)), high = tonemap_capacity(cd * exp2(second.y)), display = key;\n"
+    "    if (second.y - second.x > 0.125) display = (tonemap_capacity(la * cd / scale) - low) / (high - low);\n"
     "    rgb *= max(display, 0.0) * scale / max(la, 7.8886e-31);\n"
     "#elif TONEMAP_OPERATOR == 4\n"
     "    rgb *= scale * (TONEMAP_BURN == 1 ? exp2(-first.z) : 1.0);\n"

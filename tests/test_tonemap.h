@@ -921,7 +921,7 @@ static void check_ashikhmin(tonemap_operator operation, double cd)
     float *pixels = room_pixels(W, H, 41);
     sat_image view = sat_image_f32(pixels, W, H, 3);
     tonemap_options o = tonemap_defaults();
-    double *luminance = metrics_alloc(N), *rounded = metrics_alloc(N), *la = metrics_alloc(N), low, high, unit;
+    double *luminance = metrics_alloc(N), *rounded = metrics_alloc(N), *la = metrics_alloc(N), low, high, unit, octave;
     int i, k, off = 0;
     shot s;
     tonemap *map = NULL;
@@ -935,14 +935,15 @@ static void check_ashikhmin(tonemap_operator operation, double cd)
     tonemap_destroy(map);
     reference_luminance(luminance, pixels, N);
     unit = cd > 0 ? cd : 10 / s.stats.adapted;
+    octave = exp2(ceil(log2(high)));
     for (i = 0; i < N; ++i) {
-        rounded[i] = luminance[i] / high < 1 ? luminance[i] / high : 1;
+        rounded[i] = luminance[i] / octave < 1 ? luminance[i] / octave : 1;
         rounded[i] = floor(rounded[i] * 1048576 + 0.5) / 1048576;
     }
     if (operation == TONEMAP_ASHIKHMIN) reference_ashikhmin(la, rounded, W, H, 0);
     for (i = 0; i < N; ++i) {
         double rgb[3], c0 = reference_capacity(low * unit, 1), c1 = reference_capacity(high * unit, 1), tm;
-        double a = operation == TONEMAP_ASHIKHMIN ? la[i] * high : luminance[i];
+        double a = operation == TONEMAP_ASHIKHMIN ? la[i] * octave : luminance[i];
         if (rounded[i] * 1048576 < 64) continue; /* the operator takes the pixel itself unrounded */
         tm = (reference_capacity(a * unit, 1) - c0) / (c1 - c0);
         reference_colour(rgb, pixels + 3 * i, (tm > 0 ? tm : 0) * luminance[i] / a, 1, 1);
