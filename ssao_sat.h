@@ -291,7 +291,8 @@ enum {
     SSAO_SAT__PAD = 16,       /* words of nothing left and right of a row: neighbours may be read blindly */
     SSAO_SAT__MAX_SLABS = 16,
     SSAO_SAT__MAX_SCALES = 4,
-    SSAO_SAT__GRID = 32       /* the slabs are cut from a sample of 32 x 32 depths */
+    SSAO_SAT__GRID = 32,      /* the slabs are cut from a sample of 32 x 32 depths ... */
+    SSAO_SAT__BINS = 256      /* ... counted in 256 bins */
 };
 #define SSAO_SAT__BLOCKED 2.0f  /* length of blocked directions against occlusion, fitted */
 #define SSAO_SAT__SHARPNESS 50 /* upsampling: a neighbour off the tangent plane by 1/50 of the distance has no weight */
@@ -625,60 +626,51 @@ static void ssao_sat__range_rows(int begin, int end, int worker, void *context)
         }
 }
 
-static void ssao_sat__sort(float *v, int n) /* heap sort: no worst case, no recursion */
+static float ssao_sat__scale_depth(const ssao_sat *s, float z) { return s->camera.orthographic ? z : logf(z); }
+
+/* Pixel i + GRID j of the sample: GRID x GRID pixels spread over the tables. */
+static inline float ssao_sat__sample(const ssao_sat *s, int i, int j)
 {
-    int i, start = n / 2;
-    while (n > 1) {
-        float moved;
-        int hole;
-        if (start > 0) moved = v[--start];
-        else {
-            moved = v[--n];
-            v[n] = v[0];
+    int x = (int)((2 * i + 1) * (int64_t)s->columns / (2 * SSAO_SAT__GRID)), y = (int)((2 * j + 1) * (int64_t)s->rows / (2 * SSAO_SAT__GRID));
+    return ssao_sat__distance(s, x * s->step, y * s->step);
+}
+
+/* Share of the sample in front of each 1/BINS of the logarithmic (orthographic: linear) depth range. */
+static void ssao_sat__count_depths(const ssao_sat *s, float *share, float low, float range)
+{
+    int i, j, n = 0, count[SSAO_SAT__BINS];
+    float sum = 0;
+    memset(count, 0, sizeof count);
+    for (j = 0; j < SSAO_SAT__GRID; j++)
+        for (i = 0; i < SSAO_SAT__GRID; i++) {
+            float z = ssao_sat__sample(s, i, j);
+            if (!(z > 0)) continue;
+            count[range > 0 ? sat__clamp_int((int)((ssao_sat__scale_depth(s, z) - low) / range * SSAO_SAT__BINS), 0, SSAO_SAT__BINS - 1) : 0]++;
+            n++;
         }
-        for (hole = start; (i = 2 * hole + 1) < n; hole = i) {
-            if (i + 1 < n && v[i + 1] > v[i]) i++;
-            if (moved >= v[i]) break;
-            v[hole] = v[i];
-        }
-        v[hole] = moved;
+    for (i = 0; i <= SSAO_SAT__BINS; i++) {
+        share[i] = n ? sum / (float)n : (float)i / SSAO_SAT__BINS;
+        if (i < SSAO_SAT__BINS) sum += (float)count[i];
     }
 }
 
-static float ssao_sat__scale_depth(const ssao_sat *s, float z) { return s->camera.orthographic ? z : logf(z); }
-
-/* Edges at equal steps of F = half the share of the logarithmic (orthographic: linear) range + half the share of the pixels,
-   so that neither a long empty range nor a crowd at one depth leaves a slab useless. F from 32 x 32 pixels. */
+/* Edges at equal steps of F = half the share of the depth range + half the share of the pixels, so that neither a long empty
+   range nor a crowd at one depth leaves a slab useless. */
 static void ssao_sat__cut_slabs(ssao_sat *s)
 {
-    float sample[SSAO_SAT__GRID * SSAO_SAT__GRID], low, range;
-    int i, j, k, n = 0, slabs = s->frame_slabs;
-    for (j = 0; j < SSAO_SAT__GRID; j++)
-        for (i = 0; i < SSAO_SAT__GRID; i++) {
-            int x = (int)((2 * i + 1) * (int64_t)s->columns / (2 * SSAO_SAT__GRID)), y = (int)((2 * j + 1) * (int64_t)s->rows / (2 * SSAO_SAT__GRID));
-            float z = ssao_sat__distance(s, x * s->step, y * s->step);
-            if (z > 0) sample[n++] = ssao_sat__scale_depth(s, z);
-        }
-    ssao_sat__sort(sample, n);
-    low = ssao_sat__scale_depth(s, s->nearest);
-    range = ssao_sat__scale_depth(s, s->farthest) - low;
+    float share[SSAO_SAT__BINS + 1], low = ssao_sat__scale_depth(s, s->nearest), range = ssao_sat__scale_depth(s, s->farthest) - low;
+    int k, bin = 0, slabs = s->frame_slabs;
+    ssao_sat__count_depths(s, share, low, range);
     s->edge[0] = s->nearest;
     s->edge[slabs] = s->farthest;
     for (k = 1; k < slabs; k++) {
-        float target = (float)k / (float)slabs, a = 0, b = 1;
-        for (i = 0; i < 24; i++) { /* bisection of F(low + t range) = target */
-            float t = 0.5f * (a + b), z = low + t * range;
-            int below = 0, above = n;
-            while (below < above) {
-                int middle = (below + above) / 2;
-                if (sample[middle] < z) below = middle + 1;
-                else above = middle;
-            }
-            if (0.5f * t + 0.5f * (n ? (float)below / (float)n : t) < target) a = t;
-            else b = t;
-        }
-        s->edge[k] = s->camera.orthographic ? low + b * range : expf(low + b * range);
-        s->edge[k] = s->edge[k] < s->edge[k - 1] ? s->edge[k - 1] : s->edge[k] > s->farthest ? s->farthest : s->edge[k];
+        float target = (float)k / (float)slabs, below, above, z;
+        while (bin < SSAO_SAT__BINS - 1 && 0.5f * (float)(bin + 1) / SSAO_SAT__BINS + 0.5f * share[bin + 1] < target) bin++;
+        below = 0.5f * (float)bin / SSAO_SAT__BINS + 0.5f * share[bin];
+        above = 0.5f * (float)(bin + 1) / SSAO_SAT__BINS + 0.5f * share[bin + 1];
+        z = low + range * ((float)bin + (target - below) / (above - below)) / SSAO_SAT__BINS;
+        z = s->camera.orthographic ? z : expf(z);
+        s->edge[k] = z < s->edge[k - 1] ? s->edge[k - 1] : z > s->farthest ? s->farthest : z;
     }
 }
 
@@ -1606,10 +1598,7 @@ static float ssao_sat__sample_mean(const ssao_sat *s)
     float sum = 0;
     int i, j;
     for (j = 0; j < SSAO_SAT__GRID; j++)
-        for (i = 0; i < SSAO_SAT__GRID; i++) {
-            int x = (int)((2 * i + 1) * (int64_t)s->columns / (2 * SSAO_SAT__GRID)), y = (int)((2 * j + 1) * (int64_t)s->rows / (2 * SSAO_SAT__GRID));
-            sum += ssao_sat__table_value(s, ssao_sat__distance(s, x * s->step, y * s->step));
-        }
+        for (i = 0; i < SSAO_SAT__GRID; i++) sum += ssao_sat__table_value(s, ssao_sat__sample(s, i, j));
     return sum / (SSAO_SAT__GRID * SSAO_SAT__GRID);
 }
 
@@ -1970,34 +1959,47 @@ static const char ssao_sat__gl_range[] =
     "    result = vec4(r, 0.0, 0.0);\n"
     "}\n";
 
-/* Texel k: edge k, and low value and quantum of slab k; the number of slabs. The same cut as in C. */
-static const char ssao_sat__gl_edges[] =
+/* Texel b: share of the 32 x 32 sample in the first b of the bins of the depth range. */
+static const char ssao_sat__gl_shares[] =
     "uniform sampler2D finer;\n"
-    "uniform vec4 region;\n" /* radius, reach, limit, bits of a box: 0 a cell, 1 the region */
     "out vec4 result;\n"
     "float scaled(float z) { return orthographic() ? z : log(z); }\n"
-    "float cut(int k, int slabs, vec2 range) {\n"
-    "    float low = scaled(range.x), width = scaled(range.y) - low, target = float(k) / float(slabs), a = 0.0, b = 1.0;\n"
-    "    if (k <= 0) return range.x;\n"
-    "    if (k >= slabs) return range.y;\n"
-    "    for (int i = 0; i < 16; i++) {\n"
-    "        float t = 0.5 * (a + b), z = orthographic() ? low + t * width : exp(low + t * width);\n"
-    "        float below = 0.0, all = 0.0;\n"
-    "        for (int j = 0; j < 1024; j++) {\n"
-    "            float s = distance_at(STEP * ((2 * ivec2(j % 32, j / 32) + 1) * size / 64));\n"
-    "            all += float(s > 0.0);\n"
-    "            below += float(s > 0.0 && s < z);\n"
-    "        }\n"
-    "        if (0.5 * t + 0.5 * (all > 0.0 ? below / all : t) < target) a = t; else b = t;\n"
-    "    }\n"
-    "    return clamp(orthographic() ? low + b * width : exp(low + b * width), range.x, range.y);\n"
-    "}\n"
     "void main() {\n"
     "    vec2 range = texelFetch(finer, ivec2(0), 0).xy;\n"
-    "    int k = int(gl_FragCoord.x), slabs = int(min(float(SLABS), floor((range.y - range.x) / region.x) + 1.0)), bits = 31;\n"
+    "    float low = scaled(range.x), width = scaled(range.y) - low, below = 0.0, all = 0.0, bin = floor(gl_FragCoord.x);\n"
+    "    for (int j = 0; j < GRID * GRID; j++) {\n"
+    "        float z = distance_at(STEP * ((2 * ivec2(j % GRID, j / GRID) + 1) * size / (2 * GRID)));\n"
+    "        if (!(z > 0.0)) continue;\n"
+    "        all += 1.0;\n"
+    "        if ((width > 0.0 ? clamp(floor((scaled(z) - low) / width * float(BINS)), 0.0, float(BINS - 1)) : 0.0) < bin) below += 1.0;\n"
+    "    }\n"
+    "    result = vec4(all > 0.0 ? below / all : bin / float(BINS));\n"
+    "}\n";
+
+/* Texel k: edge k, and low value and quantum of slab k; the number of slabs. The same cut as in C. */
+static const char ssao_sat__gl_edges[] =
+    "uniform sampler2D finer, shares;\n"
+    "uniform vec4 region;\n" /* radius, reach, limit */
+    "out vec4 result;\n"
+    "float filled(int bin) { return 0.5 * float(bin) / float(BINS) + 0.5 * texelFetch(shares, ivec2(bin, 0), 0).r; }\n"
+    "float cut(int k, int slabs, vec2 range) {\n"
+    "    vec2 ends = orthographic() ? range : log(range);\n"
+    "    float target = float(k) / float(slabs), z;\n"
+    "    int a = 0, b = BINS;\n"
+    "    if (k <= 0) return range.x;\n"
+    "    if (k >= slabs) return range.y;\n"
+    "    while (b - a > 1) {\n" /* filled(a) < target <= filled(b) */
+    "        int middle = (a + b) / 2;\n"
+    "        if (filled(middle) < target) a = middle; else b = middle;\n"
+    "    }\n"
+    "    z = mix(ends.x, ends.y, (float(a) + (target - filled(a)) / (filled(b) - filled(a))) / float(BINS));\n"
+    "    return clamp(orthographic() ? z : exp(z), range.x, range.y);\n"
+    "}\n"
+    "void main() {\n"
+    "    vec2 range = texelFetch(finer, ivec2(0), 0).xy, ends = vec2(0.0);\n"
+    "    int k = int(gl_FragCoord.x), slabs = METHOD == 0 ? int(min(float(SLABS), floor((range.y - range.x) / region.x) + 1.0)) : 1, bits = 31;\n"
     "    float largest = max(min(region.y * pixels() / (orthographic() ? 1.0 : range.x), region.z), 2.0) * max(aspect(), 1.0);\n"
     "    float side = 2.0 * largest / (METHOD == 0 ? 3.0 : 1.0) + 2.0, first = cut(k, slabs, range), second = cut(k + 1, slabs, range);\n"
-    "    vec2 ends = vec2(0.0);\n"
     "    while (bits > 1 && side * side * exp2(float(bits)) > 2147483648.0) bits--;\n"
     "    bits = min(bits, 20);\n"
     "    if (METHOD == 0) ends = orthographic() ? vec2(first, second) : vec2(1.0 / second, 1.0 / first);\n"
@@ -2220,7 +2222,7 @@ static const char ssao_sat__gl_upsample[] =
     "#endif\n"
     "}\n";
 
-enum { SSAO_SAT__GL_RANGE, SSAO_SAT__GL_RANGE_FIRST, SSAO_SAT__GL_EDGES, SSAO_SAT__GL_WORDS, SSAO_SAT__GL_SCAN, SSAO_SAT__GL_ESTIMATE,
+enum { SSAO_SAT__GL_RANGE, SSAO_SAT__GL_RANGE_FIRST, SSAO_SAT__GL_SHARES, SSAO_SAT__GL_EDGES, SSAO_SAT__GL_WORDS, SSAO_SAT__GL_SCAN, SSAO_SAT__GL_ESTIMATE,
        SSAO_SAT__GL_UPSAMPLE, SSAO_SAT__GL_PROGRAMS, SSAO_SAT__GL_LEVELS = 5 };
 
 typedef struct ssao_sat__gl_target { unsigned texture, framebuffer; int width, height; } ssao_sat__gl_target;
@@ -2230,7 +2232,7 @@ struct ssao_sat_gl {
     ssao_sat_options options;
     int width, height, step, columns, rows, tiles, levels, normals; /* normals: as the programs were built, -1 not yet */
     unsigned programs[SSAO_SAT__GL_PROGRAMS];
-    ssao_sat__gl_target range[SSAO_SAT__GL_LEVELS], edges, table[2], open, out;
+    ssao_sat__gl_target range[SSAO_SAT__GL_LEVELS], shares, edges, table[2], open, out;
     ssao_sat__camera camera;
     ssao_sat__fit fit;
     float view[12], limit;
@@ -2273,6 +2275,8 @@ static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *co
     sat__gl_define(&g->gl, "STEP", g->step);
     sat__gl_define(&g->gl, "SLABS", o->slabs);
     sat__gl_define(&g->gl, "RINGS", o->scales);
+    sat__gl_define(&g->gl, "GRID", SSAO_SAT__GRID);
+    sat__gl_define(&g->gl, "BINS", SSAO_SAT__BINS);
     sat__gl_define(&g->gl, "TILES", g->tiles);
     sat__gl_define(&g->gl, "METHOD", (int)o->method);
     sat__gl_define(&g->gl, "INVERTED", o->inverted_depth != 0);
@@ -2296,7 +2300,8 @@ static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g, int normals)
                                   ssao_sat__gl_single_main, NULL};
     const char *const text[SSAO_SAT__GL_PROGRAMS][4] = {
         {ssao_sat__gl_common, ssao_sat__gl_range, NULL}, {ssao_sat__gl_common, ssao_sat__gl_range, NULL},
-        {ssao_sat__gl_common, ssao_sat__gl_edges, NULL}, {ssao_sat__gl_common, ssao_sat__gl_words, NULL},
+        {ssao_sat__gl_common, ssao_sat__gl_shares, NULL}, {ssao_sat__gl_common, ssao_sat__gl_edges, NULL},
+        {ssao_sat__gl_common, ssao_sat__gl_words, NULL},
         {ssao_sat__gl_scan, NULL}, {ssao_sat__gl_common, ssao_sat__gl_tone, ssao_sat__gl_slabs, NULL},
         {ssao_sat__gl_common, ssao_sat__gl_upsample, NULL}};
     sat_result result = SAT_OK;
@@ -2328,6 +2333,7 @@ static sat_result ssao_sat__gl_make_targets(ssao_sat_gl *g)
         h = (h + 15) / 16;
         result = ssao_sat__gl_make_target(g, &g->range[g->levels], SAT__GL_RG32F, w, h);
     }
+    if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->shares, SAT__GL_R32F, SSAO_SAT__BINS + 1, 1);
     if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->edges, SAT__GL_RGBA32F, g->options.slabs + 1, 1);
     for (i = 0; i < 2 && result == SAT_OK; i++)
         result = ssao_sat__gl_make_target(g, &g->table[i], slabs ? SAT__GL_RGBA32UI : SAT__GL_R32UI, g->columns * g->tiles, g->rows * tile_rows);
@@ -2389,6 +2395,7 @@ SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl)
             if (gl->programs[i]) gl->gl.DeleteProgram(gl->programs[i]);
         for (i = 0; i < SSAO_SAT__GL_LEVELS; i++) ssao_sat__gl_drop(gl, &gl->range[i]);
         for (i = 0; i < 2; i++) ssao_sat__gl_drop(gl, &gl->table[i]);
+        ssao_sat__gl_drop(gl, &gl->shares);
         ssao_sat__gl_drop(gl, &gl->edges);
         ssao_sat__gl_drop(gl, &gl->open);
         ssao_sat__gl_drop(gl, &gl->out);
@@ -2426,7 +2433,13 @@ static void ssao_sat__gl_find_edges(ssao_sat_gl *g, unsigned depth)
         if (i) sat__gl_set_texture(gl, program, "finer", 3, g->range[i - 1].texture);
         sat__gl_draw(gl);
     }
+    if (g->options.method == SSAO_SAT_SLABS) {
+        program = ssao_sat__gl_pass(g, SSAO_SAT__GL_SHARES, &g->shares, depth, 0);
+        sat__gl_set_texture(gl, program, "finer", 3, g->range[g->levels - 1].texture);
+        sat__gl_draw(gl);
+    }
     program = ssao_sat__gl_pass(g, SSAO_SAT__GL_EDGES, &g->edges, depth, 0);
+    sat__gl_set_texture(gl, program, "shares", 4, g->shares.texture);
     region[0] = (float)g->options.radius;
     region[1] = g->options.region_pixels > 0 ? 1e30f : (float)g->options.radius * g->fit.reach;
     region[2] = g->options.region_pixels > 0 ? (float)g->options.region_pixels / (float)g->step : g->limit;
