@@ -10,6 +10,7 @@
 #define _POSIX_C_SOURCE 200809L
 #define LIGHTSCAN_IMPLEMENTATION
 #define PIPELINE_GL
+#define FIV_GL
 #define RAINDROP_GL
 #define SSAO_SAT_GL
 #define TONEMAP_GL
@@ -173,7 +174,7 @@ int main(int argc, char **argv)
         {"mesopic", 's', &mesopic, "off, uniform or local: reds fade in dim light"},
         {"samples", 'i', &o.samples, "points a pixel each way, 1 to 4; 2"},
         {"frames", 'i', &frames, "pictures, 1/30 s apart"},
-        {"gl", 'b', &gl, "occlusion, rain and tone on OpenGL (OSMesa; LIGHTSCAN_GL=egl: the GPU)"},
+        {"gl", 'b', &gl, "on OpenGL but for self-shadows (OSMesa; LIGHTSCAN_GL=egl: the GPU)"},
         {"mosaic", 'b', &mosaic, "the picture again, from tiles"},
         {"no-shadows", 'b', &no_shadows, "leave fiv.h out"},
         {"no-occlusion", 'b', &no_occlusion, "leave ssao_sat.h out"},

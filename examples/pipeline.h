@@ -210,12 +210,38 @@ static inline int pipeline_shadows_on(pipeline *p, int what, const fiv_irradianc
     return 1;
 }
 
+/* The ground on OpenGL, all pixels of the first layer at once. */
+static inline int pipeline_shadows_gl(pipeline *p)
+{
+#ifdef PIPELINE_GL
+    size_t pixels = (size_t)p->scene.width * (size_t)p->scene.height, i;
+    fiv_instance casters[SCENE_OBJECTS];
+    float *rgba = (float *)malloc(pixels * 4 * sizeof(float));
+    int k, ok;
+    memset(casters, 0, sizeof casters);
+    for (k = 0; k < SCENE_OBJECTS; ++k) {
+        casters[k].occluder = p->occluders[k];
+        memcpy(casters[k].position, p->scene.objects[k].place, sizeof casters[k].position);
+        casters[k].scale = p->scene.objects[k].scale;
+    }
+    if (!rgba) return pipeline_check(p, "shadows", SAT_ERR_MEMORY);
+    ok = pipeline_gl_done(p, pipeline_gl_shadows(p->gl, rgba, p->scene.layers[0].points, p->scene.layers[0].normals, p->scene.width, p->scene.height,
+                                                 p->light, casters, p->options.shadows ? SCENE_OBJECTS : 0));
+    for (i = 0; ok && i < pixels; ++i)
+        if (p->scene.layers[0].what[i] == SCENE_GROUND) memcpy(p->irradiance[0] + 3 * i, rgba + 4 * i, 3 * sizeof(float));
+    free(rgba);
+    return ok;
+#else
+    return pipeline_check(p, "shadows", SAT_ERR_ARGUMENT);
+#endif
+}
+
 static inline int pipeline_shadows(pipeline *p)
 {
     fiv_irradiance_options fo = fiv_irradiance_defaults();
     fo.threads = p->options.threads;
     memset(&p->shadow_stats, 0, sizeof p->shadow_stats);
-    return pipeline_shadows_on(p, SCENE_GROUND, &fo) && pipeline_shadows_on(p, SCENE_FIRST, &fo) && pipeline_shadows_on(p, SCENE_SECOND, &fo);
+    return (p->gl ? pipeline_shadows_gl(p) : pipeline_shadows_on(p, SCENE_GROUND, &fo)) && pipeline_shadows_on(p, SCENE_FIRST, &fo) && pipeline_shadows_on(p, SCENE_SECOND, &fo);
 }
 
 /* ---- ambient occlusion ---- */

@@ -13,6 +13,7 @@
 #ifndef SAT_SIBLING_GL
 #define SAT_SIBLING_GL /* sat.h then lends its function table, textures and framebuffers */
 #endif
+#include "../fiv.h"
 #include "../raindrop.h"
 #include "../sat.h"
 #include "../ssao_sat.h"
@@ -28,9 +29,10 @@ typedef struct pipeline_gl {
     raindrop_gl *rain;
     const raindrop_environment *environment; /* what `rain` was given */
     const raindrop_rain *drops;
+    fiv_gl *shadows;
     ssao_sat_gl *ao;
     double ao_radius;                        /* what `ao` was made with */
-    unsigned scene_depth, scene_normals;     /* textures of the scene's size */
+    unsigned scene_depth, scene_normals, scene_points; /* textures of the scene's size */
     float *rows;                             /* the picture as RGBA */
     char message[320];
 } pipeline_gl;
@@ -64,12 +66,14 @@ static inline void pipeline_gl_destroy(pipeline_gl *g)
     tonemap_gl_destroy(g->tone);
     raindrop_gl_destroy(g->rain);
     ssao_sat_gl_destroy(g->ao);
+    fiv_gl_destroy(g->shadows);
     if (g->framebuffer) g->gl.DeleteFramebuffers(1, &g->framebuffer);
     if (g->hdr) g->gl.DeleteTextures(1, &g->hdr);
     if (g->rainy) g->gl.DeleteTextures(1, &g->rainy);
     if (g->depth) g->gl.DeleteTextures(1, &g->depth);
     if (g->scene_depth) g->gl.DeleteTextures(1, &g->scene_depth);
     if (g->scene_normals) g->gl.DeleteTextures(1, &g->scene_normals);
+    if (g->scene_points) g->gl.DeleteTextures(1, &g->scene_points);
     sat__gl_close(&g->gl);
     free(g->rows);
     free(g);
@@ -88,6 +92,25 @@ static inline void pipeline_gl_copy(pipeline_gl *g, float *rgb, int to_rgba, int
                 else a[k] = b[k];
             if (to_rgba) b[3] = 1;
         }
+}
+
+/* ---- shadows of several occluders on receivers that are none of them: the ground ---- */
+
+/* rgba: scratch of 4 floats a pixel, and the result. Pixels whose normal is 0 are black. */
+static inline int pipeline_gl_shadows(pipeline_gl *g, float *rgba, const float *points, const float *normals, int width, int height,
+                                      const fiv_environment *light, const fiv_instance *casters, size_t count)
+{
+    sat_result result = SAT_OK;
+    if (!g->shadows) result = fiv_gl_create(&g->shadows, g->get_proc, width, height, NULL);
+    if (result == SAT_OK) result = fiv_gl_set_scene(g->shadows, light, casters, count);
+    if (!pipeline_gl_check(g, result, g->shadows ? fiv_gl_message(g->shadows) : "")) return 0;
+    if (!g->scene_points) result = sat__gl_texture(&g->gl, &g->scene_points, SAT__GL_RGB32F, width, height, NULL);
+    if (result == SAT_OK && !g->scene_normals) result = sat__gl_texture(&g->gl, &g->scene_normals, SAT__GL_RGB32F, width, height, NULL);
+    if (!pipeline_gl_check(g, result, g->gl.message)) return 0;
+    sat__gl_upload(&g->gl, g->scene_points, SAT__GL_RGB32F, width, height, points);
+    sat__gl_upload(&g->gl, g->scene_normals, SAT__GL_RGB32F, width, height, normals);
+    if (!pipeline_gl_check(g, fiv_gl_irradiance(g->shadows, g->scene_points, g->scene_normals), fiv_gl_message(g->shadows))) return 0;
+    return pipeline_gl_check(g, sat__gl_read(&g->gl, rgba, fiv_gl_texture(g->shadows), SAT__GL_RGBA32F, width, height), g->gl.message);
 }
 
 /* ---- ambient occlusion, of the scene's size ---- */
