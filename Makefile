@@ -4,7 +4,7 @@
 
 all: examples
 .PHONY: all examples demo web check-view test bench report size check check-strict check-variants check-asan check-tsan \
-        check-analyze check-compilers fuzz data install dist gpu-bench deps help clean build-tests run-tests run-demo
+        check-analyze check-compilers fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
@@ -242,6 +242,7 @@ help:
 	@echo 'make web       the demo in a browser: out/web/index.html  [needs emscripten]'
 	@echo 'make check-view the window and the page against the demo: Xvfb, headless Chromium'
 	@echo 'make report    all tables and plots in report/index.html  [QUICK=1]'
+	@echo 'make docs      put the programs of tests/test_readme.h into README.md'
 	@echo 'make data      fetch free environment maps and meshes into data/'
 	@echo 'make dist      one-file editions in dist/: each header with what it needs of sat.h inside'
 	@echo 'make install   headers and lightscan.pc                   [PREFIX=/usr/local] [DESTDIR=]'
@@ -255,6 +256,11 @@ dist/sat.h: sat.h
 dist/%.h: %.h sat.h tests/make_dist.awk
 	@mkdir -p dist
 	awk -f tests/make_dist.awk sat.h $< >$@
+
+# the programs in README.md, from tests/test_readme.h
+docs:
+	@mkdir -p build
+	sh tests/readme.sh >build/README.md && cp build/README.md README.md
 
 # inputs for examples, into data/
 data:

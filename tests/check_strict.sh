@@ -260,6 +260,7 @@ check_examples() {
             fail "$name takes a file that does not exist" "$text"
         else pass; fi
     done
+    empty "README.md shows other programs than tests/test_readme.h (make docs)" "$(diff README.md <(sh tests/readme.sh))"
     [ $((passed + failed)) -gt 0 ] || skip "there are no examples"
     finish
 }

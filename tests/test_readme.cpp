@@ -1,0 +1,2 @@
+#include "test_readme.h"
+EXPECT_MAIN()

@@ -1,0 +1,155 @@
+/* The programs of README.md: `make docs` puts the text between the marks there, and tests/readme.sh compares. */
+
+#include "expect.h"
+
+/* README: impl */
+/* lightscan.c: one C (or C++) file of yours holds the code of all headers that you use */
+#define LIGHTSCAN_IMPLEMENTATION
+#include "sat.h"
+#include "tonemap.h"
+/* README end */
+#include "fiv.h"
+#include "raindrop.h"
+#include "softassign.h"
+#include "ssao_sat.h"
+#include "support.h"
+
+enum { SIDE = 64, READINGS = SIDE * SIDE };
+static float pixels[3 * READINGS];
+
+static void fill(double low, double high) { support_fill(pixels, 3 * READINGS, low, high, 7); }
+
+TEST(readme_sat)
+{
+    int width = SIDE, height = SIDE, x = 30, y = 40;
+    double mean = 0;
+    fill(0, 1e4);
+    {
+        /* README: sat */
+        sat_table *table;
+        sat_image image = sat_image_f32(pixels, width, height, 3);
+        sat_create(&table, width, height, 3, NULL);                     /* the only allocation */
+        sat_build(table, &image);                                       /* every frame */
+        mean = sat_mean(table, 1, x - 20, y - 20, x + 21, y + 21);      /* green, 41 x 41 pixels, constant time */
+        sat_destroy(table);
+        /* README end */
+    }
+    EXPECT(mean > 4000 && mean < 6000);
+}
+
+TEST(readme_tonemap)
+{
+    static unsigned char screen[3 * READINGS];
+    int width = SIDE, height = SIDE;
+    sat_result result;
+    fill(0, 1e4);
+    {
+        /* README: tonemap */
+        tonemap_options options = tonemap_defaults();                   /* local photographic operator */
+        options.mesopic = TONEMAP_MESOPIC_LOCAL;                        /* reds fade in the dark */
+        options.cd_per_unit = 1;
+        result = tonemap_once_u8(screen, pixels, width, height, 3, &options);
+        if (result != SAT_OK) puts(sat_result_text(result));
+        /* README end */
+    }
+    EXPECT_EQ(result, SAT_OK);
+    EXPECT(screen[0] > 0);
+}
+
+TEST(readme_ssao_sat)
+{
+    static float open[READINGS];
+    int width = SIDE, height = SIDE;
+    const float *depth = pixels;
+    ssao_sat_stats stats;
+    fill(2, 2.2);
+    {
+        /* README: ssao_sat */
+        ssao_sat *ao;
+        ssao_sat_options options = ssao_sat_defaults();
+        ssao_sat_input input = ssao_sat_input_linear(depth, width, height, 1.0); /* 57 degrees high */
+        options.radius = 0.5;                                           /* in units of depth */
+        ssao_sat_create(&ao, width, height, &options);
+        ssao_sat_apply(ao, open, 0, &input, &stats);                    /* every frame: 0 blocked, 1 open */
+        ssao_sat_destroy(ao);
+        /* README end */
+    }
+    EXPECT_EQ(stats.pixels, READINGS / 4);
+    EXPECT(open[100] >= 0 && open[100] <= 1);
+}
+
+TEST(readme_fiv)
+{
+    static const float positions[] = {1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1};
+    static const unsigned indices[] = {0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4, 2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5};
+    static const float points[] = {0, -1, 0}, normals[] = {0, 1, 0};
+    float rgb[3], all[3];
+    sat_image sky = sat_image_f32(pixels, SIDE, SIDE, 3);
+    fill(0.9, 1.1);
+    {
+        /* README: fiv */
+        fiv_environment *light;
+        fiv_occluder *occluder;
+        fiv_instance instance = {NULL, {0, 0, 0}, 1};
+        fiv_environment_create(&light, &sky, NULL, NULL);               /* an equirectangular picture */
+        fiv_occluder_create(&occluder, positions, 6, indices, 8, NULL, NULL); /* slow, once for a shape */
+        fiv_occluder_light(occluder, light, NULL);                      /* when the light changes */
+        instance.occluder = occluder;
+        fiv_irradiance(rgb, points, normals, 1, light, &instance, 1, NULL, NULL);
+        /* README end */
+        fiv_environment_irradiance(light, all, normals);
+        fiv_occluder_destroy(occluder);
+        fiv_environment_destroy(light);
+    }
+    EXPECT(rgb[1] >= 0 && rgb[1] < 0.9f * all[1]);
+}
+
+TEST(readme_raindrop)
+{
+    static float picture[3 * READINGS];
+    raindrop_render_stats stats;
+    sat_image sky = sat_image_f32(pixels, SIDE, SIDE, 3);
+    const float *depth = NULL;
+    int width = SIDE, height = SIDE;
+    fill(0.5, 2);
+    {
+        /* README: raindrop */
+        raindrop_environment *environment;
+        raindrop_rain *rain;
+        raindrop_camera camera = raindrop_camera_defaults();
+        raindrop_environment_create(&environment, &sky, NULL, NULL);
+        raindrop_rain_create(&rain, NULL);                              /* 10 mm/h in a box of 8 m */
+        raindrop_rain_advance(rain, 1 / 60.0);                          /* every frame, then: */
+        raindrop_render(picture, (ptrdiff_t)sizeof(float) * 3 * width, width, height, depth, &camera, rain, environment, NULL, &stats);
+        /* README end */
+        raindrop_rain_destroy(rain);
+        raindrop_environment_destroy(environment);
+    }
+    EXPECT(stats.drawn_near + stats.drawn_far > 0);
+}
+
+TEST(readme_softassign)
+{
+    enum { ROWS = 100, COLUMNS = 150, FEATURES = 12 };
+    static float patches[ROWS * FEATURES], tiles[COLUMNS * FEATURES];
+    int tile_of_patch[ROWS], used[COLUMNS], i;
+    softassign_report report;
+    fill(0, 1);
+    memcpy(patches, pixels, sizeof patches);
+    memcpy(tiles, pixels + ROWS * FEATURES, sizeof tiles);
+    memset(used, 0, sizeof used);
+    {
+        /* README: softassign */
+        softassign_problem problem;
+        memset(&problem, 0, sizeof problem);
+        problem.rows = ROWS, problem.columns = COLUMNS;                 /* patches and tiles */
+        problem.row_features = patches, problem.column_features = tiles;
+        problem.feature_count = FEATURES;
+        softassign_solve(tile_of_patch, &problem, NULL, &report);       /* no tile twice, proven cheapest */
+        printf("cost %g, at most %g %% above the optimum\n", report.cost, 100 * report.gap);
+        /* README end */
+    }
+    for (i = 0; i < ROWS; ++i) ++used[tile_of_patch[i]];
+    for (i = 0; i < COLUMNS; ++i) EXPECT(used[i] <= 1);
+    EXPECT(report.gap < 1e-6);
+}
