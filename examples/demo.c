@@ -128,6 +128,15 @@ static int save(pipeline *p, const char *path)
     return 0;
 }
 
+/* Better known before the picture is drawn. */
+static int can_write(const char *path)
+{
+    FILE *old = fopen(path, "rb"), *file = old ? old : fopen(path, "wb");
+    if (file) fclose(file);
+    if (file && !old) remove(path);
+    return file != NULL;
+}
+
 static int run(pipeline *p, const gl_context *context, int frames, const char *out, int stats, int mosaic)
 {
     double sum[PIPELINE_STAGES] = {0};
@@ -196,6 +205,10 @@ int main(int argc, char **argv)
     if (end == rate || (*end && strcmp(end, "mm") != 0) || !(o.rate >= 0 && o.rate <= 500) || frames < 1 || frames > 9999) {
         fprintf(stderr, "demo: --rate goes from 0mm to 500mm, --frames from 1 to 9999\n");
         return 2;
+    }
+    if (!can_write(out)) {
+        fprintf(stderr, "demo: %s cannot be written\n", out);
+        return 1;
     }
     o.width = size[0], o.height = size[1];
     o.shadows = !no_shadows, o.occlusion = !no_occlusion, o.rain = !no_rain && o.rate > 0, o.tone = !no_tone;

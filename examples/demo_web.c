@@ -24,7 +24,9 @@ const char *web_message(void);
 
 EMSCRIPTEN_KEEPALIVE int web_create(int width, int height, int hour)
 {
+    const image *light = wanted.environment;
     wanted = pipeline_defaults();
+    wanted.environment = light;
     wanted.width = width, wanted.height = height, wanted.samples = 1;
     wanted.hour = (scene_hour)(hour % 3);
     rgba = (unsigned char *)malloc((size_t)width * (size_t)height * 4);
@@ -83,7 +85,7 @@ int main(int argc, char **argv)
     common_settings common;
     int first = common_parse(&common, argc, argv, "demo_web [--out FILE] [light.hdr]", NULL, 0);
     const char *out = common.out ? common.out : "demo_web.png";
-    if (!web_create(640, 360, SCENE_DUSK) || (first < argc && !web_open(argv[first])) || !web_frame(0) || !image_save_u8(out, rgba, 640, 360, 4)) {
+    if ((first < argc && !web_open(argv[first])) || !web_create(640, 360, SCENE_DUSK) || !web_frame(0) || !image_save_u8(out, rgba, 640, 360, 4)) {
         fprintf(stderr, "demo_web: %s\n", web.message[0] ? web.message : "the picture cannot be written");
         return 1;
     }
