@@ -410,23 +410,32 @@ static inline float tonemap__sane_luminance(float y, tonemap_stats *stats)
 static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, float *peak, float *lane, const float *pixels,
                                           int channels, int x, int end)
 {
+    int64_t log_sum = 0;
+    size_t positive = 0;
     for (; x < end; x++) {
         const float *p = pixels + (size_t)x * (size_t)channels;
-        float seen = channels == 1 ? p[0] : sat__luminance(p[0], p[1], p[2]), y = tonemap__sane_luminance(seen, &w->stats);
+        float y = channels == 1 ? p[0] : sat__luminance(p[0], p[1], p[2]), t;
+        uint32_t bits;
+        int c;
+        for (c = 0; peak && c < (channels == 1 ? 1 : 3); c++) peak[x] = p[c] > peak[x] ? p[c] : peak[x];
+        if (!(y >= TONEMAP__DARKEST && y <= TONEMAP__BRIGHTEST)) {
+            int finite = sat__is_finite(y);
+            y = tonemap__sane_luminance(y, &w->stats);
+            if (!(y > 0) || !finite) { /* infinity is shown as white, but says nothing about the light */
+                luminance[x] = y;
+                continue;
+            }
+        }
         luminance[x] = y;
-        if (peak) {
-            int c;
-            for (c = 0; c < (channels == 1 ? 1 : 3); c++) peak[x] = p[c] > peak[x] ? p[c] : peak[x];
-        }
-        if (y > 0 && sat__is_finite(seen)) { /* infinity is shown as white, but says nothing about the light */
-            uint32_t bits = sat__float_bits(y);
-            float t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
-            w->log_sum += ((int64_t)(bits >> 23) - 127) * 65536 + (int32_t)(tonemap__log2_octave(t) * 65536 + 0.5f);
-            w->stats.positive++;
-            lane[x & 3] += y;
-            if (w->histogram) w->histogram[(bits - TONEMAP__DARKEST_BITS) >> 19]++;
-        }
+        lane[x & 3] += y;
+        bits = sat__float_bits(y);
+        t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
+        log_sum += ((int32_t)(bits >> 23) - 127) * 65536 + (int32_t)(tonemap__log2_octave(t) * 65536 + 0.5f);
+        positive++;
+        if (w->histogram) w->histogram[(bits - TONEMAP__DARKEST_BITS) >> 19]++;
     }
+    w->log_sum += log_sum;
+    w->stats.positive += positive;
 }
 
 #ifdef SAT__VECTOR
@@ -1094,15 +1103,17 @@ static inline void tonemap__open_window(tonemap__window *window, const tonemap *
     }
 }
 
+static inline float tonemap__box_sum(const tonemap__window *window, const tonemap__frame *f, int k, int x)
+{
+    const uint32_t *top = window->top[k] + x, *bottom = window->bottom[k] + x;
+    int r = f->radius[k];
+    return (float)(int32_t)((bottom[r + 1] - bottom[-r]) - (top[r + 1] - top[-r]));
+}
+
 static inline float tonemap__box_mean(const tonemap__window *window, const tonemap__frame *f, int k, int x)
 {
-    int r = f->radius[k], x0 = x - r, x1 = x + r + 1;
-    const uint32_t *top = window->top[k] + x, *bottom = window->bottom[k] + x;
-    uint32_t sum = (bottom[r + 1] - bottom[-r]) - (top[r + 1] - top[-r]);
-    float inverse = window->inverse[k];
-    if (x0 < 0 || x1 > window->width)
-        inverse = 1 / ((float)(window->rows[k] * (sat__min_int(x1, window->width) - sat__max_int(x0, 0))) * f->quantum);
-    return (float)(int32_t)sum * inverse;
+    int columns = sat__min_int(x + f->radius[k] + 1, window->width) - sat__max_int(x - f->radius[k], 0);
+    return tonemap__box_sum(window, f, k, x) * (1 / ((float)(window->rows[k] * columns) * f->quantum));
 }
 
 #ifdef SAT__VECTOR
@@ -1140,20 +1151,70 @@ static inline sat__i32x4 tonemap__inside4(int x, int end)
    that fails gives its centre; when none fails, the last box is taken. (Eq A.7 does not say what happens when the first
    step fails; this is the reading under which it has an answer.) */
 
+static inline void tonemap__search_one(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                       size_t *scale, int x)
+{
+    float c = luminance[x] * f->scale;
+    int k;
+    c = c < f->cap ? c : f->cap;
+    for (k = 0; k + 1 < f->boxes; k++) {
+        float v = tonemap__box_mean(window, f, k + 1, x);
+        if (!(fabsf(c - v) < f->epsilon * c + f->term[k])) break;
+        c = v;
+    }
+    local[x] = c;
+    scale[k]++;
+}
+
+/* Sixteen pixels side by side without a branch, in loops that compilers turn into vector code by themselves: limit -
+   |c - v| > 0 is asked of its bits, because a comparison of floats would stop them. */
+static inline void tonemap__search_sixteen(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                           size_t *scale, int x)
+{
+    enum { N = TONEMAP__GROUP };
+    float c[N], v[N], room[N];
+    int32_t live[N], bits[N], old[N], next[N], count = N;
+    int i, k;
+    for (i = 0; i < N; i++) {
+        c[i] = luminance[x + i] * f->scale;
+        c[i] = c[i] < f->cap ? c[i] : f->cap;
+        live[i] = -1;
+    }
+    for (k = 0; k + 1 < f->boxes && count; k++) {
+        int r = f->radius[k + 1];
+        const uint32_t *top = window->top[k + 1] + x - r, *bottom = window->bottom[k + 1] + x - r;
+        float inverse = window->inverse[k + 1], epsilon = f->epsilon, term = f->term[k];
+        for (i = 0; i < N; i++) {
+            v[i] = (float)(int32_t)((bottom[i + 2 * r + 1] - bottom[i]) - (top[i + 2 * r + 1] - top[i])) * inverse;
+            room[i] = epsilon * c[i] + term - fabsf(c[i] - v[i]);
+        }
+        memcpy(bits, room, sizeof bits);
+        memcpy(old, c, sizeof old);
+        memcpy(next, v, sizeof next);
+        scale[k] += (size_t)count;
+        for (count = 0, i = 0; i < N; i++) {
+            live[i] &= -(int32_t)(bits[i] > 0);
+            old[i] = (next[i] & live[i]) | (old[i] & ~live[i]);
+            count -= live[i];
+        }
+        scale[k] -= (size_t)count;
+        memcpy(c, old, sizeof old);
+    }
+    scale[k] += (size_t)count;
+    memcpy(local + x, c, sizeof c);
+}
+
 static inline void tonemap__search_plain(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
                                          size_t *scale, int x, int end)
 {
-    for (; x < end; x++) {
-        float c = luminance[x] * f->scale;
-        int k;
-        c = c < f->cap ? c : f->cap;
-        for (k = 0; k + 1 < f->boxes; k++) {
-            float v = tonemap__box_mean(window, f, k + 1, x);
-            if (!(fabsf(c - v) < f->epsilon * c + f->term[k])) break;
-            c = v;
+    while (x < end) {
+        if (x >= f->reach && x + TONEMAP__GROUP <= end && x + TONEMAP__GROUP + f->reach <= window->width) {
+            tonemap__search_sixteen(local, luminance, window, f, scale, x);
+            x += TONEMAP__GROUP;
+        } else {
+            tonemap__search_one(local, luminance, window, f, scale, x);
+            x++;
         }
-        local[x] = c;
-        scale[k]++;
     }
 }
 
