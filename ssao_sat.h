@@ -390,9 +390,9 @@ enum {
     SSAO_SAT__PAD = 16,       /* words of nothing left and right of a row: neighbours may be read blindly */
     SSAO_SAT__MAX_SLABS = 16,
     SSAO_SAT__MAX_SCALES = 4,
-    SSAO_SAT__GRID = 32,      /* the slabs are cut from a sample of 32 x 32 depths ... */
-    SSAO_SAT__BINS = 256      /* ... counted in 256 bins */
+    SSAO_SAT__GRID = 32       /* the slabs are cut from a sample of 32 x 32 depths ... */
 };
+#define SSAO_SAT__BINS 256    /* ... counted in so many bins */
 #define SSAO_SAT__BLOCKED 2.0f  /* length of blocked directions against occlusion, fitted */
 #define SSAO_SAT__SHARPNESS 50 /* upsampling: a neighbour off the tangent plane by 1/50 of the distance has no weight */
 #define SSAO_SAT__FAR 1e18f   /* distances beyond are sky: their squares would overflow */
