@@ -46,8 +46,8 @@
 
    NUMERICS
 
-     Sums are integers: the scaled luminance is rounded to 2^-12 and cut at 256, where the display is white; box means are
-     then exact. The logarithms of the log-average are added as integers too. So the result has the same bits for any
+     Sums are integers: the scaled luminance is rounded to 2^-12 and cut at 256, where the display has 0.4 % left; box means
+     are then exact, and beyond the cut La is taken to grow with the pixel. The logarithms of the log-average are added as integers too. So the result has the same bits for any
      number of workers, for vector and plain code (without fused multiply-add), and for pictures in units that differ by a
      power of two from 2^-20 to 2^20.
      Against OpenGL at most 1 code differs, in 2 % of codes (on a software renderer). 8-bit codes are at most one from the
@@ -306,7 +306,7 @@ enum {
 #define TONEMAP__DARKEST 7.8886090522101181e-31f  /* 2^-100 */
 #define TONEMAP__BRIGHTEST 1.2676506002282294e30f /* 2^100 */
 #define TONEMAP__DARKEST_BITS 0x0d800000u
-#define TONEMAP__LOCAL_CAP 256.0f     /* of the scaled luminance in the sums: beyond it eq A.4 shows white in any case */
+#define TONEMAP__LOCAL_CAP 256.0f     /* of the scaled luminance in the sums; the display has 0.4 % left beyond it */
 #define TONEMAP__QUANTUM 4096.0f      /* steps a unit: 41 * 41 * 256 * 4096 < 2^31 */
 #define TONEMAP__ASHIKHMIN_QUANTUM 1048576.0f /* the same for luminances up to 1: 35 * 35 * 2^20 < 2^31 */
 
@@ -377,6 +377,7 @@ enum { TONEMAP__AVERAGE, TONEMAP__KEY, TONEMAP__WHITE, TONEMAP__LOW, TONEMAP__HI
 typedef struct tonemap__frame {
     float scale;            /* scaled luminance = luminance * scale, eq A.2 */
     float cap, quantum;     /* of the sums */
+    float inverse_cap;      /* 0 for the global operators, which have no sums */
     float inverse_white2;   /* 1 / white^2 */
     float epsilon, term[TONEMAP__LENGTHS]; /* the test of eq A.5 and A.7: |c - v| < epsilon c + term[k] */
     float soft;
@@ -805,6 +806,7 @@ static inline void tonemap__frame_boxes(tonemap__frame *f, const tonemap_options
         f->boxes = 1;
     }
     f->reach = f->radius[f->boxes - 1];
+    f->inverse_cap = f->boxes > 1 ? 1 / f->cap : 0;
 }
 
 static inline void tonemap__prepare_frame(tonemap *map)
@@ -994,12 +996,12 @@ static inline tonemap__bound tonemap__display_bound(const tonemap *map, const to
     const tonemap__frame *f = &map->frame;
     float half = 0.5f / f->quantum, low = range->low, high = range->high, pixel = range->pixel_high * f->scale;
     tonemap__bound bound;
-    if (pixel > f->cap) pixel = f->cap;
+    if (pixel > f->cap) high = TONEMAP__BRIGHTEST; /* La grows with the pixel there: no bound */
     if (!(pixel < f->term[0] && high * f->scale < f->term[0])) { /* the first step may fail: La is then the pixel */
         low = range->pixel_low < low ? range->pixel_low : low;
         high = range->pixel_high > high ? range->pixel_high : high;
     }
-    high = high * f->scale < f->cap ? high * f->scale : f->cap;
+    high = high < TONEMAP__BRIGHTEST ? high * f->scale < f->cap ? high * f->scale : f->cap : high;
     bound.most = 1 / (1 + (low * f->scale > half ? low * f->scale - half : 0)); /* the means are of rounded pixels */
     bound.least = 1 / (1 + high + half);
     peak *= f->scale * (1 + pixel * f->inverse_white2);
@@ -1530,13 +1532,16 @@ static inline void tonemap__sobel_row(float *out, const float *above, const floa
 
 /* ---- La for one row */
 
-/* The pixel for itself: what the global operators take, and pixels that are not worth a search. */
-static inline void tonemap__own_luminance(float *local, const float *luminance, float scale, int x, int end)
+/* The pixel for itself: what the global operators take, and, capped as in the sums, pixels that are not worth a search. */
+static inline void tonemap__own_luminance(float *local, const float *luminance, float scale, float cap, int x, int end)
 {
 #ifdef SAT__VECTOR
-    for (; x + 4 <= end; x += 4) sat__f32x4_store(local + x, sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale)));
+    for (; x + 4 <= end; x += 4) {
+        sat__f32x4 own = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale));
+        sat__f32x4_store(local + x, sat__f32x4_min(own, sat__f32x4_set1(cap)));
+    }
 #endif
-    for (; x < end; x++) local[x] = luminance[x] * scale;
+    for (; x < end; x++) local[x] = luminance[x] * scale < cap ? luminance[x] * scale : cap;
 }
 
 /* Some squared gradient of [x, end) is above the threshold. */
@@ -1553,17 +1558,17 @@ static inline int tonemap__has_edge(const float *edge, float threshold, int x, i
 }
 
 /* Where it is not, the pixel stands for itself. */
-static inline void tonemap__reset_flat(float *local, const float *luminance, const float *edge, float threshold, float scale, int x, int end)
+static inline void tonemap__reset_flat(float *local, const float *luminance, const float *edge, float threshold, float scale, float cap, int x, int end)
 {
 #ifdef SAT__VECTOR
     for (; x + 4 <= end; x += 4) {
         sat__i32x4 above = sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x));
-        sat__f32x4 own = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale));
+        sat__f32x4 own = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale)), sat__f32x4_set1(cap));
         sat__f32x4_store(local + x, sat__f32x4_select(above, sat__f32x4_load(local + x), own));
     }
 #endif
     for (; x < end; x++)
-        if (!(edge[x] > threshold)) local[x] = luminance[x] * scale;
+        if (!(edge[x] > threshold)) local[x] = luminance[x] * scale < cap ? luminance[x] * scale : cap;
 }
 
 /* Tiles without a search get their constant; runs of the others are searched. */
@@ -1594,9 +1599,9 @@ static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const
         end = sat__min_int(x + TONEMAP__GROUP, map->width);
         if (tonemap__has_edge(edge, threshold, x, end)) {
             tonemap__search(w, luminance, window, f, map->options.operation == TONEMAP_ASHIKHMIN, x, end);
-            tonemap__reset_flat(w->local, luminance, edge, threshold, f->scale, x, end);
+            tonemap__reset_flat(w->local, luminance, edge, threshold, f->scale, f->cap, x, end);
         } else {
-            tonemap__own_luminance(w->local, luminance, f->scale, x, end);
+            tonemap__own_luminance(w->local, luminance, f->scale, f->cap, x, end);
             w->stats.skipped += (size_t)(end - x);
         }
     }
@@ -1608,7 +1613,7 @@ static inline void tonemap__local_row(tonemap *map, tonemap__worker *w, int y)
     const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
     tonemap__window window;
     if (map->frame.boxes < 2) {
-        tonemap__own_luminance(w->local, luminance, map->frame.scale, 0, map->width);
+        tonemap__own_luminance(w->local, luminance, map->frame.scale, FLT_MAX, 0, map->width);
         return;
     }
     tonemap__open_window(&window, map, w, y);
@@ -1719,24 +1724,28 @@ static inline void tonemap__shift_red4(sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 
 
 /* ---- the factor from input to display, Ld / L: multiplying R, G and B by it is what replacing Y in Yxy does */
 
-/* Eq A.3 and A.4 with burn-out: Ld = Lr (1 + Lr / white^2) / (1 + La), and Lr = scale L. */
+/* Eq A.3 and A.4 with burn-out: Ld = Lr (1 + Lr / white^2) / (1 + La), and Lr = scale L. Where Lr is beyond the cap of the
+   sums, La grows with it, so that the brightest places keep their colour as with the global operator. */
 static inline void tonemap__gain_photographic(float *gain, const float *local, const float *luminance, const tonemap__frame *f, int end)
 {
     int x = 0;
     float most = 1.1529215e18f; /* 2^60: larger scaled luminances are white too, and infinity times 0 is no number */
 #ifdef SAT__VECTOR
     sat__f32x4 one = sat__f32x4_set1(1), zero = sat__f32x4_set1(0), scale = sat__f32x4_set1(f->scale), burn = sat__f32x4_set1(f->inverse_white2);
+    sat__f32x4 inverse_cap = sat__f32x4_set1(f->inverse_cap);
     for (; x + 4 <= end; x += 4) {
         sat__f32x4 y = sat__f32x4_load(luminance + x), lr = sat__f32x4_min(sat__f32x4_mul(y, scale), sat__f32x4_set1(most));
         sat__f32x4 v = sat__f32x4_mul(scale, sat__f32x4_add(one, sat__f32x4_mul(lr, burn)));
-        v = sat__f32x4_div(v, sat__f32x4_add(one, sat__f32x4_load(local + x)));
+        lr = sat__f32x4_max(sat__f32x4_mul(lr, inverse_cap), one);
+        v = sat__f32x4_div(v, sat__f32x4_add(one, sat__f32x4_mul(sat__f32x4_load(local + x), lr)));
         sat__f32x4_store(gain + x, sat__f32x4_select(sat__f32x4_less(zero, y), v, zero));
     }
 #endif
     for (; x < end; x++) {
-        float lr = luminance[x] * f->scale;
+        float lr = luminance[x] * f->scale, beyond;
         lr = lr < most ? lr : most;
-        gain[x] = luminance[x] > 0 ? f->scale * (1 + lr * f->inverse_white2) / (1 + local[x]) : 0;
+        beyond = lr * f->inverse_cap > 1 ? lr * f->inverse_cap : 1;
+        gain[x] = luminance[x] > 0 ? f->scale * (1 + lr * f->inverse_white2) / (1 + local[x] * beyond) : 0;
     }
 }
 
@@ -2343,14 +2352,17 @@ static const char tonemap__glsl_map[] =
     "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
     "    vec3 rgb = texelFetch(hdr, p, 0).rgb;\n"
     "    vec4 first = texelFetch(state, ivec2(0), 0), second = texelFetch(state, ivec2(1, 0), 0);\n"
-    "    float y = texelFetch(luminance, p, 0).x, scale = tonemap_scale(), key = tonemap_key(), own = y * scale, la = own;\n"
+    "    float y = texelFetch(luminance, p, 0).x, scale = tonemap_scale(), key = tonemap_key(), own = y * scale, la = own, beyond = 1.0;\n"
     "    float cd = cd_per_unit > 0.0 ? cd_per_unit : 10.0 * exp2(-first.x);\n"
     "    if (!(y > 0.0)) {\n"
     "        value = vec4(0.0, 0.0, 0.0, 1.0);\n"
     "        return;\n"
     "    }\n"
     "#if TONEMAP_OPERATOR == 0 || TONEMAP_OPERATOR == 2\n"
-    "    if (TONEMAP_SELECTIVE <= 0.0 || tonemap_is_edge(p, scale)) la = tonemap_find(p, own, key);\n"
+    "    if (TONEMAP_SELECTIVE <= 0.0 || tonemap_is_edge(p, scale)) {\n"
+    "        la = tonemap_find(p, own, key);\n"
+    "        beyond = max(own / TONEMAP_CAP, 1.0);\n"
+    "    }\n"
     "#endif\n"
     "#if TONEMAP_MESOPIC == 1\n"
     "    rgb = tonemap_mesopic(rgb, y, tonemap_rho(second.z * cd * lux_per_cd));\n"
@@ -2365,7 +2377,7 @@ static const char tonemap__glsl_map[] =
     "    rgb *= scale * (TONEMAP_BURN == 1 ? exp2(-first.z) : 1.0);\n"
     "#else\n"
     "    float burn = TONEMAP_BURN == 1 ? exp2(-2.0 * first.z) : 0.0;\n"
-    "    rgb *= scale * (1.0 + min(own, 1.1529215e18) * burn) / (1.0 + la);\n"
+    "    rgb *= scale * (1.0 + min(own, 1.1529215e18) * burn) / (1.0 + la * beyond);\n"
     "#endif\n"
     "    value = vec4(tonemap_srgb(rgb), 1.0);\n"
     "}\n";

@@ -1183,6 +1183,34 @@ TEST(metrics_know_equal_pictures_and_scale)
     EXPECT_NEAR(metrics_ssim(a, b, W, H), 6.5025 / (65025 + 6.5025), 1e-6);
 }
 
+TEST(bright_places_keep_their_colour)
+{
+    enum { W = 60, H = 50 };
+    float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    int kind, i;
+    for (i = 0; i < W * H; ++i) { /* a dark room with a blue sky 100000 times brighter */
+        float light = i % W < 40 ? 0.1f : 10000.0f;
+        pixels[3 * i] = 0.5f * light;
+        pixels[3 * i + 1] = 0.8f * light;
+        pixels[3 * i + 2] = 1.3f * light;
+    }
+    for (kind = 0; kind < 5; ++kind) {
+        shot s;
+        o = tonemap_defaults();
+        o.tolerance_codes = kind == 1 ? 2 : 0;
+        o.selective = kind == 2 ? 0.1 : 0;
+        o.soft = kind == 3;
+        if (kind == 4) o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
+        s = shoot(&view, &o);
+        EXPECT_NEAR(s.f32[3 * (20 * W + 58)], 0.5 / 0.7722, 0.01);
+        EXPECT(s.u8[3 * (20 * W + 58)] < s.u8[3 * (20 * W + 58) + 2] - 30);
+        shot_free(&s);
+    }
+    free(pixels);
+}
+
 /* ---- pictures */
 
 #ifdef HAVE_OPENEXR
