@@ -380,9 +380,13 @@ static inline void fiv__normalise(float out[3], const float v[3])
         out[0] = out[1] = out[2] = 0;
         return;
     }
-    x[0] = v[0] / largest, x[1] = v[1] / largest, x[2] = v[2] / largest;
+    x[0] = v[0] / largest;
+    x[1] = v[1] / largest;
+    x[2] = v[2] / largest;
     length = sqrtf(fiv__dot(x, x));
-    out[0] = x[0] / length, out[1] = x[1] / length, out[2] = x[2] / length;
+    out[0] = x[0] / length;
+    out[1] = x[1] / length;
+    out[2] = x[2] / length;
 }
 
 /* out = m v, and out = transpose(m) v */
@@ -1299,7 +1303,10 @@ static void fiv__bounding_ball(double centre[3], double *radius, const fiv__mesh
         for (i = 0; i < mesh->vertex_count; i++) {
             const float *p = positions + 3 * (size_t)mesh->source[i];
             double x = (double)p[0] - centre[0], y = (double)p[1] - centre[1], z = (double)p[2] - centre[2], d = x * x + y * y + z * z;
-            if (d > best) best = d, far = i;
+            if (d > best) {
+                best = d;
+                far = i;
+            }
         }
         if (step == 100) break;
         for (k = 0; k < 3; k++) centre[k] += ((double)positions[3 * (size_t)mesh->source[far] + (size_t)k] - centre[k]) / (step + 1);
@@ -1319,7 +1326,10 @@ static void fiv__bound_cluster(fiv__cluster *c, const fiv__mesh *mesh)
             if (v < low[k]) low[k] = v;
             if (v > high[k]) high[k] = v;
         }
-    for (k = 0; k < 3; k++) c->centre[k] = 0.5f * (low[k] + high[k]), c->axis[k] = 0;
+    for (k = 0; k < 3; k++) {
+        c->centre[k] = 0.5f * (low[k] + high[k]);
+        c->axis[k] = 0;
+    }
     for (i = 0; i < c->vertices; i++) {
         float d[3];
         for (k = 0; k < 3; k++) d[k] = mesh->x[k][c->vertex + (size_t)i] - c->centre[k];
@@ -1454,8 +1464,10 @@ static void fiv__raster_cone(const fiv__raster *r, int face, double p[3][3])
             else if (constant < 0) high = -2;
         }
         if (!(low <= high)) continue;
-        x0 = (int)ceil((low + 1) * 0.5 * size - 0.5);
-        x1 = (int)floor((high + 1) * 0.5 * size - 0.5);
+        low = ceil((low + 1) * 0.5 * size - 0.5);
+        high = floor((high + 1) * 0.5 * size - 0.5);
+        x0 = (int)low;
+        x1 = (int)high;
         if (x0 < 0) x0 = 0;
         if (x1 > size - 1) x1 = size - 1;
         if (x0 <= x1) r->rows[face * size + y] |= fiv__bits(x0, x1 + 1);
@@ -1470,7 +1482,10 @@ static void fiv__raster_flat(uint64_t *rows, int size, const float x[3], const f
     int i, row;
     for (i = 0; i < 3; i++) {
         int a = i, b = (i + 1) % 3;
-        if (y[a] > y[b] || (y[a] == y[b] && x[a] > x[b])) a = b, b = i;
+        if (y[a] > y[b] || (y[a] == y[b] && x[a] > x[b])) {
+            a = b;
+            b = i;
+        }
         bottom[i] = y[a];
         top[i] = y[b];
         start[i] = x[a];
@@ -1509,11 +1524,15 @@ static void fiv__project(float *px, float *py, float box[4], const fiv__raster *
         sat__f32x4 y = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_add(sat__f32x4_load(xv + i), sat__f32x4_set1(ov)), q), shift);
         sat__f32x4_store(px + i, x);
         sat__f32x4_store(py + i, y);
-        low_x = sat__f32x4_min(low_x, x), high_x = sat__f32x4_max(high_x, x);
-        low_y = sat__f32x4_min(low_y, y), high_y = sat__f32x4_max(high_y, y);
+        low_x = sat__f32x4_min(low_x, x);
+        high_x = sat__f32x4_max(high_x, x);
+        low_y = sat__f32x4_min(low_y, y);
+        high_y = sat__f32x4_max(high_y, y);
     }
-    sat__f32x4_store(lanes[0], low_x), sat__f32x4_store(lanes[1], high_x);
-    sat__f32x4_store(lanes[2], low_y), sat__f32x4_store(lanes[3], high_y);
+    sat__f32x4_store(lanes[0], low_x);
+    sat__f32x4_store(lanes[1], high_x);
+    sat__f32x4_store(lanes[2], low_y);
+    sat__f32x4_store(lanes[3], high_y);
     for (i = 0; i < 4; i++) {
         float *l = lanes[i];
         int k;
@@ -1578,10 +1597,15 @@ static void fiv__raster_cluster_cones(const fiv__raster *r, const fiv__cluster *
         for (j = 0; j < 3; j++) {
             double w, u, v, side;
             for (k = 0; k < 3; k++) p[j][k] = (double)mesh->x[k][c->vertex + corner[j]] + (double)r->offset[k];
-            w = p[j][ax.w] * (double)ax.sign, u = p[j][ax.u], v = p[j][ax.v];
+            w = p[j][ax.w] * (double)ax.sign;
+            u = p[j][ax.u];
+            v = p[j][ax.v];
             side = fabs(u) > fabs(v) ? fabs(u) : fabs(v);
             near_eye |= !(side <= 4 * w && w > 0);
-            beside[0] &= u > w, beside[1] &= -u > w, beside[2] &= v > w, beside[3] &= -v > w;
+            beside[0] &= u > w;
+            beside[1] &= -u > w;
+            beside[2] &= v > w;
+            beside[3] &= -v > w;
             x[j] = (float)((u / w + 1) * half - 0.5);
             y[j] = (float)((v / w + 1) * half - 0.5);
         }
@@ -1599,13 +1623,19 @@ static void fiv__raster_cluster(const fiv__raster *r, const fiv__cluster *c, int
     uint64_t *rows = r->rows + (size_t)(face * r->size);
     int t, last = r->size - 1, x0, x1, y0, y1;
     fiv__project(px, py, box, r, c, face);
-    x0 = sat__max_int(fiv__ceil(box[0]), 0), x1 = sat__min_int(fiv__floor(box[1]), last);
-    y0 = sat__max_int(fiv__ceil(box[2]), 0), y1 = sat__min_int(fiv__floor(box[3]), last);
+    x0 = sat__max_int(fiv__ceil(box[0]), 0);
+    x1 = sat__min_int(fiv__floor(box[1]), last);
+    y0 = sat__max_int(fiv__ceil(box[2]), 0);
+    y1 = sat__min_int(fiv__floor(box[3]), last);
     if (x0 > x1 || y0 > y1 || fiv__is_covered(rows, x0, x1, y0, y1)) return;
     for (t = 0; t < c->triangles; t++, corner += 3) {
         float x[3], y[3];
-        x[0] = px[corner[0]], x[1] = px[corner[1]], x[2] = px[corner[2]];
-        y[0] = py[corner[0]], y[1] = py[corner[1]], y[2] = py[corner[2]];
+        x[0] = px[corner[0]];
+        x[1] = px[corner[1]];
+        x[2] = px[corner[2]];
+        y[0] = py[corner[0]];
+        y[1] = py[corner[1]];
+        y[2] = py[corner[2]];
         fiv__raster_triangle(rows, x, y, last, turn);
     }
 }
@@ -1754,7 +1784,9 @@ static inline void fiv__octahedron_direction(float d[3], float u, float v)
         x = u < 0 ? fabsf(v) - 1 : 1 - fabsf(v);
         z = v < 0 ? fabsf(u) - 1 : 1 - fabsf(u);
     }
-    d[0] = x, d[1] = y, d[2] = z;
+    d[0] = x;
+    d[1] = y;
+    d[2] = z;
     fiv__normalise(d, d);
 }
 
@@ -1762,7 +1794,8 @@ static inline void fiv__octahedron_square(float *u, float *v, const float d[3])
 {
     float sum = fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]), x, z;
     sum = sum > 0 ? 1 / sum : 0;
-    x = d[0] * sum, z = d[2] * sum;
+    x = d[0] * sum;
+    z = d[2] * sum;
     *u = d[1] < 0 ? (x < 0 ? fabsf(z) - 1 : 1 - fabsf(z)) : x;
     *v = d[1] < 0 ? (z < 0 ? fabsf(x) - 1 : 1 - fabsf(x)) : z;
 }
@@ -1843,8 +1876,11 @@ static void fiv__locate(fiv__cell *cell, const fiv__grid *g, const float c[3])
     i = sat__clamp_int((int)a, 0, g->octahedral ? n - 2 : n - 1);
     j = sat__clamp_int((int)b, 0, g->phi - 2);
     k = sat__min_int((int)f, g->rho - 2);
-    a -= (float)i, b -= (float)j, f -= (float)k;
-    a = a > 1 ? 1 : a, b = b > 1 ? 1 : b;
+    a -= (float)i;
+    b -= (float)j;
+    f -= (float)k;
+    a = a > 1 ? 1 : a;
+    b = b > 1 ? 1 : b;
     right = i + 1 == n ? -i : 1;
     base = ((size_t)k * (size_t)g->phi + (size_t)j) * (size_t)n + (size_t)i;
     for (q = 0; q < 8; q++) {
@@ -2537,7 +2573,10 @@ static inline void fiv__add_sample(float out[FIV__TERMS], float weight, const fi
         int k;
         sat__f32x4_store(even, sat__f32x4_mul(w, fiv__upper_halves(h - 1)));
         sat__f32x4_store(odd, sat__f32x4_mul(w, fiv__upper_halves(h)));
-        for (k = 0; k < 4; k++) out[2 * k] += even[k], out[2 * k + 1] += odd[k];
+        for (k = 0; k < 4; k++) {
+            out[2 * k] += even[k];
+            out[2 * k + 1] += odd[k];
+        }
         out[8] += weight * fiv__half(h[8]);
         out[9] += weight * fabsf(fiv__half(h[9]));
     } else {
@@ -2744,14 +2783,23 @@ static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], const f
     fiv__cell cell;
     if (!fiv__place(offset, world, &distance, instance, r->point)) return 0;
     height = fiv__dot(world, r->normal);
-    if (height <= -1) return r->stats->below_horizon++, 0;
-    if (fiv__is_negligible(r, world, distance)) return r->stats->below_cutoff++, 0;
+    if (height <= -1) {
+        r->stats->below_horizon++;
+        return 0;
+    }
+    if (fiv__is_negligible(r, world, distance)) {
+        r->stats->below_cutoff++;
+        return 0;
+    }
     fiv__turn_back(normal, o->rotation, r->normal);
     if (height < 1 && !published) {
         for (k = 0; k < 3; k++) back[k] = -normal[k];
         below = fiv__reach(o, back);
         above = fiv__reach(o, normal);
-        if (height <= -above) return r->stats->below_horizon++, 0;
+        if (height <= -above) {
+            r->stats->below_horizon++;
+            return 0;
+        }
     }
     if (height < below - 1e-4f) cut = (below - height) / (below + above);
     r->stats->clipped += cut > 0;
@@ -2976,7 +3024,10 @@ static int fiv__start_receiver(fiv__receiver *r, const float *point, const float
     const fiv_environment *e = r->environment;
     int i, k;
     for (k = 0; k < 3; k++)
-        if (!sat__is_finite(point[k]) || !sat__is_finite(normal[k])) return r->stats->non_finite++, 0;
+        if (!sat__is_finite(point[k]) || !sat__is_finite(normal[k])) {
+            r->stats->non_finite++;
+            return 0;
+        }
     memcpy(r->point, point, sizeof r->point);
     fiv__normalise(r->normal, normal);
     r->total[0] = r->total[1] = r->total[2] = 0;
@@ -3313,14 +3364,20 @@ FIV_DEF sat_result fiv_occluder_save(const fiv_occluder *o, void *memory, size_t
     memset(&s, 0, sizeof s);
     s.magic = FIV__MAGIC;
     s.words = o->first[n];
-    s.octahedral = o->grid.octahedral, s.theta = o->grid.theta, s.phi = o->grid.phi, s.rho = o->grid.rho;
+    s.octahedral = o->grid.octahedral;
+    s.theta = o->grid.theta;
+    s.phi = o->grid.phi;
+    s.rho = o->grid.rho;
     s.face = o->face;
     s.closed = o->stats.closed;
-    s.first = o->grid.first, s.last = o->grid.last;
+    s.first = o->grid.first;
+    s.last = o->grid.last;
     memcpy(s.centre, o->centre, sizeof s.centre);
     s.radius = o->radius;
-    s.triangles = o->stats.triangles, s.skipped = o->stats.skipped_triangles;
-    s.rasterised = o->stats.rasterised, s.inside = o->stats.inside;
+    s.triangles = o->stats.triangles;
+    s.skipped = o->stats.skipped_triangles;
+    s.rasterised = o->stats.rasterised;
+    s.inside = o->stats.inside;
     memcpy(p, &s, sizeof s);
     p += sizeof s;
     memcpy(p, o->state, n);
@@ -3361,8 +3418,10 @@ static int fiv__read_header(fiv_occluder *from, fiv__save *s, const unsigned cha
     o.storage = s->octahedral ? FIV_STORAGE_HALF_OCTAHEDRAL : FIV_STORAGE_FLOAT;
     o.theta = s->octahedral ? (s->theta > 0 && s->theta <= 2049 ? 2 * (s->theta - 1) : 0) : s->theta;
     o.phi = s->octahedral ? 3 : s->phi;
-    o.rho = s->rho, o.face = s->face;
-    o.first_shell = s->first, o.last_shell = s->last;
+    o.rho = s->rho;
+    o.face = s->face;
+    o.first_shell = s->first;
+    o.last_shell = s->last;
     if (!fiv__occluder_options_are_valid(&o) || !sat__is_finite(s->radius) || s->radius < 0) return 0;
     if (!sat__is_finite(s->centre[0]) || !sat__is_finite(s->centre[1]) || !sat__is_finite(s->centre[2])) return 0;
     o.max_lights = from->max_lights;
@@ -3402,8 +3461,10 @@ FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, siz
     memcpy(o->stats.centre, s.centre, sizeof s.centre);
     o->radius = o->stats.radius = s.radius;
     o->stats.closed = s.closed;
-    o->stats.triangles = (size_t)s.triangles, o->stats.skipped_triangles = (size_t)s.skipped;
-    o->stats.rasterised = (size_t)s.rasterised, o->stats.inside = (size_t)s.inside;
+    o->stats.triangles = (size_t)s.triangles;
+    o->stats.skipped_triangles = (size_t)s.skipped;
+    o->stats.rasterised = (size_t)s.rasterised;
+    o->stats.inside = (size_t)s.inside;
     o->stats.spans = (size_t)s.words;
     p += sizeof s;
     memcpy(o->state, p, n);
@@ -3637,7 +3698,10 @@ FIV_DEF unsigned fiv_gl_texture(const fiv_gl *g) { return g ? g->out : 0; }
 static void fiv__gl_delete_textures(fiv_gl *g)
 {
     unsigned textures[4];
-    textures[0] = g->out, textures[1] = g->tables, textures[2] = g->scene, textures[3] = g->diffuse;
+    textures[0] = g->out;
+    textures[1] = g->tables;
+    textures[2] = g->scene;
+    textures[3] = g->diffuse;
     g->gl.DeleteTextures(4, textures);
 }
 
@@ -3663,7 +3727,8 @@ static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
     const char *body[2];
     sat_result r = sat__gl_open(gl, get_proc);
     if (r) return r;
-    body[0] = fiv__glsl_main, body[1] = NULL;
+    body[0] = fiv__glsl_main;
+    body[1] = NULL;
     memset(&shaders, 0, sizeof shaders);
     shaders.name = "fiv: receivers";
     shaders.library = fiv__glsl;
@@ -3693,7 +3758,9 @@ FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int wi
     if (!g) return SAT_ERR_MEMORY;
     memset(g, 0, sizeof *g);
     g->allocator = allocator;
-    g->width = width, g->height = height, g->max_instances = o.max_instances;
+    g->width = width;
+    g->height = height;
+    g->max_instances = o.max_instances;
     *out = g;
     return fiv__gl_start(g, get_proc);
 }
@@ -3791,8 +3858,12 @@ static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *inst
     row[1][3] = (float)base;
     row[2][3] = (float)o->grid.octahedral;
     row[3][3] = (float)base + (float)texels * (float)o->stats.samples;
-    row[4][0] = (float)o->grid.theta, row[4][1] = (float)o->grid.phi, row[4][2] = (float)o->grid.rho, row[4][3] = o->grid.log_first;
-    row[5][0] = o->grid.first, row[5][1] = o->grid.per_log;
+    row[4][0] = (float)o->grid.theta;
+    row[4][1] = (float)o->grid.phi;
+    row[4][2] = (float)o->grid.rho;
+    row[4][3] = o->grid.log_first;
+    row[5][0] = o->grid.first;
+    row[5][1] = o->grid.per_log;
 }
 
 FIV_DEF sat_result fiv_gl_move(fiv_gl *g, const fiv_instance *instances, size_t count)
@@ -3854,7 +3925,9 @@ static void fiv__gl_uniforms(fiv_gl *g, unsigned program, int unit)
     sat__gl_set_texture(gl, program, "fiv_scene", unit + 1, g->scene);
     sat__gl_set_texture(gl, program, "fiv_diffuse", unit + 2, g->diffuse);
     for (k = 0; k < 3; k++) {
-        column[0] = g->rotation[k], column[1] = g->rotation[3 + k], column[2] = g->rotation[6 + k];
+        column[0] = g->rotation[k];
+        column[1] = g->rotation[3 + k];
+        column[2] = g->rotation[6 + k];
         sat__gl_set_float3(gl, program, names[k], column);
     }
     if (counts >= 0) gl->Uniform4i(counts, g->count, g->lights, g->texels, g->face);
