@@ -1181,6 +1181,8 @@ TEST(metrics_know_equal_pictures_and_scale)
     EXPECT_NEAR(metrics_scielab(a, b, W, H, 23), 100, 1);   /* black and white are 100 L apart */
     EXPECT(metrics_flip(a, b, W, H, 67) > 0.9);
     EXPECT_NEAR(metrics_ssim(a, b, W, H), 6.5025 / (65025 + 6.5025), 1e-6);
+    free(a);
+    free(b);
 }
 
 TEST(bright_places_keep_their_colour)
