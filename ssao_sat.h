@@ -100,6 +100,12 @@
      HBAO 16 x 8 + 15 x 15 blur    4.63   0.066   0.90   0.068                   0.047
      GTAO, half resolution         1.00   0.059   0.90   0.059                   0.048
      GTAO 3 x (3 + 3) + 5 x 5      1.64   0.057   0.90   0.057                   0.047
+
+   Time grows with the radius, because more slabs come into reach and less is flat: radii 0.1 : 0.25 : 0.6 cost 1 : 1.7 : 2.6; the
+   others cost 1 : 1.0 : 1.1. Leaving out flat regions: 1.2 to 1.7 times as fast where a third of the picture or more is flat,
+   identical output. Bent normals: 1.05 to 1.19 times the time, 1 to 7 degrees off the ray-traced ones. A gliding camera changes the
+   result by 0.0014 a frame where half-resolution GTAO changes by 0.0023. Box means of 1/z at 4096 x 4096: 5e-6 of a depth step
+   off, where float tables are 0.6 off. Full-resolution tables cost 4 times as much and gain nothing at these sizes.
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SSAO_SAT_IMPLEMENTATION)
@@ -522,14 +528,16 @@ static int ssao_sat__read_axes(ssao_sat__camera *c, const float *m, int width, i
 {
     double w = c->orthographic ? (double)m[15] : -(double)m[11];
     double shift_x = c->orthographic ? -(double)m[12] : (double)m[8], shift_y = c->orthographic ? -(double)m[13] : (double)m[9];
+    double large = c->orthographic ? 1e15 : 1e6, small = c->orthographic ? 1e-15 : 1e-9;
     double top = m[5] > 0 ? 1 : -1; /* normalised y of the upper border: -1 when the matrix flips y, as Vulkan's do */
     if (bottom_up) top = -top;
     c->full[0] = 2 * w / (width * (double)m[0]);
     c->full[1] = (shift_x - w) / (double)m[0];
     c->full[2] = -2 * w * top / (height * (double)m[5]);
     c->full[3] = (w * top + shift_y) / (double)m[5];
-    return sat__is_finite((float)c->full[0]) && sat__is_finite((float)c->full[1]) && sat__is_finite((float)c->full[2]) &&
-           sat__is_finite((float)c->full[3]) && c->full[0] != 0 && c->full[2] != 0;
+    /* rays flatter than one in a million and pixels smaller than a billionth of the distance are no view */
+    return fabs(c->full[0]) <= large && fabs(c->full[1]) <= large && fabs(c->full[2]) <= large && fabs(c->full[3]) <= large &&
+           fabs(c->full[0]) >= small && fabs(c->full[2]) >= small;
 }
 
 /* depth d -> 1/z (perspective) or z (orthographic), both affine in d. The kind must agree with the matrix. */
