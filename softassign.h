@@ -737,7 +737,7 @@ static void softassign__list_row(softassign *s, int row, softassign__scratch *w)
         if (!(cut < 3e38f)) cut = SOFTASSIGN__INFINITY;
     }
     count = softassign__gather(s, row, w, 0, -SOFTASSIGN__INFINITY, cut);
-    if (count > k) softassign__partition(w->candidates, count, k - 1);
+    if (count >= k) softassign__partition(w->candidates, count, k - 1);
     if (cut < SOFTASSIGN__INFINITY) { /* a slot that is better than the k-th so far has a key below it */
         float reach = cut;
         int old = count;
@@ -1023,7 +1023,7 @@ static void softassign__relax_list(softassign *s, softassign__search *q, int row
     }
     shift = base - (own_cost - own_price);
     for (; at < end; at++) {
-        if ((double)s->list_value[at] + shift - (fabs((double)s->list_value[at]) + fabs(shift)) * 4e-16 > q->nearest) return;
+        if ((double)s->list_value[at] + shift - (fabs((double)s->list_value[at]) + fabs(shift)) * 4e-16 > q->nearest) break; /* sorted */
         softassign__relax(s, q, row, s->list_slot[at], s->list_cost[at], base, own_cost, own_price);
     }
     if (s->list_limit[row] >= (double)SOFTASSIGN__INFINITY) return;

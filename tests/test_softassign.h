@@ -1203,3 +1203,28 @@ TEST(softassign_real_pictures_and_tiles)
     SKIP("needs libstb-dev");
 #endif
 }
+
+/* Lists of a few entries, in a problem where many rows fight for the same columns: every search runs out of its lists. */
+TEST(softassign_short_lists_stay_exact)
+{
+    uint64_t seed;
+    int k, x[120];
+    for (seed = 1; seed < 4; seed++)
+        for (k = 4; k <= 16; k += 4) {
+            problem q = make_features(120, 1300, 20, seed);
+            softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
+            softassign_report r;
+            int i, j;
+            for (i = 0; i < 120; i++) /* all patches alike, far from all tiles */
+                for (j = 0; j < 20; j++) q.rows_f[i * 20 + j] = q.rows_f[j] * 0.1f + (float)i * 0.01f;
+            free(q.cost);
+            q.cost = reference_matrix(q.rows_f, q.columns_f, 120, 1300, 20);
+            q.optimum = (double)reference_optimum(q.cost, 120, 1300, NULL, NULL);
+            o.neighbours = k;
+            EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
+            check_solution(&q, x, &r, 0);
+            EXPECT(r.gap < 1e-12);
+            EXPECT(r.rows_expanded > 0);
+            free_problem(&q);
+        }
+}
