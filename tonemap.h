@@ -40,16 +40,16 @@
 
    MEMORY, THREADS, ERRORS
 
-     One allocation of about 4 bytes a pixel and 62 rows of 4 bytes a pixel for each worker; none in a frame. threads
+     One allocation of about 4 bytes a pixel of the picture, and 50 rows of that for each worker; none in a frame. threads
      shares out bands of 64 rows. Every call checks its arguments and answers with a sat_result; on an error the output is
      untouched. An object serves one call at a time.
 
    NUMERICS
 
      Sums are integers: the scaled luminance is rounded to 2^-12 and cut at 256, where the display has 0.4 % left; box means
-     are then exact, and beyond the cut La is taken to grow with the pixel. The logarithms of the log-average are added as integers too. So the result has the same bits for any
-     number of workers, for vector and plain code (without fused multiply-add), and for pictures in units that differ by a
-     power of two from 2^-20 to 2^20.
+     are then exact, and beyond the cut La is taken to grow with the pixel. The logarithms of the log-average are added as
+     integers too. So the result has the same bits for any number of workers, for vector and plain code (without fused
+     multiply-add), and for pictures in units that differ by a power of two from 2^-20 to 2^20.
      Against OpenGL at most 1 code differs, in 2 % of codes (on a software renderer). 8-bit codes are at most one from the
      rounded value, and that in 2 % of cases, within 0.1 of a step.
      Luminances below 2^-100 are black, those above 2^100 count as 2^100. NaN and negative luminances are black, infinity
@@ -68,9 +68,9 @@
      global 0.4, + mesopic 1.25, soft scales 1.4, Ashikhmin 1.7; SAT_NO_SIMD 1.9 (clang -O2) to 2.4 (gcc -O2); OpenCV's
      global Drago operator 3.8, pfstmo_reinhard02 -s 24. SSIM against the operator with exact Gaussians 0.987 to 0.998.
      tolerance_codes = 2 skips 32 % (StillLife) and 42 % (night) of the searches, but the bounds take about as long as
-     what they save: the time is between 0.97 and 1.1. On noise it looks at an eighth of the tiles, sees that nothing can be
+     what they save: the time is between 1.0 and 1.2. On noise it looks at an eighth of the tiles, sees that nothing can be
      skipped, and costs 1.03. selective pays where few pixels are near edges, 0.9 to 1.1, and for Ashikhmin, 0.6, at an SSIM
-     of only 0.9. Where searches are dear, as on battery or without vector code, both gain more.
+     of only 0.9.
      Against flicker: 0.5 % of noise moves single pixels by up to 56 codes with hard scales and by less than 1 with soft = 1. */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(TONEMAP_IMPLEMENTATION)
