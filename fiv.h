@@ -64,10 +64,10 @@
    COST (tests/bench/bench_fiv.c; bunny of 3674 triangles, one core; ratios of one run). NRMSE is eq 17 on a plane below the
    bunny against rays to every texel, in brackets the published one:
      samples      NRMSE forest    city    1 point light    masks made  light again  vectors  masks
-     32x17x15     0.014 (0.023)   0.026   0.051 (0.1)      1.3 s       5 ms         0.33 MB  1.2 MB   default
-     64x33x30     0.006 (0.008)   0.013   0.037            10 s        25 ms        2.5 MB   8.9 MB
+     32x17x15     0.014 (0.023)   0.026   0.051 (0.1)      1.3 s       5 to 8 ms    0.33 MB  1.2 MB   default
+     64x33x30     0.006 (0.008)   0.013   0.037            10 s        30 ms        2.5 MB   8.9 MB
    - A receiver costs 0.15 us an occluder, 350 to 550 times less than its rays; FIV_MASK 1 to 2 us where masks are needed.
-   - A mask costs 0.93 times Embree's eight-wide rays at 3.7k triangles, 1.5 to 1.75 times at 11k to 48k.
+   - A mask costs 0.94 times Embree's eight-wide rays at 3.7k triangles, 1.3 to 1.75 times at 11k to 48k.
    - Two occluders, 64x33x30: NRMSE 0.034 with eq 14-15, 0.0105 FIV_SCALED, 0.007 FIV_MASK.
    - Cut by the horizon: FIV_SCALED has 0.14 to 0.36 of the error of (d + R) / 2R at d = 0 to 0.6 R.
    - Half octahedral storage: 0.29 times the published memory at 1.16 times the error (64x33x30).
@@ -3220,8 +3220,8 @@ static void fiv__self_masks(float rgb[3], const fiv__receiver *r, const fiv_occl
 }
 #endif
 
-/* A point in a fold may lie among samples that are all inside the mesh: step out along the normal until a quarter of the weight
-   is valid. */
+/* A point in a fold may lie among samples that are all inside the mesh: step out along the normal until a quarter
+   of the weight is valid. */
 static void fiv__locate_outside(fiv__cell *cell, const fiv_occluder *o, const float offset[3], const float normal[3])
 {
     static const float steps[6] = {0, 0.05f, 0.1f, 0.2f, 0.4f, 0.8f};

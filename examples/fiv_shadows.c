@@ -88,6 +88,23 @@ static void make_normals(object *o)
     }
 }
 
+/* Counter-clockwise seen from outside: the volume is positive. */
+static void turn_outwards(object *o)
+{
+    double volume = 0;
+    size_t t;
+    int k;
+    for (t = 0; t < o->triangles; ++t) {
+        const float *a = o->positions + 3 * o->indices[3 * t], *b = o->positions + 3 * o->indices[3 * t + 1], *c = o->positions + 3 * o->indices[3 * t + 2];
+        for (k = 0; k < 3; ++k) volume += (double)a[k] * ((double)b[(k + 1) % 3] * (double)c[(k + 2) % 3] - (double)b[(k + 2) % 3] * (double)c[(k + 1) % 3]);
+    }
+    for (t = 0; t < o->triangles && volume < 0; ++t) {
+        unsigned swap = o->indices[3 * t + 1];
+        o->indices[3 * t + 1] = o->indices[3 * t + 2];
+        o->indices[3 * t + 2] = swap;
+    }
+}
+
 static void open_object(object *o, const char *path, int second)
 {
     if (path) {
@@ -105,12 +122,8 @@ static void open_object(object *o, const char *path, int second)
         reference_mesh m = second ? reference_knot(1, 0, 64, 24, 0.35) : reference_knot(2, 3, 160, 16, 0.22);
         o->positions = m.positions, o->indices = m.indices;
         o->vertices = m.vertices, o->triangles = m.triangles;
-        for (size_t t = 0; t < m.triangles; ++t) { /* counter-clockwise from outside */
-            unsigned swap = o->indices[3 * t + 1];
-            o->indices[3 * t + 1] = o->indices[3 * t + 2];
-            o->indices[3 * t + 2] = swap;
-        }
     }
+    turn_outwards(o);
     make_normals(o);
 }
 

@@ -1449,3 +1449,33 @@ TEST(defaults_are_the_stated_ones)
     EXPECT(i.accuracy == FIV_SCALED && i.partial == 1 && i.overlap == 1);
     EXPECT_NEAR(i.cutoff, 0.001f, 0);
 }
+
+/* The vector loops against their plain twins. */
+TEST(vector_loops_equal_plain_ones)
+{
+    reference_mesh m = test_knot();
+    fiv_environment *e = test_environment(2000, 400);
+    int storage, k;
+    for (storage = 0; storage < 2; storage++) {
+        fiv_occluder_options options = test_small_set();
+        fiv_occluder *o;
+        size_t i;
+        options.storage = (fiv_storage)storage;
+        o = test_occluder(&m, &options, NULL);
+        EXPECT_EQ(fiv_occluder_light(o, e, NULL), SAT_OK);
+        for (i = 0; i < o->stats.samples; i += 7) {
+            float a[FIV__TERMS], b[FIV__TERMS];
+            for (k = 0; k < FIV__TERMS; k++) a[k] = b[k] = 0.25f * (float)k;
+            fiv__add_sample(a, 0.37f, o, i);
+            fiv__add_sample_plain(b, 0.37f, o, i);
+            for (k = 0; k < FIV__TERMS; k++) EXPECT_NEAR(a[k], b[k], 1e-6 * (1 + fabs((double)b[k])));
+            if (storage) {
+                const uint16_t *h = fiv__half_sample(o, i);
+                for (k = 0; k < FIV__TERMS; k++) EXPECT_ULP(fiv__half(h[k]), sat__half_to_float(h[k]), 0);
+            }
+        }
+        fiv_occluder_destroy(o);
+    }
+    fiv_environment_destroy(e);
+    reference_mesh_free(&m);
+}
