@@ -82,8 +82,8 @@
      .069, .068, .021 (.015 with four rays at the rim).
    - 1e5 drops of 2 mm in the published box at 512 x 512, time over the map's and RMSE: map 1 .0586, sprite .95 .0498,
      ray 1.24 .0456, auto with far drops below 0.5 px .78 .0343, 1 px .65 .0310, 1.5 px (the default) .63 .0313, 3 px
-     .62 .0331. 1e6 drops: map 1 .140, sprite .98 .121, ray 1.22 .113, auto .51 .077. Far drops of at least a pixel, as published, are worse than
-     none: no rain at all has .0556.
+     .62 .0331; no rain at all .0556: far drops of at least a pixel, as published, are worse than none. 1e6 drops: map 1
+     .140, sprite .98 .121, ray 1.22 .113, auto .51 .077, no rain .155.
    - Lookups in mips: a texel of the octahedral picture 256..2048 wide costs the same; 1024 is as good as 2048 (.0221,
      .0208). Boxes of a table: 20 to 150 times as long, better for small drops only (12 pixels: .036 against .049).
    - Streaks: RMSE .001 to .002 from 64 still moments, 36 to 60 times faster.
