@@ -170,6 +170,15 @@ static inline int common_parse(common_settings *common, int argc, char **argv, c
     return optind;
 }
 
+/* 1 when the file is there or can be made: better known before a picture is drawn than after. */
+static inline int common_can_write(const char *path)
+{
+    FILE *old = fopen(path, "rb"), *file = old ? old : fopen(path, "wb");
+    if (file) fclose(file);
+    if (file && !old) remove(path);
+    return file != NULL;
+}
+
 /* ---- labels and contact sheets: 8-bit RGB ---- */
 
 typedef struct common_canvas { unsigned char *rgb; int width, height; } common_canvas;

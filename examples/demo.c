@@ -128,15 +128,6 @@ static int save(pipeline *p, const char *path)
     return 0;
 }
 
-/* Better known before the picture is drawn. */
-static int can_write(const char *path)
-{
-    FILE *old = fopen(path, "rb"), *file = old ? old : fopen(path, "wb");
-    if (file) fclose(file);
-    if (file && !old) remove(path);
-    return file != NULL;
-}
-
 static int run(pipeline *p, const gl_context *context, int frames, const char *out, int stats, int mosaic)
 {
     double sum[PIPELINE_STAGES] = {0};
@@ -206,7 +197,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "demo: --rate goes from 0mm to 500mm, --frames from 1 to 9999\n");
         return 2;
     }
-    if (!can_write(out)) {
+    if (!common_can_write(out)) {
         fprintf(stderr, "demo: %s cannot be written\n", out);
         return 1;
     }

@@ -379,6 +379,10 @@ int main(int argc, char **argv)
         first = common_parse(&set.common, argc, argv, "raindrops [options] out.png", options, (int)(sizeof options / sizeof *options));
     }
     path = set.common.out ? set.common.out : first < argc ? argv[first] : "raindrops.png";
+    if (!common_can_write(path)) {
+        fprintf(stderr, "raindrops: %s cannot be written\n", path);
+        return 1;
+    }
     s.set = &set;
     ok = open_environment(&s) && open_rain(&s) && set_look(&s) && set_camera(&s) && set_tone(&s);
     if (ok && set.closeup) ok = save_closeup(&s, path);

@@ -244,7 +244,7 @@ check_dist() {
 
 # ---- examples --------------------------------------------------------------------------------------------------
 
-# Each is one file that compiles without any package, answers --help, and refuses what it does not know with a sentence.
+# Each is one file that compiles without any package (some use a reference of tests/, which needs -I.), answers --help, and refuses what it does not know with a sentence.
 check_examples() {
     local source name program text
     dir=build/check/strict/examples
@@ -252,7 +252,7 @@ check_examples() {
     for source in examples/*.c; do
         [ -f "$source" ] && [[ $source != *_view.c ]] || continue
         name=$(basename "$source" .c) program=$dir/$(basename "$source" .c)
-        ok "$source compiles alone" ${CC:-cc} -std=c99 -O1 -D_POSIX_C_SOURCE=200809L $WARN_C "$source" -o "$program" $LIBS -lpthread -ldl
+        ok "$source compiles alone" ${CC:-cc} -std=c99 -O1 -D_POSIX_C_SOURCE=200809L $DEFS $WARN_C "$source" -o "$program" $LIBS -lpthread -ldl
         [ -x "$program" ] || continue
         if text=$("./$program" --help 2>&1) && grep -q 'usage: ' <<<"$text"; then pass; else fail "$name --help" "$text"; fi
         if text=$("./$program" --no-such-option 2>&1) || [ -z "$text" ]; then fail "$name takes --no-such-option" "$text"; else pass; fi
