@@ -155,7 +155,7 @@ TEST(softassign_defaults_are_as_documented)
     EXPECT_EQ(o.method, SOFTASSIGN_AUTO);
     EXPECT_NEAR(o.gap, 0.001, 0);
     EXPECT_EQ(o.capacity_default, 1);
-    EXPECT_EQ(o.neighbours, 64);
+    EXPECT_EQ(o.neighbours, 160);
     EXPECT_EQ(o.certify, 1);
     EXPECT_EQ(o.gather, 4);
     EXPECT_EQ(o.ants, 30);
