@@ -62,9 +62,10 @@
    COST (one thread, measured by tests/bench/bench_softassign.c on real photographs and tiles)
      time from features to the proven answer, as a ratio to scipy's linear_sum_assignment and to a plain LAPJV, both
      without the time of their matrix:           900 x 8192 (six photos)           2048 x 8192 (three photos)
-       EXACT                                     0.07 to 0.35; LAPJV 0.11 to 1.7    0.06 to 0.14; LAPJV 0.10 to 0.31
-       FAST, gap 0.1 %                           0.07 to 0.29; LAPJV 0.11 to 1.3    0.06 to 0.13; LAPJV 0.12 to 0.27
-     The upper ends are pictures that scipy finds easy (0.14 s). 100 x 100, dense: 0.9 of LAPJV, checks and bound included.
+       EXACT                                     0.09 to 0.17; LAPJV 0.11 to 0.31   0.06, 0.07; LAPJV 0.09, 0.10
+       FAST, gap 0.1 %                           0.05 to 0.12; LAPJV 0.09 to 0.22   0.05, 0.06; LAPJV 0.08, 0.09
+     A picture whose cells hardly compete (stream) is easy for all: EXACT 0.54 and 0.21, FAST 0.37 and 0.16 of scipy, which
+     needs 0.14 s; there a plain LAPJV wins at 900 x 8192, if its matrix is free. 100 x 100, dense: 0.9 of LAPJV, checks and bound included.
      8192 x 65536: the optimum in a minute on two cores, 4 % of the distances. Video, 30 x 30 of 8192, an eighth of a cell
      a frame: 0.07 of LAPJV from prices; a switching bonus of 0.05 changes 39 % of the tiles (74 % without) at +0.9 % cost.
      Beside the optimum the published methods cost, 100x100 to 400x1500: greedy +3 to 10 %, greedy and 2-opt +0.4 to 0.7 %,
@@ -1278,11 +1279,11 @@ static void softassign__finish(softassign *s, int slot)
 /* The smallest and the second smallest cost - price of a row; ties go to the smaller index. Returns the index. */
 static int softassign__two_smallest(const float *cost, const double *price, int n, double *smallest, double *second)
 {
-    double m1 = (double)SOFTASSIGN__INFINITY, m2 = m1;
+    double m1, m2;
     int j = 0, best = -1;
 #ifdef SAT__SSE2
     double low[2], high[2], index[2];
-    __m128d a = _mm_set1_pd(m1), b = a, at = _mm_set1_pd(-1), here = _mm_set_pd(1, 0), two = _mm_set1_pd(2);
+    __m128d a = _mm_set1_pd((double)SOFTASSIGN__INFINITY), b = a, at = _mm_set1_pd(-1), here = _mm_set_pd(1, 0), two = _mm_set1_pd(2);
     for (; j + 2 <= n; j += 2) {
         __m128d v = _mm_sub_pd(_mm_set_pd((double)cost[j + 1], (double)cost[j]), _mm_loadu_pd(price + j)), less = _mm_cmplt_pd(v, a);
         b = _mm_min_pd(b, _mm_max_pd(v, a));
@@ -1297,6 +1298,8 @@ static int softassign__two_smallest(const float *cost, const double *price, int 
     m1 = low[best];
     m2 = low[1 - best] < high[best] ? low[1 - best] : high[best];
     best = (int)index[best];
+#else
+    m1 = m2 = (double)SOFTASSIGN__INFINITY;
 #endif
     for (; j < n; j++) {
         double value = (double)cost[j] - price[j];
@@ -2126,7 +2129,7 @@ typedef struct softassign__sweep {
 /* e[j] = c - v and their minimum. */
 static float softassign__reduced_row(const float *cost, const float *price, float *e, int n)
 {
-    float least = SOFTASSIGN__INFINITY;
+    float least;
     int j = 0;
 #ifdef SAT__VECTOR
     float m[4];
@@ -2140,6 +2143,8 @@ static float softassign__reduced_row(const float *cost, const float *price, floa
     least = m[0] < m[1] ? m[0] : m[1];
     least = m[2] < least ? m[2] : least;
     least = m[3] < least ? m[3] : least;
+#else
+    least = SOFTASSIGN__INFINITY;
 #endif
     for (; j < n; j++) {
         e[j] = cost[j] - price[j];
@@ -3224,7 +3229,7 @@ static float softassign__cell_mean(const sat_image *image, int grid_width, int g
     if (y1 <= y0) y1 = y0 + 1;
     for (j = y0; j < y1; j++)
         for (i = x0; i < x1; i++) {
-            float value;
+            float value = 0;
             sat__read_row(&value, image, j, i, i + 1, channel);
             sum += (double)value;
         }
