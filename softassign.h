@@ -1685,6 +1685,10 @@ static sat_result softassign__finish_phase(softassign *s)
             softassign__finish(s, j);
             return SAT_OK;
         }
+        if (j >= s->columns && softassign__is_free(s, j)) { /* forbidden pairs keep a column below its minimum use */
+            s->report.column_error = softassign__column(s, j);
+            return SAT_ERR_LIMIT;
+        }
         s->next++;
     }
     s->phase = SOFTASSIGN__DONE;

@@ -421,6 +421,21 @@ TEST(softassign_minimum_use)
     }
 }
 
+TEST(softassign_impossible_minimum_use_names_its_column)
+{
+    problem q = make_dense(6, 9, cost_uniform, 3);
+    int least[9] = {0, 0, 0, 1, 0, 0, 0, 0, 0}, x[6], i;
+    softassign_report r;
+    for (i = 0; i < 6; i++) q.cost[i * 9 + 3] = INFINITY;
+    q.p.minimum_use = least;
+    EXPECT_EQ(softassign_solve(x, &q.p, NULL, &r), SAT_ERR_LIMIT);
+    EXPECT_EQ(r.column_error, 3);
+    least[3] = 2; /* more than the capacity */
+    EXPECT_EQ(softassign_solve(x, &q.p, NULL, &r), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(r.column_error, 3);
+    free_problem(&q);
+}
+
 TEST(softassign_minimum_distance_between_repeats)
 {
     problem q = make_features(144, 60, 6, 8);
@@ -1204,27 +1219,29 @@ TEST(softassign_real_pictures_and_tiles)
 #endif
 }
 
-/* Lists of a few entries, in a problem where many rows fight for the same columns: every search runs out of its lists. */
+/* Many rows fight for the same columns with lists of a few entries: searches run out of their lists all the time. */
 TEST(softassign_short_lists_stay_exact)
 {
     uint64_t seed;
-    int k, x[120];
-    for (seed = 1; seed < 4; seed++)
-        for (k = 4; k <= 16; k += 4) {
-            problem q = make_features(120, 1300, 20, seed);
-            softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
-            softassign_report r;
-            int i, j;
-            for (i = 0; i < 120; i++) /* all patches alike, far from all tiles */
-                for (j = 0; j < 20; j++) q.rows_f[i * 20 + j] = q.rows_f[j] * 0.1f + (float)i * 0.01f;
-            free(q.cost);
-            q.cost = reference_matrix(q.rows_f, q.columns_f, 120, 1300, 20);
-            q.optimum = (double)reference_optimum(q.cost, 120, 1300, NULL, NULL);
-            o.neighbours = k;
-            EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
-            check_solution(&q, x, &r, 0);
-            EXPECT(r.gap < 1e-12);
-            EXPECT(r.rows_expanded > 0);
-            free_problem(&q);
+    int turn, x[60];
+    for (turn = 0; turn < 36; turn++) {
+        int columns = turn % 2 ? 1300 : 600, i, j;
+        problem q = make_features(60, columns, 20, 1);
+        softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
+        softassign_report r;
+        seed = (uint64_t)(turn / 2) + 4;
+        for (i = 0; i < 60 + columns; i++) {
+            double level = (i < 60 ? 10 : 250) * support_uniform(&seed), spread = i < 60 ? 3 : 30;
+            float *f = i < 60 ? q.rows_f + i * 20 : q.columns_f + (i - 60) * 20;
+            for (j = 0; j < 20; j++) f[j] = (float)(level + spread * support_gaussian(&seed));
         }
+        free(q.cost);
+        q.cost = reference_matrix(q.rows_f, q.columns_f, 60, columns, 20);
+        q.optimum = (double)reference_optimum(q.cost, 60, columns, NULL, NULL);
+        o.neighbours = 4 + turn % 3 * 4;
+        EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
+        check_solution(&q, x, &r, 0);
+        EXPECT(r.gap < 1e-12);
+        free_problem(&q);
+    }
 }
