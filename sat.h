@@ -964,8 +964,6 @@ enum {
     X(void, Uniform1fv, (int location, int count, const float *values))                                                \
     X(void, Uniform3fv, (int location, int count, const float *values))                                                \
     X(void, Uniform4fv, (int location, int count, const float *values))                                                \
-    X(void, UniformMatrix3fv, (int location, int count, unsigned char transpose, const float *values))                 \
-    X(void, UniformMatrix4fv, (int location, int count, unsigned char transpose, const float *values))                 \
     X(void, UseProgram, (unsigned program))                                                                            \
     X(void, VertexAttribDivisor, (unsigned index, unsigned divisor))                                                   \
     X(void, VertexAttribPointer, (unsigned index, int size, unsigned type, unsigned char normalized, int stride,       \
@@ -1399,12 +1397,6 @@ static inline void sat__gl_set_float3(sat__gl *gl, unsigned program, const char 
 static inline void sat__gl_set_float4(sat__gl *gl, unsigned program, const char *name, const float *v)
 {
     gl->Uniform4fv(gl->GetUniformLocation(program, name), 1, v);
-}
-
-/* 16 floats, column after column */
-static inline void sat__gl_set_matrix4(sat__gl *gl, unsigned program, const char *name, const float *m)
-{
-    gl->UniformMatrix4fv(gl->GetUniformLocation(program, name), 1, 0, m);
 }
 
 /* Binds a 2D texture to a unit below the number given to sat__gl_begin, without a sampler object, and tells the
