@@ -34,7 +34,7 @@
    - Drops do not see the scene or each other, only the environment; they do not collide, merge, splash or run down.
    - A drop that reaches the near plane, or that the eye is in, is left out (and counted).
    - Sprites (MAP, SPRITE) are still and in focus. Flattened drops have order 0 only. OpenGL draws unsorted, as published,
-     and knows no streaks, no depth of field, no internal reflections and no flattened shapes.
+     and knows no depth of field, no internal reflections and no flattened shapes.
    - No Airy theory: no supernumerary bows.
    - It starts no thread, opens no window, creates no OpenGL context, keeps no global state.
 
@@ -429,7 +429,7 @@ RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *d
 
 /* Blends the drops over the bound framebuffer's viewport (0, 0, width, height), which should hold floats: row 0 is the
    bottom one, as OpenGL has it. Unsorted, as published; looks as in raindrop_render but without internal reflections,
-   flattened shapes, streaks and depth of field. depth_near > 0: the depth test is on, against a depth buffer of the
+   flattened shapes and depth of field. depth_near > 0: the depth test is on, against a depth buffer of the
    usual perspective with these planes; depth is not written. */
 RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, int width, int height, const raindrop_camera *camera,
                                            const raindrop_render_options *options, float depth_near, float depth_far);
@@ -3281,79 +3281,103 @@ static const char raindrop__glsl_environment[] =
     "    return mix(fine, atlas(at.xy, level + 1.0), lod - level);\n"
     "}\n";
 
-/* A drop's sprite. LOOK 0 map, 1 sprite, 2 ray, 3 auto. */
+/* A drop's square or streak. LOOK 0 map, 1 sprite, 2 ray, 3 auto; SOFT where drops leave streaks. */
 static const char raindrop__glsl_draw_vertex[] =
     "layout(location = 0) in vec4 drop;\n"     /* position, radius */
     "layout(location = 1) in vec4 motion;\n"   /* velocity, axis ratio */
     "uniform vec3 eye, right, up, back;\n"
     "uniform vec4 view;\n"                     /* half width, half height, focal length in pixels, near distance */
     "uniform vec4 limits;\n"                   /* far radius, coverage threshold, depth planes */
-    "flat out vec4 place;\n"                   /* centre in pixels, half side, focal length in radii */
+    "flat out vec4 place;\n"                   /* centre in pixels, half side (sprite) or radius, focal length in radii */
     "flat out vec3 seen;\n"                    /* centre in radii, view space, z forward */
     "flat out vec4 far_colour;\n"              /* colour, half side of the square that stands for a far drop */
+    "#ifdef SOFT\n"
+    "uniform vec4 shutter;\n"                  /* the camera's velocity, exposure */
+    "flat out vec4 path;\n"                    /* streak, 0, radius of what moves along it (0: still), in pixels */
+    "vec4 path_of(vec3 v, float r, bool is_far) {\n"
+    "    vec3 w = motion.xyz - shutter.xyz;\n"
+    "    vec2 fall = vec2(dot(w, right), dot(w, up)) + v.xy / v.z * dot(w, back);\n"
+    "    vec2 streak = clamp(shutter.w * view.z / v.z * fall, -1e5, 1e5);\n"
+    "    if (dot(streak, streak) < 0.0625) return vec4(0.0);\n"
+    "    return vec4(streak, 0.0, is_far ? sqrt(r * r + 1.0 / 3.0) : r);\n"
+    "}\n"
+    "#endif\n"
     "void main() {\n"
     "    vec3 rel = drop.xyz - eye, v = vec3(dot(rel, right), dot(rel, up), -dot(rel, back));\n"
-    "    float r = drop.w, d2 = dot(v, v), half_side = 0.0;\n"
+    "    float r = drop.w, d2 = dot(v, v), tangent2 = r * r / (d2 - r * r), stretch = sqrt(d2) / v.z;\n"
+    "    float area_radius = view.z * sqrt(tangent2 * stretch * stretch * stretch);\n"
+    "    vec2 reach = vec2(0.0);\n"
     "    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);\n"
     "    place = vec4(0.0);\n"
     "    seen = vec3(0.0);\n"
     "    far_colour = vec4(0.0);\n"
+    "#ifdef SOFT\n"
+    "    path = vec4(0.0);\n"
+    "#endif\n"
     "    bool kept = r > 0.0 && d2 > 1.0001 * r * r && v.z - r > view.w && v.z > 1.0001 * r;\n"
-    "    float tangent2 = r * r / (d2 - r * r), stretch = sqrt(d2) / v.z;\n"
-    "    float area_radius = view.z * sqrt(tangent2 * stretch * stretch * stretch);\n"
-    "    kept = kept && 3.14159265 * area_radius * area_radius >= limits.y;\n"
-    "    if (kept) {\n"
-    "        vec2 centre = view.xy + view.z * v.xy / v.z, middle = centre;\n"
+    "    if (kept && 3.14159265 * area_radius * area_radius >= limits.y) {\n"
+    "        vec2 middle = view.xy + view.z * v.xy / v.z, along = vec2(1.0, 0.0);\n"
     "        seen = v / r;\n"
-    "        place = vec4(centre, 0.0, v.z / (view.z * r));\n"
+    "        place = vec4(middle, area_radius, v.z / (view.z * r));\n"
     "#if LOOK < 2\n"
-    "        half_side = max(view.z * sqrt(tangent2) * stretch, 0.5);\n"
-    "        place.z = half_side;\n"
-    "        half_side += 0.01;\n" /* rasterisers snap to 1/256 of a pixel; the fragment cuts exactly */
+    "        place.z = max(view.z * sqrt(tangent2) * stretch, 0.5);\n"
+    "        reach = vec2(place.z + 0.01);\n" /* rasterisers snap to 1/256 of a pixel; the fragment cuts exactly */
     "#else\n"
     /* tangents from the eye, exact off axis */
     "        vec2 q = sqrt(v.xy * v.xy + v.z * v.z - r * r), low = (v.xy * q - r * v.z) / (v.z * q + r * v.xy);\n"
-    "        vec2 high = (v.xy * q + r * v.z) / (v.z * q - r * v.xy), reach = 0.5 * view.z * (high - low) + 1.0;\n"
+    "        vec2 high = (v.xy * q + r * v.z) / (v.z * q - r * v.xy);\n"
+    "        bool is_far = LOOK == 3 && area_radius < limits.x;\n"
+    "        reach = 0.5 * view.z * (high - low) + 1.0;\n"
     "        middle = view.xy + 0.5 * view.z * (low + high);\n"
-    "        half_side = max(reach.x, reach.y);\n"
-    "#if LOOK == 3\n"
-    "        if (area_radius < limits.x) {\n"
+    "        if (is_far) {\n"
     "            vec3 d = v.x * right + v.y * up - v.z * back, at = fold(d);\n"
     "            vec2 size = vec2(textureSize(far_drops, 0));\n"
     "            far_colour = vec4(textureLod(far_drops, (at.xy * (size - 2.0) + 1.0) / size, 0.0).rgb, 0.886227 * area_radius);\n"
-    "            half_side = far_colour.w + 1.0;\n"
-    "            middle = centre;\n"
+    "            reach = vec2(far_colour.w + 1.0);\n"
+    "            middle = place.xy;\n"
+    "        }\n"
+    "#ifdef SOFT\n"
+    "        path = path_of(v, area_radius, is_far);\n"
+    "        if (path.w > 0.0) {\n"
+    "            float way = length(path.xy);\n"
+    "            if (way > 1e-6) along = path.xy / way;\n"
+    "            reach = path.w + 0.01 + vec2(0.5 * max(way, 1.0), 0.0);\n"
+    "            middle = place.xy;\n"
     "        }\n"
     "#endif\n"
     "#endif\n"
     "        float z = limits.z > 0.0 ? ((limits.w + limits.z) - 2.0 * limits.w * limits.z / v.z) / (limits.w - limits.z) : 0.0;\n"
     "#ifdef QUADS\n"
-    "        vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;\n"
-    "        middle += corner * half_side;\n"
+    "        vec2 corner = (vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0) * reach;\n"
+    "        middle += corner.x * along + corner.y * vec2(-along.y, along.x);\n"
     "#endif\n"
     "        gl_Position = vec4(middle / view.xy - 1.0, z, 1.0);\n"
     "    }\n"
     "#ifndef QUADS\n"
-    "    gl_PointSize = max(2.0 * half_side, 1.0);\n"
+    "    gl_PointSize = max(2.0 * max(reach.x, reach.y), 1.0);\n"
     "#endif\n"
     "}\n";
 
-static const char raindrop__glsl_draw_fragment[] =
+/* Two lookups a ray: what all looks share. */
+static const char raindrop__glsl_shade[] =
     "flat in vec4 place;\n"
     "flat in vec3 seen;\n"
     "flat in vec4 far_colour;\n"
     "uniform vec3 right, up, back;\n"
     "uniform vec4 view;\n"
     "uniform vec2 optics;\n" /* index, whether the exit has Fresnel factors */
+    "layout(location = 0) out vec4 colour;\n"
+    "vec3 shade(raindrop_ray ray, float blur) {\n"
+    "    float pixel = 1.0 / view.z, width = sqrt(dot(seen, seen) - 1.0) * pixel, pass = optics.y > 0.5 ? ray.transmit : 1.0 - ray.fresnel;\n"
+    "    return ray.fresnel * look(ray.reflected, blur * (2.0 * width + pixel)) +\n"
+    "           pass * look(ray.refracted, blur * abs(ray.footprint * width - pixel));\n"
+    "}\n";
+
+/* LOOK 0 and 1. */
+static const char raindrop__glsl_draw_sprite[] =
     "#if LOOK == 0\n"
     "uniform sampler2D reflections, refractions;\n"
     "#endif\n"
-    "layout(location = 0) out vec4 colour;\n"
-    "vec3 shade(raindrop_ray ray, float width) {\n"
-    "    float pixel = 1.0 / view.z, pass = optics.y > 0.5 ? ray.transmit : 1.0 - ray.fresnel;\n"
-    "    return ray.fresnel * look(ray.reflected, 2.0 * width + pixel) + pass * look(ray.refracted, abs(ray.footprint * width - pixel));\n"
-    "}\n"
-    "#if LOOK < 2\n"
     /* the camera's axes under the shortest rotation from back to the direction of the eye (eq 2.1 without eq 2.3) */
     "vec3 turned(vec3 v, vec3 n) {\n"
     "    float k = 1.0 / (1.0 + n.z);\n"
@@ -3363,7 +3387,7 @@ static const char raindrop__glsl_draw_fragment[] =
     "void main() {\n"
     "    vec2 st = (gl_FragCoord.xy - place.xy) / place.z;\n"
     "    if (max(abs(st.x), abs(st.y)) > 1.0) discard;\n"
-    "    float d2 = dot(seen, seen), width = sqrt(d2 - 1.0) / view.z;\n"
+    "    float d2 = dot(seen, seen);\n"
     "    vec3 n = vec3(-seen.xy, seen.z) / sqrt(d2);\n"
     "    raindrop_ray ray;\n"
     "#if LOOK == 0\n"
@@ -3375,43 +3399,75 @@ static const char raindrop__glsl_draw_fragment[] =
     "    ray.refracted = turned(normalize(r.xyz), n);\n"
     "    ray.fresnel = l.a;\n"
     "    ray.transmit = 1.0 - l.a;\n"
-    "    colour = vec4(shade(ray, width), r.a);\n"
+    "    colour = vec4(shade(ray, 1.0), r.a);\n"
     "#else\n"
-    "    float rho = length(st), alpha = clamp((1.0 - rho) / width + 0.5, 0.0, 1.0), dist = sqrt(d2);\n"
+    "    float rho = length(st), alpha = clamp((1.0 - rho) * view.z / sqrt(d2 - 1.0) + 0.5, 0.0, 1.0), dist = sqrt(d2);\n"
     "    if (alpha <= 0.0) discard;\n"
     "    if (rho > 0.999) st *= 0.999 / rho;\n"
     "    vec2 xy = st / sqrt(d2 - 1.0);\n"
     "    float c2 = 1.0 / (1.0 + dot(xy, xy));\n"
     "    vec3 d = vec3(xy, -1.0) * sqrt(c2), p = dist * vec3(xy * c2, 1.0 - c2);\n"
     "    ray = raindrop_trace(turned(d, n), turned(p, n), (1.0 - dot(st, st)) * c2, optics.x);\n"
-    "    colour = vec4(shade(ray, width), alpha);\n"
+    "    colour = vec4(shade(ray, 1.0), alpha);\n"
     "#endif\n"
+    "}\n";
+
+/* LOOK 2 and 3: raindrop__batch_rays, raindrop__draw_far, and with SOFT raindrop__draw_soft and raindrop__draw_far_soft. */
+static const char raindrop__glsl_draw_ray[] =
+    /* the pixel's ray and the drop, `at` from the projection of the centre; returns the share of the pixel that is covered */
+    "float trace(out raindrop_ray ray, vec2 at) {\n"
+    "    vec3 d = vec3((gl_FragCoord.xy - view.xy) / view.z, 1.0), q = vec3(at * place.w, 0.0);\n"
+    "    float l2 = dot(d, d), t = dot(q, d) / l2;\n"
+    "    vec3 p = q - t * d;\n"
+    "    float b2 = dot(p, p), b = sqrt(max(b2, 1e-12)), slope = length(p.xy * (place.w - t / view.z)) / b;\n"
+    "    d /= sqrt(l2);\n"
+    "    p *= min(1.0, 0.999 / b);\n"
+    "    d = d.x * right + d.y * up - d.z * back;\n"
+    "    p = p.x * right + p.y * up - p.z * back;\n"
+    "    ray = raindrop_trace(d, p, max(1.0 - b2, 0.001999), optics.x);\n"
+    "    return clamp(0.5 + (1.0 - b) / max(slope, 1e-9), 0.0, 1.0);\n"
     "}\n"
-    "#else\n"
+    "#ifdef SOFT\n"
+    "flat in vec4 path;\n"
+    "void draw_soft(vec2 at) {\n"
+    "    float r = place.z, way = length(path.xy), length1 = max(way, 1.0);\n"
+    "    vec2 along = way > 1e-6 ? path.xy / way : vec2(1.0, 0.0);\n"
+    "    float u = dot(at, along), w = along.x * at.y - along.y * at.x, h = sqrt(max(path.w * path.w - w * w, 0.0));\n"
+    "    float from = max(u - h, -0.5 * length1), to = min(u + h, 0.5 * length1);\n"
+    "    float alpha = (to - from) / length1 * r * r / (path.w * path.w);\n"
+    "    if (alpha <= 0.0) discard;\n"
+    "    colour = vec4(far_colour.rgb, alpha);\n"
+    "    if (far_colour.w > 0.0) return;\n"
+    "    int samples = r < 6.0 ? 4 : r < 24.0 ? 8 : 16;\n"
+    "    float blur = max(min(2.0 * r, length1) / float(samples), 1.0);\n"
+    "    vec3 sum = vec3(0.0);\n"
+    "    for (int j = 0; j < samples; j++) {\n"
+    "        raindrop_ray ray;\n"
+    "        trace(ray, at - along * mix(from, to, (float(j) + 0.5) / float(samples)));\n"
+    "        sum += shade(ray, blur);\n"
+    "    }\n"
+    "    colour.rgb = sum / float(samples);\n"
+    "}\n"
+    "#endif\n"
     "void main() {\n"
     "    vec2 at = gl_FragCoord.xy - place.xy;\n"
-    "#if LOOK == 3\n"
+    "    raindrop_ray ray;\n"
+    "#ifdef SOFT\n"
+    "    if (path.w > 0.0) {\n"
+    "        draw_soft(at);\n"
+    "        return;\n"
+    "    }\n"
+    "#endif\n"
     "    if (far_colour.w > 0.0) {\n" /* a square cut with the pixel */
     "        vec2 cut = max(min(at + 0.5, vec2(far_colour.w)) - max(at - 0.5, vec2(-far_colour.w)), vec2(0.0));\n"
     "        if (cut.x * cut.y <= 0.0) discard;\n"
     "        colour = vec4(far_colour.rgb, cut.x * cut.y);\n"
     "        return;\n"
     "    }\n"
-    "#endif\n"
-    "    float k = place.w, width = sqrt(dot(seen, seen) - 1.0) / view.z;\n"
-    "    vec3 ray_at = vec3((gl_FragCoord.xy - view.xy) / view.z, 1.0), q = vec3(at * k, 0.0);\n"
-    "    float l2 = dot(ray_at, ray_at), t = dot(q, ray_at) / l2;\n"
-    "    vec3 p = q - t * ray_at;\n"
-    "    float b2 = dot(p, p), b = sqrt(max(b2, 1e-12));\n"
-    "    float alpha = clamp(0.5 + (1.0 - b) / max(length(p.xy * (k - t / view.z)) / b, 1e-9), 0.0, 1.0);\n"
+    "    float alpha = trace(ray, at);\n"
     "    if (alpha <= 0.0) discard;\n"
-    "    p *= min(1.0, 0.999 / b);\n"
-    "    vec3 d = ray_at / sqrt(l2);\n"
-    "    d = d.x * right + d.y * up - d.z * back;\n"
-    "    p = p.x * right + p.y * up - p.z * back;\n"
-    "    colour = vec4(shade(raindrop_trace(d, p, max(1.0 - b2, 0.001999), optics.x), width), alpha);\n"
-    "}\n"
-    "#endif\n";
+    "    colour = vec4(shade(ray, 1.0), alpha);\n"
+    "}\n";
 
 /* raindrop__step and raindrop__reenter in floats. */
 static const char raindrop__glsl_step[] =
@@ -3530,10 +3586,12 @@ static const char raindrop__glsl_advance[] =
 
 enum { RAINDROP__GL_TEXTURE_MIN_LOD_LINEAR = 0x2703 }; /* GL_LINEAR_MIPMAP_LINEAR */
 
+enum { RAINDROP__GL_SOFT = 1, RAINDROP__GL_KINDS = 2 }; /* sums: the kinds of drops a program knows beside still ones */
+
 struct raindrop_gl {
     sat__gl gl;
     raindrop_gl_options options;
-    unsigned draw[4], advance;        /* programs; draw by look, 0 where it cannot be */
+    unsigned draw[4][RAINDROP__GL_KINDS], advance; /* programs; draw by look and what drops do, 0 until it is needed */
     unsigned environment, far_drops, map[2];
     unsigned drops[2], arrays[2];     /* ping-pong buffers and their vertex arrays */
     unsigned scratch, target;         /* a texture of one texel: transform feedback needs a framebuffer of ours */
@@ -3554,37 +3612,44 @@ RAINDROP_DEF raindrop_gl_options raindrop_gl_defaults(void)
 
 RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl) { return gl ? gl->gl.message : "there is no object"; }
 
-static inline sat_result raindrop__gl_programs(raindrop_gl *g)
+/* The program of a look and a kind, built when it is first asked for. */
+static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int kind)
 {
-    static const char *const varyings[] = {"next_drop", "next_motion", NULL};
-    const char *library[3], *vertex[3], *fragment[2];
+    const char *library[3], *vertex[2], *fragment[3];
     sat__gl_shaders shaders;
-    sat_result result = SAT_OK;
-    int look;
+    if (g->draw[look][kind]) return SAT_OK;
     memset(&shaders, 0, sizeof shaders);
     library[0] = raindrop_gl_glsl();
     library[1] = raindrop__glsl_environment;
-    library[2] = NULL;
     vertex[0] = raindrop__glsl_draw_vertex;
-    vertex[1] = NULL;
-    fragment[0] = raindrop__glsl_draw_fragment;
-    fragment[1] = NULL;
+    fragment[0] = raindrop__glsl_shade;
+    fragment[1] = look <= RAINDROP_LOOK_SPRITE ? raindrop__glsl_draw_sprite : raindrop__glsl_draw_ray;
+    library[2] = vertex[1] = fragment[2] = NULL;
     shaders.name = "raindrop: drops";
     shaders.library = library;
     shaders.vertex = vertex;
     shaders.fragment = fragment;
-    for (look = g->options.map ? 0 : 1; look < 4 && result == SAT_OK; look++) {
-        sat__gl_define(&g->gl, "LOOK", look);
-        if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
-        result = sat__gl_build(&g->gl, &g->draw[look], &shaders);
-    }
+    sat__gl_define(&g->gl, "LOOK", look);
+    if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
+    if (kind & RAINDROP__GL_SOFT) sat__gl_define(&g->gl, "SOFT", 1);
+    return sat__gl_build(&g->gl, &g->draw[look][kind], &shaders);
+}
+
+static inline sat_result raindrop__gl_programs(raindrop_gl *g)
+{
+    static const char *const varyings[] = {"next_drop", "next_motion", NULL};
+    const char *vertex[3];
+    sat__gl_shaders shaders;
+    sat_result result = SAT_OK;
+    int look;
+    for (look = g->options.map ? 0 : 1; look < 4 && result == SAT_OK; look++) result = raindrop__gl_draw_program(g, look, 0);
     if (result != SAT_OK) return result;
+    memset(&shaders, 0, sizeof shaders);
     vertex[0] = raindrop__glsl_step;
     vertex[1] = raindrop__glsl_advance;
     vertex[2] = NULL;
     shaders.name = "raindrop: advance";
-    shaders.library = NULL;
-    shaders.fragment = NULL;
+    shaders.vertex = vertex;
     shaders.varyings = varyings;
     return sat__gl_build(&g->gl, &g->advance, &shaders);
 }
@@ -3664,8 +3729,8 @@ RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *g)
     gl = &g->gl;
     memory = g->allocator;
     if (gl->vertex_array) { /* the context was good enough to open */
-        for (i = 0; i < 4; i++)
-            if (g->draw[i]) gl->DeleteProgram(g->draw[i]);
+        for (i = 0; i < 4 * RAINDROP__GL_KINDS; i++)
+            if (g->draw[i / RAINDROP__GL_KINDS][i % RAINDROP__GL_KINDS]) gl->DeleteProgram(g->draw[i / RAINDROP__GL_KINDS][i % RAINDROP__GL_KINDS]);
         if (g->advance) gl->DeleteProgram(g->advance);
         if (g->target) gl->DeleteFramebuffers(1, &g->target);
         gl->DeleteTextures(1, &g->scratch);
@@ -3859,6 +3924,9 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
     v[2] = depth_near;
     v[3] = depth_far;
     sat__gl_set_float4(gl, program, "limits", v);
+    memcpy(v, camera->velocity, sizeof camera->velocity);
+    v[3] = camera->exposure;
+    sat__gl_set_float4(gl, program, "shutter", v);
     sat__gl_set_float2(gl, program, "optics", g->n, (float)(frame->options.exit_fresnel != 0));
     sat__gl_set_float2(gl, program, "environment_size", (float)g->resolution, (float)g->levels);
     sat__gl_set_texture(gl, program, "environment", 0, g->environment);
@@ -3875,7 +3943,9 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     raindrop__frame frame;
     sat__gl_state state;
     sat__gl *gl;
+    sat_result result;
     unsigned program;
+    int kind = 0;
     memset(&frame, 0, sizeof frame);
     frame.camera = camera ? *camera : raindrop_camera_defaults();
     frame.options = options ? *options : raindrop_render_defaults();
@@ -3884,10 +3954,13 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     if (!g || !g->environment || !g->drops[0] || width < 1 || height < 1 || width > 32768 || height > 32768) return SAT_ERR_ARGUMENT;
     if (!raindrop__camera_is_valid(&frame.camera) || (unsigned)frame.options.look > RAINDROP_LOOK_AUTO) return SAT_ERR_ARGUMENT;
     if (!(depth_near >= 0) || (depth_near > 0 && !(depth_far > depth_near))) return SAT_ERR_ARGUMENT;
-    program = g->draw[frame.options.look];
-    if (!program) return SAT_ERR_ARGUMENT;
+    if (frame.options.look == RAINDROP_LOOK_MAP && !g->options.map) return SAT_ERR_ARGUMENT;
     if (!g->count) return SAT_OK;
+    if (!raindrop__is_sprite(&frame) && frame.camera.exposure > 0) kind |= RAINDROP__GL_SOFT;
+    result = raindrop__gl_draw_program(g, frame.options.look, kind);
+    if (result != SAT_OK) return result;
     gl = &g->gl;
+    program = g->draw[frame.options.look][kind];
     raindrop__set_frame(&frame);
     sat__gl_begin(gl, &state, 4);
     gl->UseProgram(program);
