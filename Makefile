@@ -96,20 +96,25 @@ run-demo: build/$(DEMO)
 	@echo out/demo.png
 
 # The demo in a browser: open out/web/index.html. emcc's optimiser is not run when linking: Debian's lacks a part.
+# OpenEXR is fetched and compiled into build/web/; without it the page reads the other formats.
 EMCC    ?= emcc
-WEB     := -I. -Ibuild/web/include $(if $(wildcard /usr/include/stb/stb_image.h),-DHAVE_STB)
+WEB_EXR := $(wildcard build/web/libexr.a)
+WEB_STB := $(if $(wildcard /usr/include/stb/stb_image.h),build/web/stb.o)
+WEB     := -I. -isystem build/web/include $(if $(WEB_STB),-DHAVE_STB) $(if $(WEB_EXR),-DHAVE_OPENEXR -isystem build/web/include/OpenEXR)
 STB_IMPLEMENTATIONS := '\#define STB_IMAGE_IMPLEMENTATION\n\#define STB_IMAGE_WRITE_IMPLEMENTATION\n\#include <stb/stb_image.h>\n\#include <stb/stb_image_write.h>\n'
 web:
-	@if command -v $(EMCC) >/dev/null; then $(MAKE) --no-print-directory out/web/index.html; \
+	@if command -v $(EMCC) >/dev/null; then \
+	     EMCC='$(EMCC)' NO_DEPS='$(NO_DEPS)' sh examples/web_exr.sh build/web && \
+	     $(MAKE) --no-print-directory out/web/index.html; \
 	 else echo 'make web needs emscripten: apt-get install emscripten'; fi
 out/web/index.html: examples/demo_web.html out/web/demo_web.js
 	cp $< $@
-out/web/demo_web.js: build/web/demo_web.o $(if $(findstring STB,$(WEB)),build/web/stb.o)
+out/web/demo_web.js: build/web/demo_web.o $(WEB_STB) $(WEB_EXR)
 	@mkdir -p $(@D)
 	$(EMCC) -O1 $^ -o $@ -sALLOW_MEMORY_GROWTH=1 -sSINGLE_FILE=1 -sEXPORTED_RUNTIME_METHODS=ccall,FS -sFORCE_FILESYSTEM=1 -sENVIRONMENT=web
-build/web/demo_web.o: examples/demo_web.c build/web/include/stb
+build/web/demo_web.o: examples/demo_web.c $(WEB_EXR) | build/web/include/stb
 	$(EMCC) -std=gnu99 -O3 -msimd128 -msse2 $(WEB) -MMD -MP -c $< -o $@
-build/web/stb.o: build/web/include/stb
+build/web/stb.o: | build/web/include/stb
 	printf $(STB_IMPLEMENTATIONS) | $(EMCC) -w -O3 $(WEB) -x c -c - -o $@
 build/web/include/stb:
 	@mkdir -p $(@D)

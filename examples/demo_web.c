@@ -13,12 +13,14 @@
 
 static pipeline web;
 static pipeline_options wanted;
-static image dropped[2]; /* the light in use, and the next one */
+static image dropped[3]; /* the light of the last picture, that of the next one, and the one being read */
+static char message[400];
 static unsigned char *rgba;
 
 int web_create(int width, int height, int hour);
 int web_set(const char *name, double value);
 int web_open(const char *path);
+const char *web_formats(void);
 const unsigned char *web_frame(double dt);
 const char *web_message(void);
 
@@ -30,7 +32,9 @@ EMSCRIPTEN_KEEPALIVE int web_create(int width, int height, int hour)
     wanted.width = width, wanted.height = height, wanted.samples = 1;
     wanted.hour = (scene_hour)(hour % 3);
     rgba = (unsigned char *)malloc((size_t)width * (size_t)height * 4);
-    return rgba && pipeline_create(&web, &wanted);
+    if (rgba && pipeline_create(&web, &wanted)) return 1;
+    snprintf(message, sizeof message, "%s", rgba ? web.message : "not enough memory");
+    return 0;
 }
 
 /* 0: there is no such option. */
@@ -52,16 +56,31 @@ EMSCRIPTEN_KEEPALIVE int web_set(const char *name, double value)
     return 1;
 }
 
-/* A picture of the light from the file system: .hdr, .pfm, .png or .jpg (.exr where the build has OpenEXR). */
+/* What web_open reads. */
+EMSCRIPTEN_KEEPALIVE const char *web_formats(void)
+{
+    return
+#ifdef HAVE_OPENEXR
+        ".exr "
+#endif
+#ifdef HAVE_STB
+        ".hdr .png .jpg "
+#endif
+        ".pfm";
+}
+
+/* A picture of the light, all directions by longitude and latitude, from the file system. */
 EMSCRIPTEN_KEEPALIVE int web_open(const char *path)
 {
-    int next = wanted.environment == &dropped[0];
-    image_free(&dropped[next]);
-    if (!image_load(&dropped[next], path)) {
-        snprintf(web.message, sizeof web.message, "%s", dropped[next].message);
+    image *next = dropped;
+    while (next == wanted.environment || next == web.options.environment) ++next;
+    image_free(next);
+    if (!image_load(next, path)) {
+        snprintf(message, sizeof message, "%s", next->message);
         return 0;
     }
-    wanted.environment = &dropped[next];
+    snprintf(message, sizeof message, "light: %.180s, %d x %d", path, next->width, next->height);
+    wanted.environment = next;
     return 1;
 }
 
@@ -69,7 +88,10 @@ EMSCRIPTEN_KEEPALIVE int web_open(const char *path)
 EMSCRIPTEN_KEEPALIVE const unsigned char *web_frame(double dt)
 {
     size_t i, pixels = (size_t)wanted.width * (size_t)wanted.height;
-    if (!pipeline_change(&web, &wanted) || !pipeline_frame(&web, dt)) return NULL;
+    if (!pipeline_change(&web, &wanted) || !pipeline_frame(&web, dt)) {
+        snprintf(message, sizeof message, "%s", web.message);
+        return NULL;
+    }
     for (i = 0; i < pixels; ++i) {
         memcpy(rgba + 4 * i, web.pixels + 3 * i, 3);
         rgba[4 * i + 3] = 255;
@@ -77,7 +99,8 @@ EMSCRIPTEN_KEEPALIVE const unsigned char *web_frame(double dt)
     return rgba;
 }
 
-EMSCRIPTEN_KEEPALIVE const char *web_message(void) { return web.message; }
+/* Why a call returned 0 or NULL; after web_open what it read. */
+EMSCRIPTEN_KEEPALIVE const char *web_message(void) { return message; }
 
 #ifndef __EMSCRIPTEN__
 int main(int argc, char **argv)
@@ -86,11 +109,11 @@ int main(int argc, char **argv)
     int first = common_parse(&common, argc, argv, "demo_web [--out FILE] [light.hdr]", NULL, 0);
     const char *out = common.out ? common.out : "demo_web.png";
     if ((first < argc && !web_open(argv[first])) || !web_create(640, 360, SCENE_DUSK) || !web_frame(0) || !image_save_u8(out, rgba, 640, 360, 4)) {
-        fprintf(stderr, "demo_web: %s\n", web.message[0] ? web.message : "the picture cannot be written");
+        fprintf(stderr, "demo_web: %s\n", message[0] ? message : "the picture cannot be written");
         return 1;
     }
     pipeline_destroy(&web);
-    image_free(&dropped[0]), image_free(&dropped[1]);
+    image_free(&dropped[0]), image_free(&dropped[1]), image_free(&dropped[2]);
     free(rgba);
     return 0;
 }

@@ -169,7 +169,7 @@ static inline int image_write_png(const char *path, const unsigned char *bytes, 
 
 static inline int image_load_stb(image *out, const char *path)
 {
-    return image_fail(out, path, "reading .hdr, .png and .jpg needs libstb: apt-get install libstb-dev");
+    return image_fail(out, path, "this program was built without libstb (libstb-dev), which reads .hdr, .png and .jpg");
 }
 
 /* PNG with its deflate stream in stored blocks, one a row (PNG 1.2, RFC 1950 and 1951). */
@@ -287,12 +287,12 @@ static inline int image_save_png(image *picture, const char *path)
 #else
 static inline int image_load_exr(image *out, const char *path)
 {
-    return image_fail(out, path, "reading .exr needs OpenEXR: apt-get install libopenexr-dev");
+    return image_fail(out, path, "this program was built without OpenEXR (libopenexr-dev), which reads .exr");
 }
 static inline int image_save_exr(image *picture, const char *path, int half)
 {
     (void)half;
-    snprintf(picture->message, sizeof picture->message, "%.180s: writing .exr needs OpenEXR: apt-get install libopenexr-dev", path);
+    snprintf(picture->message, sizeof picture->message, "%.180s: this program was built without OpenEXR (libopenexr-dev), which writes .exr", path);
     return 0;
 }
 #endif

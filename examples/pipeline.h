@@ -513,7 +513,7 @@ static inline int pipeline_create(pipeline *p, const pipeline_options *options)
     pixels = (size_t)w * (size_t)h;
     ok = scene_create(&p->scene, w, h) && image_create(&p->hdr, options->width, options->height, 3) &&
          image_create(&p->dry, options->width, options->height, 3);
-    ok = ok && (options->environment || image_create(&p->sky, 1024, 512, 3));
+    ok = ok && image_create(&p->sky, 1024, 512, 3);
     p->depth = (float *)malloc((size_t)options->width * (size_t)options->height * sizeof(float));
     p->pixels = (unsigned char *)malloc((size_t)options->width * (size_t)options->height * 3);
     for (i = 0; i < 2; ++i) p->irradiance[i] = (float *)malloc(3 * pixels * sizeof(float));
