@@ -34,7 +34,7 @@
    - Drops do not see the scene or each other, only the environment; they do not collide, merge, splash or run down.
    - A drop that reaches the near plane, or that the eye is in, is left out (and counted).
    - Sprites (MAP, SPRITE) are still and in focus. Flattened drops have order 0 only. OpenGL draws unsorted, as published,
-     and knows no depth of field, no internal reflections and no flattened shapes.
+     and knows no internal reflections and no flattened shapes.
    - No Airy theory: no supernumerary bows.
    - It starts no thread, opens no window, creates no OpenGL context, keeps no global state.
 
@@ -428,8 +428,8 @@ RAINDROP_DEF sat_result raindrop_gl_set_wind(raindrop_gl *gl, const float wind[3
 RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *drops, int count);
 
 /* Blends the drops over the bound framebuffer's viewport (0, 0, width, height), which should hold floats: row 0 is the
-   bottom one, as OpenGL has it. Unsorted, as published; looks as in raindrop_render but without internal reflections,
-   flattened shapes and depth of field. depth_near > 0: the depth test is on, against a depth buffer of the
+   bottom one, as OpenGL has it. Unsorted, as published; looks as in raindrop_render but without internal reflections
+   and flattened shapes. depth_near > 0: the depth test is on, against a depth buffer of the
    usual perspective with these planes; depth is not written. */
 RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, int width, int height, const raindrop_camera *camera,
                                            const raindrop_render_options *options, float depth_near, float depth_far);
@@ -3281,7 +3281,7 @@ static const char raindrop__glsl_environment[] =
     "    return mix(fine, atlas(at.xy, level + 1.0), lod - level);\n"
     "}\n";
 
-/* A drop's square or streak. LOOK 0 map, 1 sprite, 2 ray, 3 auto; SOFT where drops leave streaks. */
+/* A drop's square or streak. LOOK 0 map, 1 sprite, 2 ray, 3 auto; SOFT where drops leave streaks or are out of focus. */
 static const char raindrop__glsl_draw_vertex[] =
     "layout(location = 0) in vec4 drop;\n"     /* position, radius */
     "layout(location = 1) in vec4 motion;\n"   /* velocity, axis ratio */
@@ -3293,13 +3293,15 @@ static const char raindrop__glsl_draw_vertex[] =
     "flat out vec4 far_colour;\n"              /* colour, half side of the square that stands for a far drop */
     "#ifdef SOFT\n"
     "uniform vec4 shutter;\n"                  /* the camera's velocity, exposure */
-    "flat out vec4 path;\n"                    /* streak, 0, radius of what moves along it (0: still), in pixels */
+    "uniform vec2 lens;\n"                     /* aperture, focus distance */
+    "flat out vec4 path;\n"                    /* in pixels: streak, circle of confusion, radius of what moves (0: sharp and still) */
     "vec4 path_of(vec3 v, float r, bool is_far) {\n"
     "    vec3 w = motion.xyz - shutter.xyz;\n"
     "    vec2 fall = vec2(dot(w, right), dot(w, up)) + v.xy / v.z * dot(w, back);\n"
     "    vec2 streak = clamp(shutter.w * view.z / v.z * fall, -1e5, 1e5);\n"
-    "    if (dot(streak, streak) < 0.0625) return vec4(0.0);\n"
-    "    return vec4(streak, 0.0, is_far ? sqrt(r * r + 1.0 / 3.0) : r);\n"
+    "    float blur = min(0.5 * lens.x * view.z * abs(1.0 / v.z - 1.0 / lens.y), 1e5), way2 = dot(streak, streak), r2 = r * r + blur * blur;\n"
+    "    if (way2 + blur * blur < 0.0625) return vec4(0.0);\n"
+    "    return vec4(streak, blur, is_far ? sqrt(r2 + 1.0 / 3.0) : way2 <= 0.0625 ? r + max(blur, 0.5) : blur > 0.25 ? sqrt(r2) : r);\n"
     "}\n"
     "#endif\n"
     "void main() {\n"
@@ -3429,17 +3431,27 @@ static const char raindrop__glsl_draw_ray[] =
     "}\n"
     "#ifdef SOFT\n"
     "flat in vec4 path;\n"
+    "float lens_share(float r, float c, float apart) {\n"
+    "    if (apart >= r + c) return 0.0;\n"
+    "    if (apart <= abs(r - c)) return min(r * r / (c * c), 1.0);\n"
+    "    float x = clamp((apart * apart + r * r - c * c) / (2.0 * apart * r), -1.0, 1.0);\n"
+    "    float y = clamp((apart * apart + c * c - r * r) / (2.0 * apart * c), -1.0, 1.0);\n"
+    "    float k = (r + c - apart) * (apart + r - c) * (apart - r + c) * (apart + r + c);\n"
+    "    return (r * r * acos(x) + c * c * acos(y) - 0.5 * sqrt(max(k, 0.0))) / (3.14159265 * c * c);\n"
+    "}\n"
     "void draw_soft(vec2 at) {\n"
     "    float r = place.z, way = length(path.xy), length1 = max(way, 1.0);\n"
+    "    bool is_far = far_colour.w > 0.0, moves = way > 0.25;\n"
     "    vec2 along = way > 1e-6 ? path.xy / way : vec2(1.0, 0.0);\n"
     "    float u = dot(at, along), w = along.x * at.y - along.y * at.x, h = sqrt(max(path.w * path.w - w * w, 0.0));\n"
     "    float from = max(u - h, -0.5 * length1), to = min(u + h, 0.5 * length1);\n"
     "    float alpha = (to - from) / length1 * r * r / (path.w * path.w);\n"
+    "    if (!moves && !is_far) alpha = lens_share(r, max(path.z, 0.5), length(at)), from = to = 0.0;\n"
     "    if (alpha <= 0.0) discard;\n"
     "    colour = vec4(far_colour.rgb, alpha);\n"
-    "    if (far_colour.w > 0.0) return;\n"
-    "    int samples = r < 6.0 ? 4 : r < 24.0 ? 8 : 16;\n"
-    "    float blur = max(min(2.0 * r, length1) / float(samples), 1.0);\n"
+    "    if (is_far) return;\n"
+    "    int samples = !moves ? 1 : r < 6.0 ? 4 : r < 24.0 ? 8 : 16;\n"
+    "    float blur = 2.0 * path.z + (moves ? max(min(2.0 * r, length1) / float(samples), 1.0) : 1.0);\n"
     "    vec3 sum = vec3(0.0);\n"
     "    for (int j = 0; j < samples; j++) {\n"
     "        raindrop_ray ray;\n"
@@ -3927,6 +3939,7 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
     memcpy(v, camera->velocity, sizeof camera->velocity);
     v[3] = camera->exposure;
     sat__gl_set_float4(gl, program, "shutter", v);
+    sat__gl_set_float2(gl, program, "lens", camera->aperture, camera->focus_distance);
     sat__gl_set_float2(gl, program, "optics", g->n, (float)(frame->options.exit_fresnel != 0));
     sat__gl_set_float2(gl, program, "environment_size", (float)g->resolution, (float)g->levels);
     sat__gl_set_texture(gl, program, "environment", 0, g->environment);
@@ -3956,7 +3969,7 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     if (!(depth_near >= 0) || (depth_near > 0 && !(depth_far > depth_near))) return SAT_ERR_ARGUMENT;
     if (frame.options.look == RAINDROP_LOOK_MAP && !g->options.map) return SAT_ERR_ARGUMENT;
     if (!g->count) return SAT_OK;
-    if (!raindrop__is_sprite(&frame) && frame.camera.exposure > 0) kind |= RAINDROP__GL_SOFT;
+    if (!raindrop__is_sprite(&frame) && (frame.camera.exposure > 0 || frame.camera.aperture > 0)) kind |= RAINDROP__GL_SOFT;
     result = raindrop__gl_draw_program(g, frame.options.look, kind);
     if (result != SAT_OK) return result;
     gl = &g->gl;
