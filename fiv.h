@@ -44,7 +44,7 @@
      FIV_IMPLEMENTATION  the implementation, in one file     FIV_STATIC, FIV_DEF   linkage, everywhere
      FIV_GL              the OpenGL part, everywhere         FIV_ASSERT(x)         default SAT_ASSERT
      FIV_NO_MASKS        no stored masks: no FIV_MASK, share, save (keep_masks must be 0)
-     FIV_NO_SELF         no fiv_self_irradiance              FIV_NO_DELTA          no split-off lights
+     FIV_NO_SELF         no self-shadows (eq 13)             FIV_NO_DELTA          no split-off lights
 
    MEMORY, THREADS, ERRORS
    An environment is one block; an occluder two (its tables, its masks) or, without keep_masks, two (tables, mesh). Only
@@ -57,6 +57,7 @@
    - NaN and negative radiance count as 0, what exceeds max_radiance as that much; all are counted. NaN receivers are black.
    - A texel of 1e8 changes no other vector: relative error of a span sum below 1e-10 (double prefixes), of a split-off light
      1e-7. Masks equal rays through the texel centres but for rays that graze an edge (2e-6 of the texels set).
+   - OpenGL: within 2e-3 of the largest irradiance of fiv_irradiance and fiv_self_irradiance with cutoff 0, 1e-4 rms.
    - I_tot: within 6e-4 of its largest value of the sum over all texels. Turned vectors: 1.7 % rms of the same
      vectors computed from a turned mesh.
    - Receivers up to 1e9 radii away, anywhere inside and on the mesh, scale 0. Below the first shell its samples stand.
@@ -300,7 +301,7 @@ FIV_DEF int fiv_version(void);
 #endif /* FIV_H */
 
 /* ------------------------------------------------------------------------------------------------
-   OpenGL: the receiver pass (FIV_SCALED). Masks and vectors stay the CPU's work.
+   OpenGL: the receiver pass (FIV_SCALED, with self-shadows). Masks and vectors stay the CPU's work.
    ------------------------------------------------------------------------------------------------ */
 
 #if defined(FIV_GL) && !defined(FIV__GL_API)
@@ -312,6 +313,7 @@ extern "C" {
 
 typedef struct fiv_gl_options {
     int max_instances;       /* 8; 1..64: of one scene; the shader keeps an array of so many */
+    int self;                /* 0; 1: shadows on the occluders themselves, see fiv_gl_irradiance */
     sat_allocator allocator; /* malloc; used by create, destroy and, when tables grow, by fiv_gl_set_scene */
 } fiv_gl_options;
 FIV_DEF fiv_gl_options fiv_gl_defaults(void);
@@ -325,17 +327,20 @@ FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int wi
 FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *gl, const fiv_environment *environment, const fiv_instance *instances, size_t count);
 /* Only places and scales differ from the last fiv_gl_set_scene: what moving occluders cost a frame. */
 FIV_DEF sat_result fiv_gl_move(fiv_gl *gl, const fiv_instance *instances, size_t count);
-/* Irradiance of every pixel: `points` and `normals` are float textures of world coordinates; a normal of 0 gives 0. State that
-   is touched is put back. */
+/* Irradiance of every pixel: `points` and `normals` are float textures of world coordinates; a normal of 0 gives 0. With
+   options.self the alpha of `points` says what a receiver lies on: 2 + i the surface of instance i, which shadows itself as in
+   fiv_self_irradiance; any other value, such as the 1 of RGB textures, nothing that casts shadows. State that is touched is
+   put back. */
 FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *gl, unsigned points, unsigned normals);
 /* The result, RGBA32F; belongs to the object. */
 FIV_DEF unsigned fiv_gl_texture(const fiv_gl *gl);
 FIV_DEF const char *fiv_gl_message(const fiv_gl *gl);
 FIV_DEF void fiv_gl_destroy(fiv_gl *gl); /* NULL is fine */
 
-/* For a shader of one's own: `vec3 fiv_irradiance(vec3 point, vec3 normal)`, a list of strings that ends with NULL. Define
-   FIV_INSTANCES as max_instances in front of it. fiv_gl_bind uses the program and sets its uniforms; it takes three
-   texture units and leaves them bound. */
+/* For a shader of one's own: `vec3 fiv_irradiance(vec3 point, vec3 normal)` and `vec3 fiv_self_irradiance(int self, vec3 point,
+   vec3 normal)` on the surface of instance `self` (-1: none), as a list of strings that ends with NULL. Define FIV_INSTANCES as
+   max_instances in front of it. fiv_gl_bind uses the program and sets its uniforms; it takes three texture units and
+   leaves them bound. */
 FIV_DEF const char *const *fiv_gl_glsl(void);
 FIV_DEF sat_result fiv_gl_bind(fiv_gl *gl, unsigned program, int first_unit);
 
@@ -3504,8 +3509,8 @@ extern "C" {
 #endif
 
 /* Texels of fiv_tables: of each sample the vector and the solid angle in ten components, then the distances of the lights, two
-   in the third texel and four in each further one; then the support function, one a texel. fiv_scene: eight texels an instance,
-   two a light in the row behind them. fiv_diffuse: I_tot at the corners of the cube. */
+   in the third texel and four in each further one; then the support function, one a texel. fiv_scene: a row an instance, see
+   fiv__gl_row and fiv__gl_light; two texels a light in the row behind them. fiv_diffuse: I_tot at the corners of the cube. */
 static const char fiv__glsl_cube[] =
     "#ifndef FIV_GLSL\n"
     "#define FIV_GLSL\n"
@@ -3542,70 +3547,118 @@ static const char fiv__glsl_cube[] =
     "    int at = i.y * 33 + i.x;\n"
     "    p -= vec2(i);\n"
     "    return mix(mix(fiv_at(base, at).x, fiv_at(base, at + 1).x, p.x), mix(fiv_at(base, at + 33).x, fiv_at(base, at + 34).x, p.x), p.y);\n"
+    "}\n";
+
+/* The eight samples around an offset, as fiv__locate has them, and the sums over them: of the valid ones and of all. */
+static const char fiv__glsl_cell[] =
+    "struct fiv_cell {\n"
+    "    int base, theta, phi;\n"
+    "    ivec3 at;\n"
+    "    vec3 part;\n"
+    "    float r;\n"
+    "    vec2 shell;\n"
+    "};\n"
+    "struct fiv_sum { mat3 v, whole; float angle, all, total; };\n"
+    "vec4 fiv_row(int instance, int texel) { return texelFetch(fiv_scene, ivec2(texel, instance), 0); }\n"
+    "vec3 fiv_own(int instance, vec3 v) {\n"
+    "    return fiv_row(instance, 1).xyz * v.x + fiv_row(instance, 2).xyz * v.y + fiv_row(instance, 3).xyz * v.z;\n"
     "}\n"
+    "fiv_cell fiv_locate(int instance, vec3 d) {\n"
+    "    vec4 grid = fiv_row(instance, 4), shells = fiv_row(instance, 5);\n"
+    "    bool octahedral = fiv_row(instance, 2).w > 0.5;\n"
+    "    fiv_cell c;\n"
+    "    c.base = int(fiv_row(instance, 1).w); c.theta = int(grid.x); c.phi = int(grid.y);\n"
+    "    c.r = max(length(d), shells.x);\n"
+    "    float f = clamp((log2(c.r) - grid.w) * shells.y, 0.0, grid.z - 1.0);\n"
+    "    vec2 p = octahedral ? (fiv_square(d) + 1.0) * 0.5 * (grid.xy - 1.0)\n"
+    "        : vec2(atan(d.z, d.x == 0.0 && d.z == 0.0 ? 1.0 : d.x) * 0.159154943 * grid.x,\n"
+    "               atan(length(d.xz), d == vec3(0.0) ? 1.0 : d.y) * 0.318309886 * (grid.y - 1.0));\n"
+    "    if (p.x < 0.0) p.x += grid.x;\n"
+    "    c.at = ivec3(clamp(int(p.x), 0, octahedral ? c.theta - 2 : c.theta - 1), clamp(int(p.y), 0, c.phi - 2), min(int(f), int(grid.z) - 2));\n"
+    "    c.part = clamp(vec3(p, f) - vec3(c.at), 0.0, 1.0);\n"
+    "    c.shell = exp2(grid.w + (float(c.at.z) + vec2(0.0, 1.0)) / shells.y);\n"
+    "    return c;\n"
+    "}\n"
+    "int fiv_sample(fiv_cell c, int q, out float weight) {\n"
+    "    ivec3 e = ivec3(q & 1, (q >> 1) & 1, q >> 2);\n"
+    "    vec3 share = mix(1.0 - c.part, c.part, vec3(e));\n"
+    "    int x = c.at.x + e.x;\n"
+    "    weight = share.x * share.y * share.z;\n"
+    "    return (((c.at.z + e.z) * c.phi + c.at.y + e.y) * c.theta + (x == c.theta ? 0 : x)) * fiv_counts.z;\n"
+    "}\n"
+    "fiv_sum fiv_gather(fiv_cell c, vec2 scale, inout float light[8]) {\n"
+    "    fiv_sum s = fiv_sum(mat3(0.0), mat3(0.0), 0.0, 0.0, 0.0);\n"
+    "    float far[8], weight;\n"
+    "    for (int k = 0; k < 8; k++) far[k] = 0.0;\n"
+    "    for (int q = 0; q < 8; q++) {\n"
+    "        int at = fiv_sample(c, q, weight);\n"
+    "        float scaled = weight * (q < 4 ? scale.x : scale.y);\n"
+    "        vec4 a = fiv_at(c.base, at), b = fiv_at(c.base, at + 1), e = fiv_at(c.base, at + 2);\n"
+    "        mat3 v = scaled * mat3(a.xyz, vec3(a.w, b.xy), vec3(b.zw, e.x));\n"
+    "        s.whole += v;\n"
+    "        s.all += scaled * abs(e.y);\n"
+    "        if (e.y < 0.0) continue;\n"
+    "        s.v += v;\n"
+    "        s.angle += scaled * e.y;\n"
+    "        s.total += weight;\n"
+    "        far[0] += weight * e.z; far[1] += weight * e.w;\n"
+    "        for (int k = 2; k < fiv_counts.y; k += 4) {\n"
+    "            vec4 more = fiv_at(c.base, at + 3 + (k - 2) / 4);\n"
+    "            far[k] += weight * more.x; if (k + 1 < 8) far[k + 1] += weight * more.y;\n"
+    "            if (k + 2 < 8) { far[k + 2] += weight * more.z; far[k + 3] += weight * more.w; }\n"
+    "        }\n"
+    "    }\n"
+    "    for (int k = 0; k < fiv_counts.y; k++)\n"
+    "        light[k] = max(light[k], s.total > 1e-4 ? clamp(0.5 + far[k] / s.total, 0.0, 1.0) : 1.0);\n"
+    "    return s;\n"
+    "}\n";
+
+/* What one occluder takes, and its solid angle in w; what is left of the light on its own surface (eq 13). Both note in `light` how
+   much of each light is covered. */
+static const char fiv__glsl_occluder[] =
     "float fiv_cap(float c, float h) {\n"
     "    float s = 1.0 - h * h;\n"
     "    if (c * c >= s) return max(c, 0.0);\n"
     "    float w = sqrt(1.0 - c * c), x = h / sqrt(s), y = clamp(-x * c / w, -1.0, 1.0), q = sqrt(1.0 - y * y);\n"
     "    return ((c * acos(y) - x * w * q) * s + atan(w * q / x)) / (3.14159265 * s);\n"
-    "}\n";
-
-/* One occluder: what it takes, its solid angle in w, and in `light` how much of each light it covers. */
-static const char fiv__glsl_occluder[] =
-    "vec4 fiv_occluder(int instance, vec3 world, vec3 normal, float cut, inout float light[8]) {\n"
-    "    vec4 a = texelFetch(fiv_scene, ivec2(1, instance), 0), b = texelFetch(fiv_scene, ivec2(2, instance), 0);\n"
-    "    vec4 c = texelFetch(fiv_scene, ivec2(3, instance), 0), grid = texelFetch(fiv_scene, ivec2(4, instance), 0);\n"
-    "    vec4 shells = texelFetch(fiv_scene, ivec2(5, instance), 0);\n"
-    "    vec3 d = vec3(a.x * world.x + b.x * world.y + c.x * world.z, a.y * world.x + b.y * world.y + c.y * world.z,\n"
-    "                  a.z * world.x + b.z * world.y + c.z * world.z);\n"
-    "    vec3 n = vec3(a.x * normal.x + b.x * normal.y + c.x * normal.z, a.y * normal.x + b.y * normal.y + c.y * normal.z,\n"
-    "                  a.z * normal.x + b.z * normal.y + c.z * normal.z);\n"
-    "    int base = int(a.w), theta = int(grid.x), phi = int(grid.y);\n"
-    "    float r = max(length(d), shells.x), f = clamp((log2(r) - grid.w) * shells.y, 0.0, grid.z - 1.0);\n"
-    "    bool octahedral = b.w > 0.5;\n"
-    "    vec2 p = octahedral ? (fiv_square(d) + 1.0) * 0.5 * (grid.xy - 1.0)\n"
-    "        : vec2(atan(d.z, d.x == 0.0 && d.z == 0.0 ? 1.0 : d.x) * 0.159154943 * grid.x, acos(clamp(d.y / max(length(d), 1e-30), -1.0, 1.0)) * 0.318309886 * (grid.y - 1.0));\n"
-    "    if (p.x < 0.0) p.x += grid.x;\n"
-    "    ivec3 i = ivec3(clamp(int(p.x), 0, octahedral ? theta - 2 : theta - 1), clamp(int(p.y), 0, phi - 2), min(int(f), int(grid.z) - 2));\n"
-    "    vec3 w = clamp(vec3(p, f) - vec3(i), 0.0, 1.0), v[3], whole[3];\n"
-    "    float angle = 0.0, all = 0.0, total = 0.0, far[8];\n"
-    "    for (int k = 0; k < 8; k++) far[k] = 0.0;\n"
-    "    for (int k = 0; k < 3; k++) v[k] = whole[k] = vec3(0.0);\n"
-    "    for (int q = 0; q < 8; q++) {\n"
-    "        ivec3 e = ivec3(q & 1, (q >> 1) & 1, q >> 2);\n"
-    "        vec3 share = mix(1.0 - w, w, vec3(e));\n"
-    "        float weight = share.x * share.y * share.z;\n"
-    "        int x = i.x + e.x, at = (((i.z + e.z) * phi + i.y + e.y) * theta + (x == theta ? 0 : x)) * fiv_counts.z;\n"
-    "        vec4 s = fiv_at(base, at), t = fiv_at(base, at + 1), u = fiv_at(base, at + 2);\n"
-    "        vec3 red = s.xyz, green = vec3(s.w, t.xy), blue = vec3(t.zw, u.x);\n"
-    "        whole[0] += weight * red; whole[1] += weight * green; whole[2] += weight * blue;\n"
-    "        all += weight * abs(u.y);\n"
-    "        if (u.y < 0.0) continue;\n"
-    "        v[0] += weight * red; v[1] += weight * green; v[2] += weight * blue;\n"
-    "        angle += weight * u.y;\n"
-    "        total += weight;\n"
-    "        far[0] += weight * u.z; far[1] += weight * u.w;\n"
-    "        for (int k = 2; k < fiv_counts.y; k += 4) {\n"
-    "            vec4 more = fiv_at(base, at + 3 + (k - 2) / 4);\n"
-    "            far[k] += weight * more.x; if (k + 1 < 8) far[k + 1] += weight * more.y;\n"
-    "            if (k + 2 < 8) { far[k + 2] += weight * more.z; far[k + 3] += weight * more.w; }\n"
-    "        }\n"
-    "    }\n"
-    "    bool inside = !(total > 1e-4);\n"
-    "    for (int k = 0; k < fiv_counts.y; k++)\n"
-    "        light[k] = max(light[k], inside ? 1.0 : clamp(0.5 + far[k] / max(total, 1e-4), 0.0, 1.0));\n"
-    "    float scale = 1.0 / ((inside ? 1.0 : total) * r * r);\n"
-    "    angle = (inside ? all : angle) * scale;\n"
-    "    vec4 taken = vec4(0.0, 0.0, 0.0, angle);\n"
+    "}\n"
+    "vec3 fiv_shade(mat3 v, float angle, vec3 n, float cut) {\n"
+    "    vec3 along = n * v;\n"
+    "    float h = clamp(1.0 - angle * 0.159154943, 0.01, 0.999999);\n"
     "    for (int k = 0; k < 3; k++) {\n"
-    "        vec3 whole_or_valid = (inside ? whole[k] : v[k]) * scale;\n"
-    "        float along = dot(whole_or_valid, n), size = length(whole_or_valid);\n"
-    "        if (cut > 0.0 && size > 0.0)\n"
-    "            along = mix(along, size * fiv_cap(along / size, clamp(1.0 - angle * 0.159154943, 0.01, 0.999999)), min(4.0 * cut, 1.0));\n"
-    "        taken[k] = max(along, 0.0);\n"
+    "        float size = length(v[k]);\n"
+    "        if (cut > 0.0 && size > 0.0) along[k] = mix(along[k], size * fiv_cap(along[k] / size, h), min(4.0 * cut, 1.0));\n"
     "    }\n"
-    "    return taken;\n"
-    "}\n";
+    "    return max(along, 0.0);\n"
+    "}\n"
+    "vec4 fiv_occluder(int instance, vec3 d, vec3 n, float cut, inout float light[8]) {\n"
+    "    fiv_cell c = fiv_locate(instance, d);\n"
+    "    fiv_sum s = fiv_gather(c, vec2(1.0), light);\n"
+    "    bool inside = !(s.total > 1e-4);\n"
+    "    float scale = 1.0 / ((inside ? 1.0 : s.total) * c.r * c.r), angle = (inside ? s.all : s.angle) * scale;\n"
+    "    mat3 v = s.v;\n"
+    "    if (inside) v = s.whole;\n"
+    "    return vec4(fiv_shade(v * scale, angle, n, cut), angle);\n"
+    "}\n"
+#ifndef FIV_NO_SELF
+    "vec3 fiv_self(int self, vec3 d, vec3 n, inout float light[8]) {\n"
+    "    fiv_cell c;\n"
+    "    float out_by = 0.0;\n"
+    "    for (int k = 0; k < 6; k++) {\n"
+    "        float valid = 0.0, weight;\n"
+    "        c = fiv_locate(self, d - out_by * n);\n"
+    "        for (int q = 0; q < 8; q++)\n"
+    "            if (fiv_at(c.base, fiv_sample(c, q, weight) + 2).y >= 0.0) valid += weight;\n"
+    "        if (valid > 0.25) break;\n"
+    "        out_by = max(2.0 * out_by, 0.05);\n"
+    "    }\n"
+    "    fiv_sum s = fiv_gather(c, 1.0 / (c.shell * c.shell), light);\n"
+    "    if (!(s.total > 1e-4)) return vec3(0.0);\n"
+    "    mat3 open = mat3(fiv_row(self, 6).xyz, fiv_row(self, 7).xyz, fiv_row(self, 8).xyz) - s.v / s.total;\n"
+    "    return fiv_shade(open, 12.5663706 - s.angle / s.total, n, 1.0);\n"
+    "}\n"
+#endif
+    ;
 
 static const char fiv__glsl_receiver[] =
     "float fiv_lens(float r, float s, float d) {\n"
@@ -3615,10 +3668,15 @@ static const char fiv__glsl_receiver[] =
     "    float b = acos(clamp((d * d + s * s - r * r) / (2.0 * d * s), -1.0, 1.0));\n"
     "    return r * r * (a - 0.5 * sin(2.0 * a)) + s * s * (b - 0.5 * sin(2.0 * b));\n"
     "}\n"
-    "vec3 fiv_irradiance(vec3 point, vec3 normal) {\n"
+    "bool fiv_place(int instance, vec3 point, out vec3 world) {\n"
+    "    vec4 place = fiv_row(instance, 0);\n"
+    "    world = (place.xyz - point) * place.w;\n"
+    "    return place.w > 0.0 && length(world) < 1e9;\n"
+    "}\n"
+    "vec3 fiv_receive(int self, vec3 point, vec3 normal) {\n"
     "    if (!(dot(normal, normal) > 0.0)) return vec3(0.0);\n"
     "    normal = normalize(normal);\n"
-    "    vec3 open = fiv_total(normal), sum = vec3(0.0), shared_sum = vec3(0.0), largest = vec3(0.0);\n"
+    "    vec3 open = fiv_total(normal), sum = vec3(0.0), shared_sum = vec3(0.0), largest = vec3(0.0), world;\n"
     "    vec4 discs[FIV_INSTANCES];\n"
     "    vec3 takes[FIV_INSTANCES];\n"
     "    float light[8];\n"
@@ -3626,20 +3684,19 @@ static const char fiv__glsl_receiver[] =
     "    for (int k = 0; k < 8; k++) light[k] = 0.0;\n"
     "    for (int i = 0; i < FIV_INSTANCES; i++) {\n"
     "        if (i >= fiv_counts.x) break;\n"
-    "        vec4 place = texelFetch(fiv_scene, ivec2(0, i), 0);\n"
-    "        vec3 world = (place.xyz - point) * place.w;\n"
-    "        float r = length(world), height = dot(world, normal), cut = 0.0;\n"
-    "        if (!(place.w > 0.0) || !(r < 1e9) || height <= -1.0) continue;\n"
+    "        if (i == self || !fiv_place(i, point, world)) continue;\n"
+    "        vec3 n = fiv_own(i, normal);\n"
+    "        float height = dot(world, normal), cut = 0.0;\n"
+    "        if (height <= -1.0) continue;\n"
     "        if (height < 1.0) {\n"
-    "            vec4 a = texelFetch(fiv_scene, ivec2(1, i), 0), b = texelFetch(fiv_scene, ivec2(2, i), 0), c = texelFetch(fiv_scene, ivec2(3, i), 0);\n"
-    "            vec3 n = a.xyz * normal.x + b.xyz * normal.y + c.xyz * normal.z;\n"
-    "            float below = fiv_reach(int(c.w), -n), above = fiv_reach(int(c.w), n);\n"
+    "            int reach = int(fiv_row(i, 3).w);\n"
+    "            float below = fiv_reach(reach, -n), above = fiv_reach(reach, n);\n"
     "            if (height <= -above) continue;\n"
     "            if (height < below - 1e-4) cut = (below - height) / (below + above);\n"
     "        }\n"
-    "        vec4 taken = fiv_occluder(i, world, normal, cut, light);\n"
+    "        vec4 taken = fiv_occluder(i, fiv_own(i, world), n, cut, light);\n"
     "        vec3 own = min(taken.rgb, open);\n"
-    "        discs[count] = vec4(world / max(r, 1e-30), sqrt(taken.w * 0.318309886));\n"
+    "        discs[count] = vec4(world / max(length(world), 1e-30), sqrt(taken.w * 0.318309886));\n"
     "        takes[count] = own;\n"
     "        sum += own;\n"
     "        largest = max(largest, own);\n"
@@ -3650,15 +3707,23 @@ static const char fiv__glsl_receiver[] =
     "        count++;\n"
     "    }\n"
     "    vec3 result = clamp(open - max(sum - shared_sum, largest), vec3(0.0), open);\n"
+#ifndef FIV_NO_SELF
+    "    if (self >= 0 && self < fiv_counts.x && fiv_place(self, point, world))\n"
+    "        result *= min(fiv_self(self, fiv_own(self, world), fiv_own(self, normal), light) / max(open, 1e-30), 1.0);\n"
+#endif
     "    for (int k = 0; k < fiv_counts.y; k++) {\n"
-    "        vec3 direction = texelFetch(fiv_scene, ivec2(2 * k, FIV_INSTANCES), 0).xyz, power = texelFetch(fiv_scene, ivec2(2 * k + 1, FIV_INSTANCES), 0).rgb;\n"
+    "        vec3 direction = fiv_row(FIV_INSTANCES, 2 * k).xyz, power = fiv_row(FIV_INSTANCES, 2 * k + 1).rgb;\n"
     "        result += power * max(dot(normal, direction), 0.0) * (1.0 - light[k]);\n"
     "    }\n"
     "    return result;\n"
     "}\n"
+    "vec3 fiv_irradiance(vec3 point, vec3 normal) { return fiv_receive(-1, point, normal); }\n"
+#ifndef FIV_NO_SELF
+    "vec3 fiv_self_irradiance(int self, vec3 point, vec3 normal) { return fiv_receive(self, point, normal); }\n"
+#endif
     "#endif\n";
 
-static const char *const fiv__glsl[] = {fiv__glsl_cube, fiv__glsl_occluder, fiv__glsl_receiver, NULL};
+static const char *const fiv__glsl[] = {fiv__glsl_cube, fiv__glsl_cell, fiv__glsl_occluder, fiv__glsl_receiver, NULL};
 
 FIV_DEF const char *const *fiv_gl_glsl(void) { return fiv__glsl; }
 
@@ -3667,7 +3732,9 @@ static const char fiv__glsl_main[] =
     "out vec4 value;\n"
     "void main() {\n"
     "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
-    "    value = vec4(fiv_irradiance(texelFetch(fiv_points, p, 0).xyz, texelFetch(fiv_normals, p, 0).xyz), 1.0);\n"
+    "    vec4 point = texelFetch(fiv_points, p, 0);\n"
+    "    int self = FIV_SELF != 0 && point.w >= 2.0 && point.w < 66.0 ? int(point.w) - 2 : -1;\n"
+    "    value = vec4(fiv_receive(self, point.xyz, texelFetch(fiv_normals, p, 0).xyz), 1.0);\n"
     "}\n";
 
 enum { FIV__GL_WIDTH = 2048, FIV__GL_UNITS = 5, FIV__SCENE_WIDTH = 16, FIV__SUPPORT_TEXELS = FIV__SUPPORT * FIV__SUPPORT };
@@ -3675,7 +3742,7 @@ enum { FIV__GL_WIDTH = 2048, FIV__GL_UNITS = 5, FIV__SCENE_WIDTH = 16, FIV__SUPP
 struct fiv_gl {
     sat__gl gl;
     sat_allocator allocator;
-    int width, height, max_instances;
+    int width, height, max_instances, self;
     int count, lights, texels, face, table_rows; /* what the textures hold */
     int base[64];                                /* texel where the tables of each instance begin */
     float rotation[9];
@@ -3734,6 +3801,7 @@ static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
     shaders.library = fiv__glsl;
     shaders.fragment = body;
     sat__gl_define(gl, "FIV_INSTANCES", g->max_instances);
+    sat__gl_define(gl, "FIV_SELF", g->self);
     r = sat__gl_build(gl, &g->program, &shaders);
     if (r) return r;
     sat__gl_begin(gl, &state, 1);
@@ -3754,6 +3822,9 @@ FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int wi
     if (!sat__version_matches()) return SAT_ERR_VERSION;
     if (!get_proc || width < 1 || height < 1 || width > 16384 || height > 16384) return SAT_ERR_ARGUMENT;
     if (o.max_instances < 1 || o.max_instances > 64 || !sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
+#ifdef FIV_NO_SELF
+    if (o.self) return SAT_ERR_ARGUMENT;
+#endif
     g = (fiv_gl *)sat__alloc(&allocator, sizeof *g);
     if (!g) return SAT_ERR_MEMORY;
     memset(g, 0, sizeof *g);
@@ -3761,6 +3832,7 @@ FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int wi
     g->width = width;
     g->height = height;
     g->max_instances = o.max_instances;
+    g->self = o.self != 0;
     *out = g;
     return fiv__gl_start(g, get_proc);
 }
@@ -3845,7 +3917,7 @@ static sat_result fiv__gl_upload_diffuse(fiv_gl *g, const fiv_environment *e)
     return r;
 }
 
-/* The scene's row of one instance, see fiv__glsl_occluder. */
+/* Texels 0 to 5 of an instance: where it is, and its tables. */
 static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *instance, int base, int texels)
 {
     const fiv_occluder *o = instance->occluder;
@@ -3864,6 +3936,23 @@ static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *inst
     row[4][3] = o->grid.log_first;
     row[5][0] = o->grid.first;
     row[5][1] = o->grid.per_log;
+}
+
+/* What stays while instances move: texels 6 to 8, the environment's vector in the occluder's frame, and the lights. */
+static void fiv__gl_light(fiv_gl *g, const fiv_environment *e)
+{
+    int i, k, c;
+    memset(g->rows, 0, sizeof g->rows);
+    for (i = 0; i < g->count; i++)
+        for (c = 0; c < 3; c++) {
+            float world[3];
+            for (k = 0; k < 3; k++) world[k] = (float)e->vector[3 * c + k];
+            fiv__turn_back(g->rows[i][6 + c], g->occluders[i]->rotation, world);
+        }
+    for (k = 0; k < e->light_count; k++) {
+        fiv__turn(g->rows[g->max_instances][2 * k], e->rotation, e->lights[k].direction);
+        memcpy(g->rows[g->max_instances][2 * k + 1], e->lights[k].power, sizeof e->lights[k].power);
+    }
 }
 
 FIV_DEF sat_result fiv_gl_move(fiv_gl *g, const fiv_instance *instances, size_t count)
@@ -3890,7 +3979,6 @@ FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *g, const fiv_environment *e, const f
     fiv_irradiance_options o = fiv_irradiance_defaults();
     size_t i, used;
     sat_result r;
-    int k;
     if (!g || !g->program || !e || (count && !instances)) return SAT_ERR_ARGUMENT;
     if (count > (size_t)g->max_instances) return SAT_ERR_LIMIT;
     for (i = 0; i < count; i++)
@@ -3901,11 +3989,7 @@ FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *g, const fiv_environment *e, const f
     memcpy(g->rotation, e->rotation, sizeof g->rotation);
     used = fiv__gl_bases(g, instances, count);
     if (used > ((size_t)1 << 24)) return SAT_ERR_LIMIT;
-    memset(g->rows, 0, sizeof g->rows);
-    for (k = 0; k < e->light_count; k++) {
-        fiv__turn(g->rows[g->max_instances][2 * k], e->rotation, e->lights[k].direction);
-        memcpy(g->rows[g->max_instances][2 * k + 1], e->lights[k].power, sizeof e->lights[k].power);
-    }
+    fiv__gl_light(g, e);
     sat__gl_clear_errors(&g->gl);
     sat__gl_begin(&g->gl, &state, 1);
     r = fiv__gl_upload_tables(g, used);

@@ -22,6 +22,12 @@ typedef struct test_scene {
 
 static test_scene scene;
 
+#ifdef FIV_NO_SELF
+enum { TEST_SELF = 0 };
+#else
+enum { TEST_SELF = 1 };
+#endif
+
 /* A sky with `suns` bright texels. */
 static void test_sky(int suns)
 {
@@ -62,7 +68,7 @@ static void test_receivers(void)
     }
 }
 
-static int test_open(fiv_storage storage)
+static int test_open(fiv_storage storage, int self)
 {
     fiv_occluder_options o = fiv_occluder_defaults();
     fiv_gl_options options = fiv_gl_defaults();
@@ -86,6 +92,7 @@ static int test_open(fiv_storage storage)
     }
     test_receivers();
     options.allocator = support_allocator(&scene.memory);
+    options.self = self;
     result = fiv_gl_create(&scene.gl, scene.context.get_proc, WIDTH, HEIGHT, &options);
     if (result) printf("%s\n", fiv_gl_message(scene.gl));
     if (!EXPECT_EQ(result, SAT_OK)) return 0;
@@ -111,18 +118,33 @@ static void test_close(void)
     gl_context_close(&scene.context);
 }
 
+/* One receiver on the CPU; on the surface of the instance that the alpha of its point names. */
+static void test_cpu(float rgb[3], int i, size_t count)
+{
+    const float *point = scene.points + 4 * i, *normal = scene.normals + 4 * i;
+    fiv_irradiance_options o = fiv_irradiance_defaults();
+    fiv_instance others[3];
+    size_t j, n = 0;
+    o.cutoff = 0;
+    for (j = 0; j < count; j++)
+        if (!(point[3] >= (float)j + 2 && point[3] < (float)j + 3)) others[n++] = scene.instances[j];
+#ifndef FIV_NO_SELF
+    if (n < count) {
+        EXPECT_EQ(fiv_self_irradiance(rgb, point, normal, 1, scene.environment, &scene.instances[(int)point[3] - 2], others, n, &o, NULL), SAT_OK);
+        return;
+    }
+#endif
+    EXPECT_EQ(fiv_irradiance(rgb, point, normal, 1, scene.environment, others, n, &o, NULL), SAT_OK);
+}
+
 /* The largest and the root-mean-square difference between both sides, as parts of the largest irradiance. */
 static void test_difference(double *worst, double *rms, size_t count)
 {
-    static float gpu[4 * COUNT], cpu[3 * COUNT], points[3 * COUNT], normals[3 * COUNT];
-    fiv_irradiance_options o = fiv_irradiance_defaults();
+    static float gpu[4 * COUNT], cpu[3 * COUNT];
     sat__gl_state state;
     double largest = 0;
     int i, k;
-    o.cutoff = 0;
-    for (i = 0; i < COUNT; i++)
-        for (k = 0; k < 3; k++) points[3 * i + k] = scene.points[4 * i + k], normals[3 * i + k] = scene.normals[4 * i + k];
-    EXPECT_EQ(fiv_irradiance(cpu, points, normals, COUNT, scene.environment, scene.instances, count, &o, NULL), SAT_OK);
+    for (i = 0; i < COUNT; i++) test_cpu(cpu + 3 * i, i, count);
     EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
     sat__gl_begin(&scene.gl->gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&scene.gl->gl, gpu, fiv_gl_texture(scene.gl), SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
@@ -146,7 +168,7 @@ TEST(receiver_pass_equals_the_cpu)
     int storage, suns;
     size_t count;
     for (storage = 0; storage < 2; storage++) {
-        if (!test_open((fiv_storage)storage)) SKIP(scene.context.message);
+        if (!test_open((fiv_storage)storage, 0)) SKIP(scene.context.message);
         for (suns = 0; suns < 5; suns += suns < 2 ? 1 : 2) {
             test_sky(suns);
             EXPECT_EQ(fiv_environment_get_stats(scene.environment).lights, suns);
@@ -165,11 +187,101 @@ TEST(receiver_pass_equals_the_cpu)
     }
 }
 
+#ifndef FIV_NO_SELF
+/* Receivers on the knots, in turn on each of the first two instances, and every fifth one as it was: on none, or on one that is not there.
+   Writes the texture anew. */
+static void test_receivers_on_knots(void)
+{
+    static const float none[5] = {1, 0, -3, 2 + 3, 1e9f};
+    sat__gl_state state;
+    int i, j, k;
+    for (i = 0; i < COUNT; i++) {
+        const fiv_instance *self = &scene.instances[i & 1];
+        const unsigned *corner = scene.mesh.indices + 3 * ((size_t)i % scene.mesh.triangles);
+        const float *p[3];
+        float e[2][3], n[3], middle[3];
+        scene.points[4 * i + 3] = i % 5 ? (float)(2 + (i & 1)) : none[i / 5 % 5];
+        if (i % 5 == 0) continue;
+        for (j = 0; j < 3; j++) p[j] = scene.mesh.positions + 3 * (size_t)corner[j];
+        for (k = 0; k < 3; k++) e[0][k] = p[1][k] - p[0][k], e[1][k] = p[2][k] - p[0][k], middle[k] = (p[0][k] + p[1][k] + p[2][k]) / 3;
+        for (k = 0; k < 3; k++) n[k] = (float)self->occluder->mesh.turn * (e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3]);
+        fiv__turn(scene.normals + 4 * i, self->occluder->rotation, n);
+        fiv__turn(scene.points + 4 * i, self->occluder->rotation, middle);
+        for (k = 0; k < 3; k++) scene.points[4 * i + k] = self->position[k] + self->scale * scene.points[4 * i + k];
+    }
+    sat__gl_begin(&scene.gl->gl, &state, 1);
+    sat__gl_upload(&scene.gl->gl, scene.point_texture, SAT__GL_RGBA32F, WIDTH, HEIGHT, scene.points);
+    sat__gl_upload(&scene.gl->gl, scene.normal_texture, SAT__GL_RGBA32F, WIDTH, HEIGHT, scene.normals);
+    sat__gl_end(&scene.gl->gl, &state);
+}
+
+/* Alone, with a second occluder and with a third that no receiver lies on; without split-off lights and with some. */
+TEST(self_shadows_equal_the_cpu)
+{
+    int storage, suns, i;
+    size_t count;
+    double worst, rms;
+    for (storage = 0; storage < 2; storage++) {
+        if (!test_open((fiv_storage)storage, 1)) SKIP(scene.context.message);
+        test_receivers_on_knots();
+        for (suns = 0; suns < 5; suns += suns < 1 ? 1 : 3) {
+            test_sky(suns);
+            test_light();
+            for (count = 0; count < 4; count++) {
+                EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, count), SAT_OK);
+                test_difference(&worst, &rms, count);
+                EXPECT(worst < 2e-3);
+                EXPECT(rms < 1e-4);
+                if (suns == 1 && count == 3) REPORT("GPU against CPU, receivers on occluders: worst", worst, "of the largest");
+                if (suns == 1 && count == 3) REPORT("GPU against CPU, receivers on occluders: rms", rms, "of the largest");
+            }
+        }
+        for (i = 0; i < COUNT; i++) scene.points[4 * i + 3] = 1; /* on the CPU alone: the difference sees what is compared */
+        test_difference(&worst, &rms, 3);
+        EXPECT(rms > 0.02);
+        test_close();
+    }
+}
+#endif
+
+/* The same in GLSL ES 3.00, on the same driver. */
+static fiv_gl *test_desktop;
+
+static const unsigned char *SAT__GL_CALL test_es_string(unsigned name)
+{
+    return name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)" : test_desktop->gl.GetString(name);
+}
+
+static sat_gl_proc test_as_es(const char *name)
+{
+    return strcmp(name, "glGetString") == 0 ? (sat_gl_proc)test_es_string : scene.context.get_proc(name);
+}
+
+TEST(shaders_are_es)
+{
+    fiv_gl_options o = fiv_gl_defaults();
+    double worst, rms;
+    if (!test_open(FIV_STORAGE_FLOAT, 0)) SKIP(scene.context.message);
+    test_desktop = scene.gl;
+    o.allocator = scene.gl->allocator;
+#ifndef FIV_NO_SELF
+    o.self = 1;
+    test_receivers_on_knots();
+#endif
+    EXPECT_EQ(fiv_gl_create(&scene.gl, test_as_es, WIDTH, HEIGHT, &o), SAT_OK);
+    EXPECT(scene.gl->gl.is_es);
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
+    test_difference(&worst, &rms, 3);
+    EXPECT(worst < 2e-3 && rms < 1e-4);
+    fiv_gl_destroy(test_desktop);
+    test_close();
+}
+
 TEST(moving_needs_no_tables)
 {
     double worst, rms;
     long calls;
-    if (!test_open(FIV_STORAGE_FLOAT)) SKIP(scene.context.message);
+    if (!test_open(FIV_STORAGE_FLOAT, 0)) SKIP(scene.context.message);
     EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
     scene.instances[0].position[0] += 0.7f;
     scene.instances[2].scale = 0;
@@ -190,7 +302,7 @@ TEST(state_is_put_back)
     static const unsigned names[6] = {VIEWPORT, PROGRAM, DRAW_FRAMEBUFFER, VERTEX_ARRAY, TEXTURE_2D, ACTIVE};
     int before[6][4], after[6][4], i;
     unsigned texture = 0;
-    if (!test_open(FIV_STORAGE_FLOAT)) SKIP(scene.context.message);
+    if (!test_open(FIV_STORAGE_FLOAT, TEST_SELF)) SKIP(scene.context.message);
     scene.gl->gl.GenTextures(1, &texture);
     scene.gl->gl.ActiveTexture(0x84C0 + 1);
     scene.gl->gl.BindTexture(0x0DE1, texture);
@@ -207,19 +319,21 @@ TEST(state_is_put_back)
     test_close();
 }
 
-/* A shader of one's own calls fiv_irradiance. */
-TEST(own_shader)
+/* A shader of one's own calls fiv_irradiance or fiv_self_irradiance. */
+static void test_shader(const char *call, int self)
 {
-    static const char *const body[] = {"uniform sampler2D p, n;\nout vec4 value;\n"
-        "void main() { ivec2 i = ivec2(gl_FragCoord.xy);\n"
-        "    value = vec4(fiv_irradiance(texelFetch(p, i, 0).xyz, texelFetch(n, i, 0).xyz), 1.0); }\n", NULL};
+    const char *const body[] = {"uniform sampler2D p, n;\nout vec4 value;\nvoid main() { ivec2 i = ivec2(gl_FragCoord.xy);\n"
+        "    vec4 point = texelFetch(p, i, 0); vec3 normal = texelFetch(n, i, 0).xyz;\n    value = vec4(", call, ", 1.0); }\n", NULL};
     static float mine[4 * COUNT], theirs[4 * COUNT];
     sat__gl_shaders shaders;
     sat__gl_state state;
     unsigned program = 0, target = 0, out = 0;
     sat__gl *gl;
-    if (!test_open(FIV_STORAGE_FLOAT)) SKIP(scene.context.message);
+    if (!test_open(FIV_STORAGE_FLOAT, self)) SKIP(scene.context.message);
     gl = &scene.gl->gl;
+#ifndef FIV_NO_SELF
+    if (self) test_receivers_on_knots();
+#endif
     EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
     EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
     memset(&shaders, 0, sizeof shaders);
@@ -246,6 +360,14 @@ TEST(own_shader)
     test_close();
 }
 
+TEST(own_shader)
+{
+    test_shader("fiv_irradiance(point.xyz, normal)", 0);
+#ifndef FIV_NO_SELF
+    test_shader("fiv_self_irradiance(point.w > 9.0 ? 99 : int(point.w) - 2, point.xyz, normal)", 1);
+#endif
+}
+
 static sat_gl_proc test_nothing(const char *name)
 {
     (void)name;
@@ -267,9 +389,14 @@ TEST(bad_arguments)
     EXPECT_EQ(fiv_gl_create(NULL, test_nothing, 4, 4, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(fiv_gl_create(&gl, NULL, 4, 4, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 0, 4, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(o.self, 0);
+#ifdef FIV_NO_SELF
+    o.self = 1;
+    EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 4, 4, &o), SAT_ERR_ARGUMENT);
+#endif
     o.max_instances = 65;
     EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 4, 4, &o), SAT_ERR_ARGUMENT);
-    if (!test_open(FIV_STORAGE_FLOAT)) SKIP(scene.context.message);
+    if (!test_open(FIV_STORAGE_FLOAT, 0)) SKIP(scene.context.message);
     EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_ERR_ARGUMENT); /* no scene */
     for (i = 0; i < 9; i++) many[i] = scene.instances[0];
     EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, many, 9), SAT_ERR_LIMIT);
