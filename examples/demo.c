@@ -49,7 +49,9 @@ static void print_table(const pipeline *p, const gl_context *context)
              1e-6 * (double)(p->mask_stats[0].bytes + p->mask_stats[1].bytes));
     print_row("masks", p->seconds[PIPELINE_MASKS], "-", rest);
     print_row("scene", p->seconds[PIPELINE_SCENE], "-", "");
-    if (p->options.shadows) {
+    if (p->options.shadows && p->gl)
+        print_row("shadows", p->seconds[PIPELINE_SHADOWS], percent(error, sizeof error, reference_shadow_error(p, 24), "rms (ray casting)"), gpu);
+    else if (p->options.shadows) {
         snprintf(rest, sizeof rest, "occluders below the horizon %.0f %%, too small %.0f %% of %.3g pairs",
                  100 * (double)f->below_horizon / pairs, 100 * (double)f->below_cutoff / pairs, pairs);
         print_row("shadows", p->seconds[PIPELINE_SHADOWS], percent(error, sizeof error, reference_shadow_error(p, 24), "rms (ray casting)"), rest);
@@ -174,7 +176,7 @@ int main(int argc, char **argv)
         {"mesopic", 's', &mesopic, "off, uniform or local: reds fade in dim light"},
         {"samples", 'i', &o.samples, "points a pixel each way, 1 to 4; 2"},
         {"frames", 'i', &frames, "pictures, 1/30 s apart"},
-        {"gl", 'b', &gl, "on OpenGL but for self-shadows (OSMesa; LIGHTSCAN_GL=egl: the GPU)"},
+        {"gl", 'b', &gl, "on OpenGL (OSMesa; LIGHTSCAN_GL=egl: the GPU)"},
         {"mosaic", 'b', &mosaic, "the picture again, from tiles"},
         {"no-shadows", 'b', &no_shadows, "leave fiv.h out"},
         {"no-occlusion", 'b', &no_occlusion, "leave ssao_sat.h out"},

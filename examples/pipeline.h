@@ -174,21 +174,24 @@ static inline int pipeline_masks(pipeline *p)
 
 /* ---- shadows ---- */
 
+static inline fiv_instance pipeline_caster(const pipeline *p, int object)
+{
+    fiv_instance caster;
+    caster.occluder = p->occluders[object];
+    memcpy(caster.position, p->scene.objects[object].place, sizeof caster.position);
+    caster.scale = p->scene.objects[object].scale;
+    return caster;
+}
+
 /* The receivers of one kind in both layers, gathered, lit and put back. */
 static inline int pipeline_shadows_on(pipeline *p, int what, const fiv_irradiance_options *fo)
 {
     size_t pixels = (size_t)p->scene.width * (size_t)p->scene.height, i, n;
     fiv_instance casters[SCENE_OBJECTS];
     fiv_irradiance_stats stats;
-    int layer, k, count = 0;
-    memset(casters, 0, sizeof casters);
-    for (k = 0; k < SCENE_OBJECTS; ++k) { /* the receiver's own object comes last */
-        int object = what == SCENE_FIRST ? SCENE_OBJECTS - 1 - k : k;
-        casters[k].occluder = p->occluders[object];
-        memcpy(casters[k].position, p->scene.objects[object].place, sizeof casters[k].position);
-        casters[k].scale = p->scene.objects[object].scale;
-        count += p->options.shadows;
-    }
+    int layer, k, count = p->options.shadows ? SCENE_OBJECTS : 0;
+    for (k = 0; k < SCENE_OBJECTS; ++k) /* the receiver's own object comes last */
+        casters[k] = pipeline_caster(p, what == SCENE_FIRST ? SCENE_OBJECTS - 1 - k : k);
     for (layer = 0; layer < 2; ++layer) {
         const scene_layer *l = &p->scene.layers[layer];
         sat_result result;
@@ -210,38 +213,39 @@ static inline int pipeline_shadows_on(pipeline *p, int what, const fiv_irradianc
     return 1;
 }
 
-/* The ground on OpenGL, all pixels of the first layer at once. */
+#ifdef PIPELINE_GL
+/* All receivers of a layer at once; alpha says what they lie on. */
 static inline int pipeline_shadows_gl(pipeline *p)
 {
-#ifdef PIPELINE_GL
-    size_t pixels = (size_t)p->scene.width * (size_t)p->scene.height, i;
+    size_t pixels = (size_t)p->scene.width * (size_t)p->scene.height, i, k;
     fiv_instance casters[SCENE_OBJECTS];
     float *rgba = (float *)malloc(pixels * 4 * sizeof(float));
-    int k, ok;
-    memset(casters, 0, sizeof casters);
-    for (k = 0; k < SCENE_OBJECTS; ++k) {
-        casters[k].occluder = p->occluders[k];
-        memcpy(casters[k].position, p->scene.objects[k].place, sizeof casters[k].position);
-        casters[k].scale = p->scene.objects[k].scale;
+    int layer, ok = pipeline_gl_check(p->gl, rgba ? SAT_OK : SAT_ERR_MEMORY, "shadows");
+    for (k = 0; k < SCENE_OBJECTS; ++k) casters[k] = pipeline_caster(p, (int)k);
+    for (layer = 0; ok && layer < 2; ++layer) {
+        const scene_layer *l = &p->scene.layers[layer];
+        for (i = 0; i < pixels; ++i) {
+            for (k = 0; k < 3; ++k) {
+                rgba[4 * i + k] = l->what[i] == SCENE_SKY ? 0 : l->points[3 * i + k];
+                p->normals[3 * i + k] = l->what[i] == SCENE_SKY ? 0 : l->normals[3 * i + k];
+            }
+            rgba[4 * i + 3] = (float)(l->what[i] < SCENE_FIRST ? 1 : 2 + l->what[i] - SCENE_FIRST);
+        }
+        ok = pipeline_gl_shadows(p->gl, rgba, p->normals, p->scene.width, p->scene.height, p->light, casters, p->options.shadows ? SCENE_OBJECTS : 0);
+        for (i = 0; ok && i < pixels; ++i) memcpy(p->irradiance[layer] + 3 * i, rgba + 4 * i, 3 * sizeof(float));
     }
-    if (!rgba) return pipeline_check(p, "shadows", SAT_ERR_MEMORY);
-    ok = pipeline_gl_done(p, pipeline_gl_shadows(p->gl, rgba, p->scene.layers[0].points, p->scene.layers[0].normals, p->scene.width, p->scene.height,
-                                                 p->light, casters, p->options.shadows ? SCENE_OBJECTS : 0));
-    for (i = 0; ok && i < pixels; ++i)
-        if (p->scene.layers[0].what[i] == SCENE_GROUND) memcpy(p->irradiance[0] + 3 * i, rgba + 4 * i, 3 * sizeof(float));
     free(rgba);
     return ok;
-#else
-    return pipeline_check(p, "shadows", SAT_ERR_ARGUMENT);
-#endif
 }
+#endif
 
 static inline int pipeline_shadows(pipeline *p)
 {
     fiv_irradiance_options fo = fiv_irradiance_defaults();
+    PIPELINE_ON_GL(p, pipeline_shadows_gl(p));
     fo.threads = p->options.threads;
     memset(&p->shadow_stats, 0, sizeof p->shadow_stats);
-    return (p->gl ? pipeline_shadows_gl(p) : pipeline_shadows_on(p, SCENE_GROUND, &fo)) && pipeline_shadows_on(p, SCENE_FIRST, &fo) && pipeline_shadows_on(p, SCENE_SECOND, &fo);
+    return pipeline_shadows_on(p, SCENE_GROUND, &fo) && pipeline_shadows_on(p, SCENE_FIRST, &fo) && pipeline_shadows_on(p, SCENE_SECOND, &fo);
 }
 
 /* ---- ambient occlusion ---- */

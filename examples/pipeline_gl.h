@@ -94,20 +94,22 @@ static inline void pipeline_gl_copy(pipeline_gl *g, float *rgb, int to_rgba, int
         }
 }
 
-/* ---- shadows of several occluders on receivers that are none of them: the ground ---- */
+/* ---- shadows, of the scene's size ---- */
 
-/* rgba: scratch of 4 floats a pixel, and the result. Pixels whose normal is 0 are black. */
-static inline int pipeline_gl_shadows(pipeline_gl *g, float *rgba, const float *points, const float *normals, int width, int height,
+/* rgba: points whose alpha says what they lie on, as fiv_gl_irradiance has it; then the result. Pixels whose normal is 0 are black. */
+static inline int pipeline_gl_shadows(pipeline_gl *g, float *rgba, const float *normals, int width, int height,
                                       const fiv_environment *light, const fiv_instance *casters, size_t count)
 {
+    fiv_gl_options options = fiv_gl_defaults();
     sat_result result = SAT_OK;
-    if (!g->shadows) result = fiv_gl_create(&g->shadows, g->get_proc, width, height, NULL);
+    options.self = 1;
+    if (!g->shadows) result = fiv_gl_create(&g->shadows, g->get_proc, width, height, &options);
     if (result == SAT_OK) result = fiv_gl_set_scene(g->shadows, light, casters, count);
     if (!pipeline_gl_check(g, result, g->shadows ? fiv_gl_message(g->shadows) : "")) return 0;
-    if (!g->scene_points) result = sat__gl_texture(&g->gl, &g->scene_points, SAT__GL_RGB32F, width, height, NULL);
+    if (!g->scene_points) result = sat__gl_texture(&g->gl, &g->scene_points, SAT__GL_RGBA32F, width, height, NULL);
     if (result == SAT_OK && !g->scene_normals) result = sat__gl_texture(&g->gl, &g->scene_normals, SAT__GL_RGB32F, width, height, NULL);
     if (!pipeline_gl_check(g, result, g->gl.message)) return 0;
-    sat__gl_upload(&g->gl, g->scene_points, SAT__GL_RGB32F, width, height, points);
+    sat__gl_upload(&g->gl, g->scene_points, SAT__GL_RGBA32F, width, height, rgba);
     sat__gl_upload(&g->gl, g->scene_normals, SAT__GL_RGB32F, width, height, normals);
     if (!pipeline_gl_check(g, fiv_gl_irradiance(g->shadows, g->scene_points, g->scene_normals), fiv_gl_message(g->shadows))) return 0;
     return pipeline_gl_check(g, sat__gl_read(&g->gl, rgba, fiv_gl_texture(g->shadows), SAT__GL_RGBA32F, width, height), g->gl.message);
