@@ -27,14 +27,14 @@
      filtered by the drop's own phase function.
    - Rain from a rate: Marshall-Palmer sizes, measured speeds, wind, a drag step that is exact for any dt.
    - Streaks, depth of field, primary and secondary rainbow; occlusion by scene depth; statistics of what was left out.
-   - OpenGL 3.3 / ES 3.0: sprites or quads, and rain that falls by transform feedback.
+   - OpenGL 3.3 / ES 3.0: sprites or quads, with all of that but internal reflections; rain falls by transform feedback.
 
    WHAT IT DOES NOT
 
    - Drops do not see the scene or each other, only the environment; they do not collide, merge, splash or run down.
    - A drop that reaches the near plane, or that the eye is in, is left out (and counted).
    - Sprites (MAP, SPRITE) are still and in focus. Flattened drops have order 0 only. OpenGL draws unsorted, as published,
-     and knows no internal reflections and no flattened shapes.
+     and knows order 0 only.
    - No Airy theory: no supernumerary bows.
    - It starts no thread, opens no window, creates no OpenGL context, keeps no global state.
 
@@ -72,7 +72,8 @@
    - Environment: NaN counts as 0, infinity as the largest finite value, negative light as 0; all are counted. One texel of
      1e8 stays what it is: mips and footprints spread it, or `clamp` cuts it.
    - The same bits for any number of workers; SIMD differs from plain C in the last digits. The GPU's picture is within an
-     RMSE of 5e-4 of the CPU's (tone-mapped luminance, unsorted), its drops within 3e-4 m over tens of steps.
+     RMSE of 5e-4 of the CPU's (tone-mapped luminance, quads, unsorted, streaks, depth of field and flattened drops
+     included; 2e-4 on llvmpipe), its drops within 3e-4 m over tens of steps.
 
    COST (one core, SSE2; ratios from tests/bench/bench_raindrop.c, forest environment)
 
@@ -428,8 +429,8 @@ RAINDROP_DEF sat_result raindrop_gl_set_wind(raindrop_gl *gl, const float wind[3
 RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *drops, int count);
 
 /* Blends the drops over the bound framebuffer's viewport (0, 0, width, height), which should hold floats: row 0 is the
-   bottom one, as OpenGL has it. Unsorted, as published; looks as in raindrop_render but without internal reflections
-   and flattened shapes. depth_near > 0: the depth test is on, against a depth buffer of the
+   bottom one, as OpenGL has it. Unsorted, as published; looks as in raindrop_render but without internal
+   reflections. depth_near > 0: the depth test is on, against a depth buffer of the
    usual perspective with these planes; depth is not written. */
 RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, int width, int height, const raindrop_camera *camera,
                                            const raindrop_render_options *options, float depth_near, float depth_far);
@@ -3239,19 +3240,21 @@ RAINDROP_DEF const char *raindrop_gl_glsl(void)
     return "#ifndef RAINDROP_GLSL\n"
            "#define RAINDROP_GLSL\n"
            "struct raindrop_ray { vec3 reflected, refracted; float fresnel, transmit, footprint; };\n"
+           "void raindrop_surface(inout raindrop_ray ray, float ci, float cr, float n, bool total) {\n"
+           "    float a = (ci - n * cr) / (ci + n * cr + 1e-12), c = (n * ci - cr) / (n * ci + cr + 1e-12);\n"
+           "    float fs = total ? 1.0 : a * a, fp = total ? 1.0 : c * c, turn = (cr - ci / n) * (ci * cr + (1.0 - ci * ci) / n);\n"
+           "    ray.fresnel = 0.5 * (fs + fp);\n"
+           "    ray.transmit = 0.5 * ((1.0 - fs) * (1.0 - fs) + (1.0 - fp) * (1.0 - fp));\n"
+           "    ray.footprint = total ? 2.0 : 2.0 * sqrt(abs((1.0 / (ci + 1e-6) - 1.0 / (n * cr + 1e-6)) * turn));\n"
+           "}\n"
            "raindrop_ray raindrop_trace(vec3 d, vec3 p, float one_minus_b2, float n) {\n"
            "    raindrop_ray ray;\n"
            "    float m = clamp(one_minus_b2, 0.0, 1.0), b2 = 1.0 - m, inside = (m + (n - 1.0) * (n + 1.0)) / (n * n);\n"
            "    float ci = sqrt(m), cr = sqrt(max(inside, 0.0)), cd = ci * cr + b2 / n, sd = cr - ci / n;\n"
-           "    float a = (ci - n * cr) / (ci + n * cr + 1e-12), c = (n * ci - cr) / (n * ci + cr + 1e-12);\n"
-           "    float fs = a * a, fp = c * c;\n"
            "    bool total = inside <= 0.0 && n < 1.0;\n"
-           "    if (total) fs = fp = 1.0;\n"
            "    ray.reflected = (2.0 * b2 - 1.0) * d + 2.0 * ci * p;\n"
            "    ray.refracted = total ? ray.reflected : (1.0 - 2.0 * b2 * sd * sd) * d - 2.0 * sd * cd * p;\n"
-           "    ray.fresnel = 0.5 * (fs + fp);\n"
-           "    ray.transmit = 0.5 * ((1.0 - fs) * (1.0 - fs) + (1.0 - fp) * (1.0 - fp));\n"
-           "    ray.footprint = total ? 2.0 : 2.0 * sqrt(abs((1.0 / (ci + 1e-6) - 1.0 / (n * cr + 1e-6)) * sd * cd));\n"
+           "    raindrop_surface(ray, ci, cr, n, total);\n"
            "    return ray;\n"
            "}\n"
            "#endif\n";
@@ -3275,13 +3278,16 @@ static const char raindrop__glsl_environment[] =
     "vec3 look(vec3 d, float cone) {\n"
     "    vec3 at = fold(d);\n"
     "    float texels = 0.6 * cone * 0.5 * environment_size.x / (at.z * sqrt(at.z));\n"
-    "    float lod = clamp(log2(max(texels, 1.0)), 0.0, environment_size.y - 1.0), level = floor(lod);\n"
+    "    float lod = texels > 1.0 ? float(floatBitsToUint(texels)) * 1.1920929e-7 - 126.957 : 0.0;\n" /* raindrop__rough_log2 */
+    "    lod = clamp(lod, 0.0, environment_size.y - 1.0);\n"
+    "    float level = floor(lod);\n"
     "    vec3 fine = atlas(at.xy, level);\n"
     "    if (level + 1.0 >= environment_size.y) return fine;\n"
     "    return mix(fine, atlas(at.xy, level + 1.0), lod - level);\n"
     "}\n";
 
-/* A drop's square or streak. LOOK 0 map, 1 sprite, 2 ray, 3 auto; SOFT where drops leave streaks or are out of focus. */
+/* A drop's square or streak. LOOK 0 map, 1 sprite, 2 ray, 3 auto; SOFT where drops leave streaks or are out of focus, FLAT
+   where some are flattened. */
 static const char raindrop__glsl_draw_vertex[] =
     "layout(location = 0) in vec4 drop;\n"     /* position, radius */
     "layout(location = 1) in vec4 motion;\n"   /* velocity, axis ratio */
@@ -3289,7 +3295,7 @@ static const char raindrop__glsl_draw_vertex[] =
     "uniform vec4 view;\n"                     /* half width, half height, focal length in pixels, near distance */
     "uniform vec4 limits;\n"                   /* far radius, coverage threshold, depth planes */
     "flat out vec4 place;\n"                   /* centre in pixels, half side (sprite) or radius, focal length in radii */
-    "flat out vec3 seen;\n"                    /* centre in radii, view space, z forward */
+    "flat out vec4 seen;\n"                    /* centre in radii, view space, z forward; axis ratio */
     "flat out vec4 far_colour;\n"              /* colour, half side of the square that stands for a far drop */
     "#ifdef SOFT\n"
     "uniform vec4 shutter;\n"                  /* the camera's velocity, exposure */
@@ -3306,20 +3312,26 @@ static const char raindrop__glsl_draw_vertex[] =
     "#endif\n"
     "void main() {\n"
     "    vec3 rel = drop.xyz - eye, v = vec3(dot(rel, right), dot(rel, up), -dot(rel, back));\n"
-    "    float r = drop.w, d2 = dot(v, v), tangent2 = r * r / (d2 - r * r), stretch = sqrt(d2) / v.z;\n"
-    "    float area_radius = view.z * sqrt(tangent2 * stretch * stretch * stretch);\n"
+    "#ifdef FLAT\n"
+    "    float ratio = motion.w, r = drop.w * pow(ratio, -1.0 / 3.0);\n"
+    "#else\n"
+    "    const float ratio = 1.0;\n"
+    "    float r = drop.w;\n"
+    "#endif\n"
+    "    float d2 = dot(v, v), tangent2 = r * r / (d2 - r * r), stretch = sqrt(d2) / v.z;\n"
+    "    float area_radius = view.z * sqrt(tangent2 * ratio * stretch * stretch * stretch);\n"
     "    vec2 reach = vec2(0.0);\n"
     "    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);\n"
     "    place = vec4(0.0);\n"
-    "    seen = vec3(0.0);\n"
+    "    seen = vec4(0.0);\n"
     "    far_colour = vec4(0.0);\n"
     "#ifdef SOFT\n"
     "    path = vec4(0.0);\n"
     "#endif\n"
-    "    bool kept = r > 0.0 && d2 > 1.0001 * r * r && v.z - r > view.w && v.z > 1.0001 * r;\n"
+    "    bool kept = ratio > 0.0 && ratio <= 1.0 && r > 0.0 && d2 > 1.0001 * r * r && v.z - r > view.w && v.z > 1.0001 * r;\n"
     "    if (kept && 3.14159265 * area_radius * area_radius >= limits.y) {\n"
     "        vec2 middle = view.xy + view.z * v.xy / v.z, along = vec2(1.0, 0.0);\n"
-    "        seen = v / r;\n"
+    "        seen = vec4(v / r, ratio);\n"
     "        place = vec4(middle, area_radius, v.z / (view.z * r));\n"
     "#if LOOK < 2\n"
     "        place.z = max(view.z * sqrt(tangent2) * stretch, 0.5);\n"
@@ -3363,14 +3375,14 @@ static const char raindrop__glsl_draw_vertex[] =
 /* Two lookups a ray: what all looks share. */
 static const char raindrop__glsl_shade[] =
     "flat in vec4 place;\n"
-    "flat in vec3 seen;\n"
+    "flat in vec4 seen;\n"
     "flat in vec4 far_colour;\n"
     "uniform vec3 right, up, back;\n"
     "uniform vec4 view;\n"
     "uniform vec2 optics;\n" /* index, whether the exit has Fresnel factors */
     "layout(location = 0) out vec4 colour;\n"
     "vec3 shade(raindrop_ray ray, float blur) {\n"
-    "    float pixel = 1.0 / view.z, width = sqrt(dot(seen, seen) - 1.0) * pixel, pass = optics.y > 0.5 ? ray.transmit : 1.0 - ray.fresnel;\n"
+    "    float pixel = 1.0 / view.z, width = sqrt(dot(seen.xyz, seen.xyz) - 1.0) * pixel, pass = optics.y > 0.5 ? ray.transmit : 1.0 - ray.fresnel;\n"
     "    return ray.fresnel * look(ray.reflected, blur * (2.0 * width + pixel)) +\n"
     "           pass * look(ray.refracted, blur * abs(ray.footprint * width - pixel));\n"
     "}\n";
@@ -3389,7 +3401,7 @@ static const char raindrop__glsl_draw_sprite[] =
     "void main() {\n"
     "    vec2 st = (gl_FragCoord.xy - place.xy) / place.z;\n"
     "    if (max(abs(st.x), abs(st.y)) > 1.0) discard;\n"
-    "    float d2 = dot(seen, seen);\n"
+    "    float d2 = dot(seen.xyz, seen.xyz);\n"
     "    vec3 n = vec3(-seen.xy, seen.z) / sqrt(d2);\n"
     "    raindrop_ray ray;\n"
     "#if LOOK == 0\n"
@@ -3414,6 +3426,29 @@ static const char raindrop__glsl_draw_sprite[] =
     "#endif\n"
     "}\n";
 
+/* raindrop_trace_spheroid behind raindrop__flat_cover. */
+static const char raindrop__glsl_flat[] =
+    "#ifdef FLAT\n"
+    "float trace_flat(out raindrop_ray ray, vec3 d, vec3 p) {\n"
+    "    vec3 s = vec3(1.0, 1.0 / seen.w, 1.0), unit = d * s, q = p * s;\n"
+    "    float n = optics.x, d2 = dot(unit, unit);\n"
+    "    q -= dot(q, unit) / d2 * unit;\n"
+    "    float b = length(q) + 1e-9, slope = place.w * length(vec2(dot(q * s, right), dot(q * s, up))) / b;\n"
+    "    q *= min(1.0, 0.999 / b);\n"
+    "    vec3 hit = q - sqrt((1.0 - dot(q, q)) / d2) * unit, normal = normalize(hit * s), inner = refract(d, normal, 1.0 / n);\n"
+    "    bool total = dot(inner, inner) < 0.5;\n" /* refract then gives 0 */
+    "    ray.reflected = ray.refracted = reflect(d, normal);\n"
+    "    raindrop_surface(ray, -dot(d, normal), -dot(inner, normal), n, total);\n"
+    "    if (!total) {\n"
+    "        unit = inner * s;\n"
+    "        hit -= 2.0 * dot(hit, unit) / dot(unit, unit) * unit;\n"
+    "        ray.refracted = refract(inner, -normalize(hit * s), n);\n"
+    "        if (dot(ray.refracted, ray.refracted) < 0.5) ray.transmit = 0.0, ray.refracted = inner;\n"
+    "    }\n"
+    "    return clamp((1.0 - b) / (slope + 1e-9) + 0.5, 0.0, 1.0);\n"
+    "}\n"
+    "#endif\n";
+
 /* LOOK 2 and 3: raindrop__batch_rays, raindrop__draw_far, and with SOFT raindrop__draw_soft and raindrop__draw_far_soft. */
 static const char raindrop__glsl_draw_ray[] =
     /* the pixel's ray and the drop, `at` from the projection of the centre; returns the share of the pixel that is covered */
@@ -3422,11 +3457,12 @@ static const char raindrop__glsl_draw_ray[] =
     "    float l2 = dot(d, d), t = dot(q, d) / l2;\n"
     "    vec3 p = q - t * d;\n"
     "    float b2 = dot(p, p), b = sqrt(max(b2, 1e-12)), slope = length(p.xy * (place.w - t / view.z)) / b;\n"
-    "    d /= sqrt(l2);\n"
-    "    p *= min(1.0, 0.999 / b);\n"
-    "    d = d.x * right + d.y * up - d.z * back;\n"
+    "    d = (d.x * right + d.y * up - d.z * back) / sqrt(l2);\n"
     "    p = p.x * right + p.y * up - p.z * back;\n"
-    "    ray = raindrop_trace(d, p, max(1.0 - b2, 0.001999), optics.x);\n"
+    "#ifdef FLAT\n"
+    "    if (seen.w < 1.0) return trace_flat(ray, d, p);\n"
+    "#endif\n"
+    "    ray = raindrop_trace(d, p * min(1.0, 0.999 / b), max(1.0 - b2, 0.001999), optics.x);\n"
     "    return clamp(0.5 + (1.0 - b) / max(slope, 1e-9), 0.0, 1.0);\n"
     "}\n"
     "#ifdef SOFT\n"
@@ -3598,7 +3634,7 @@ static const char raindrop__glsl_advance[] =
 
 enum { RAINDROP__GL_TEXTURE_MIN_LOD_LINEAR = 0x2703 }; /* GL_LINEAR_MIPMAP_LINEAR */
 
-enum { RAINDROP__GL_SOFT = 1, RAINDROP__GL_KINDS = 2 }; /* sums: the kinds of drops a program knows beside still ones */
+enum { RAINDROP__GL_SOFT = 1, RAINDROP__GL_FLAT = 2, RAINDROP__GL_KINDS = 4 }; /* sums: what a program knows beside still spheres */
 
 struct raindrop_gl {
     sat__gl gl;
@@ -3608,6 +3644,7 @@ struct raindrop_gl {
     unsigned drops[2], arrays[2];     /* ping-pong buffers and their vertex arrays */
     unsigned scratch, target;         /* a texture of one texel: transform feedback needs a framebuffer of ours */
     int resolution, levels, count, capacity, front, settled, own;
+    int flat;                         /* some drops are, or will be when they come back on top */
     float n;
     uint32_t step;
     raindrop_rain_options rain;
@@ -3627,7 +3664,7 @@ RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl) { return gl 
 /* The program of a look and a kind, built when it is first asked for. */
 static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int kind)
 {
-    const char *library[3], *vertex[2], *fragment[3];
+    const char *library[3], *vertex[2], *fragment[4];
     sat__gl_shaders shaders;
     if (g->draw[look][kind]) return SAT_OK;
     memset(&shaders, 0, sizeof shaders);
@@ -3635,8 +3672,9 @@ static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int
     library[1] = raindrop__glsl_environment;
     vertex[0] = raindrop__glsl_draw_vertex;
     fragment[0] = raindrop__glsl_shade;
-    fragment[1] = look <= RAINDROP_LOOK_SPRITE ? raindrop__glsl_draw_sprite : raindrop__glsl_draw_ray;
-    library[2] = vertex[1] = fragment[2] = NULL;
+    fragment[1] = look <= RAINDROP_LOOK_SPRITE ? raindrop__glsl_draw_sprite : raindrop__glsl_flat;
+    fragment[2] = look <= RAINDROP_LOOK_SPRITE ? NULL : raindrop__glsl_draw_ray;
+    library[2] = vertex[1] = fragment[3] = NULL;
     shaders.name = "raindrop: drops";
     shaders.library = library;
     shaders.vertex = vertex;
@@ -3644,6 +3682,7 @@ static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int
     sat__gl_define(&g->gl, "LOOK", look);
     if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
     if (kind & RAINDROP__GL_SOFT) sat__gl_define(&g->gl, "SOFT", 1);
+    if (kind & RAINDROP__GL_FLAT) sat__gl_define(&g->gl, "FLAT", 1);
     return sat__gl_build(&g->gl, &g->draw[look][kind], &shaders);
 }
 
@@ -3831,6 +3870,8 @@ RAINDROP_DEF sat_result raindrop_gl_set_rain(raindrop_gl *g, const raindrop_rain
     g->front = 0;
     g->settled = rain->settled;
     g->own = rain->own;
+    g->flat = rain->options.oblate;
+    for (i = 0; i < rain->count && !g->flat; i++) g->flat = !(rain->drops[i].axis_ratio >= 1 && rain->drops[i].axis_ratio <= 1);
     g->step = rain->step;
     g->rain = rain->options;
     return result;
@@ -3958,7 +3999,7 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     sat__gl *gl;
     sat_result result;
     unsigned program;
-    int kind = 0;
+    int kind = g && g->flat ? RAINDROP__GL_FLAT : 0;
     memset(&frame, 0, sizeof frame);
     frame.camera = camera ? *camera : raindrop_camera_defaults();
     frame.options = options ? *options : raindrop_render_defaults();
