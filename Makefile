@@ -206,6 +206,7 @@ build/bench/bench_%: tests/bench/bench_%.cpp
 bench: $(BENCHES:%=out/bench/%.tsv)
 out/bench/%.tsv: build/bench/bench_% FORCE
 	@mkdir -p $(@D)
+	@echo '  bench $*' >&2
 	@QUICK='$(QUICK)' $< $(ARGS) >$@.part && mv $@.part $@ && cat $@
 .PHONY: FORCE
 FORCE:
@@ -221,6 +222,7 @@ out/bench/gpu_%.tsv: build/bench/gpu_% FORCE
 
 report:
 	@sh tests/deps.sh gnuplot-nox
+	+@$(MAKE) --no-print-directory -k -j2 $(BENCHES:%=build/bench/bench_%) || true
 	+@$(MAKE) --no-print-directory -k bench QUICK='$(QUICK)' >/dev/null || true
 	@mkdir -p out/bench report
 	@$(MAKE) --no-print-directory -s size >out/bench/size.tsv
@@ -247,7 +249,7 @@ help:
 	@echo 'make web       the demo in a browser: out/web/index.html  [needs emscripten]'
 	@echo 'make check-view the window and the page against the demo: Xvfb, headless Chromium'
 	@echo 'make report    all tables and plots in report/index.html  [QUICK=1]'
-	@echo 'make docs      put the programs of tests/test_readme.h into README.md'
+	@echo 'make docs      put the programs of tests/test_readme.h and the plots of the last bench into README.md'
 	@echo 'make data      fetch free environment maps and meshes into data/'
 	@echo 'make dist      one-file editions in dist/: each header with what it needs of sat.h inside'
 	@echo 'make install   headers and lightscan.pc                   [PREFIX=/usr/local] [DESTDIR=]'
@@ -262,10 +264,11 @@ dist/%.h: %.h sat.h tests/make_dist.awk
 	@mkdir -p dist
 	awk -f tests/make_dist.awk sat.h $< >$@
 
-# the programs in README.md, from tests/test_readme.h
+# README.md: its programs from tests/test_readme.h, its plots from the tables of the last `make bench` or `make report`
 docs:
 	@mkdir -p build
 	sh tests/readme.sh >build/README.md && cp build/README.md README.md
+	PLOTS=docs bash tests/report.sh $(wildcard $(FAMILY:%=out/bench/%.tsv)) >build/report.html
 
 # inputs for examples, into data/
 data:

@@ -12,7 +12,8 @@
        (an empty line, or the next title, ends the table)
 
    plot keys: x, y (columns); by (one colour per value of this column); where (only these rows, as in
-   where=picture:14 decades,radius:1); log (x, y or xy); style (points, lines or linespoints; points unless told).
+   where=picture:14 decades,radius:1); log (x, y or xy); style (points, lines or linespoints; points unless told); picture (the
+   name under which `make docs` keeps the plot for README.md).
    Times are ratios to a reference in the same run wherever the machine matters: bench_ratio runs A B A B ...
 
        bench_start("sat.h");

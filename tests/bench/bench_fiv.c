@@ -253,7 +253,8 @@ static void ladder(bench *b)
     for (s = 0; s < count; s++) o[s] = make(b, sets[s][0], sets[s][1], sets[s][2], FIV_STORAGE_FLOAT, 8, &precompute[s], &stats[s]);
     bench_table("A plane below the mesh: accuracy, samples and environments (figures 18 and 19; published 0.023, 0.008, 0.007; point 0.1)",
                 "mesh\tenvironment\tsamples\taccuracy\tnrmse\tpoint_us\tbrute_ratio\tprecompute_s\tvectors_mb\tmasks_mb\tdefault");
-    bench_plot("Error against time, forest and others; x=point_us; y=nrmse; by=accuracy; log=xy");
+    bench_plot("Forest: error against time; x=point_us; y=nrmse; by=accuracy; where=environment:forest; log=xy; picture=plot_fiv");
+    bench_plot("All surroundings; x=point_us; y=nrmse; by=environment; log=xy");
     bench_plot("Error against memory; x=vectors_mb; y=nrmse; by=environment; log=xy");
     bench_note("nrmse: eq 17 against rays to every texel of the light. brute_ratio: time of those rays over the time of the vectors, in this run.");
     for (e = 0; e < ENVIRONMENTS; e++) {
@@ -445,7 +446,7 @@ static void partial_occluders(bench *b)
     int s, h, i, k, a;
     bench_table("Occluders cut by the horizon: error of the part of I_tot they take (figure 23: 0.026 without, 0.019 with the factor)",
                 "mesh\tsamples\theight_radii\tno_correction\tfactor\tcap\tmasks\tcap_over_factor");
-    bench_plot("Cut occluders; x=height_radii; y=cap_over_factor; by=samples; style=lines");
+    bench_plot("Cut occluders; x=height_radii; y=cap_over_factor; by=samples; style=linespoints");
     open_environment(b, 0);
     for (s = 0; s < (bench_quick() ? 1 : 2); s++) {
         double seconds;
@@ -589,7 +590,7 @@ static void many_occluders(bench *b)
     o = make(b, 32, 17, 15, FIV_STORAGE_FLOAT, 8, &seconds, NULL);
     check(fiv_occluder_light(o, b->environment, NULL), "light");
     bench_table("Many occluders (table 3, on one core)", "occluders\tpublished_fps\tpoint_us\tpoint_us_all_kept\tleft_out_percent");
-    bench_plot("Cost of occluders; x=occluders; y=point_us; style=lines");
+    bench_plot("Cost of occluders; x=occluders; y=point_us; style=linespoints");
     for (i = 0; i < 64; i++) {
         instances[i] = instance_of(b, o);
         for (k = 0; k < 3; k += 2) instances[i].position[k] += 60 * (float)support_uniform(&seed) - 30;

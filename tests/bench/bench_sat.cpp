@@ -85,7 +85,7 @@ static void bench_build(void)
 {
     static const int sizes[] = {512, 2048, 4096, 8192};
     bench_table("Build: time against memcpy of the same traffic and against OpenCV", "kind\tside\ttime_memcpy_ratio\topencv_speedup\tbytes_a_pixel\tdefault");
-    bench_plot("Build time; x=side; y=time_memcpy_ratio; by=kind; log=x; style=lines");
+    bench_plot("Build time; x=side; y=time_memcpy_ratio; by=kind; log=x; style=linespoints");
     bench_note("opencv_speedup: time of cv::integral (float or double output) over ours; 0: OpenCV is not installed");
     for (int s = 0; s < (bench_quick() ? 2 : 4); s++) {
         int n = sizes[s];
@@ -193,19 +193,55 @@ static void bench_precision(void)
 {
     bench_table("Precision: box means against exact sums",
                 "picture\trepresentation\tside\tbox\trms_of_mean\tmax_of_mean\tmedian_relative\tp99_relative\tmax_relative\tnegative_share\ttime_memcpy_ratio\tdefault");
-    bench_plot("3 x 3 boxes of 14 decades and others: error against build time; x=time_memcpy_ratio; y=median_relative; by=representation; log=y");
+    bench_plot("Boxes of 3 x 3 in 14 decades, 2048 x 2048: error against build time; x=time_memcpy_ratio; y=median_relative; by=representation; where=picture:14 decades,box:3,side:2048; log=xy; picture=plot_sat");
+    bench_plot("The same against the size of the table; x=side; y=median_relative; by=representation; where=picture:14 decades,box:3; log=xy; style=linespoints");
+    bench_plot("Boxes of all sizes in uniform noise; x=time_memcpy_ratio; y=median_relative; by=representation; where=picture:uniform,side:2048; log=xy");
     bench_note("rms and max are of the image's mean; relative errors are of each box's own mean; fixed kinds are given boxes up to 201 x 201");
-    for (int s = 0; s < 3; s++) {
-        int n = s == 0 ? 2048 : s == 1 ? 4096 : 8192;
-        float *p;
-        if (bench_quick() && s) break;
-        p = (float *)malloc((size_t)n * (size_t)n * 4);
+    for (int n = 512; n <= (bench_quick() ? 2048 : 8192); n *= n == 512 ? 4 : 2) {
+        float *p = (float *)malloc((size_t)n * (size_t)n * 4);
         for (int which = 0; which < PICTURES; which++) {
             make_picture(p, n, which);
             for (size_t r = 0; r < sizeof representations / sizeof *representations; r++) precision_rows(p, n, picture_names[which], &representations[r]);
         }
         free(p);
     }
+}
+
+/* The picture of 14 decades squeezed into fewer. */
+static void bench_luminance_range(void)
+{
+    enum { N = 1024, SIDE = 3 };
+    static double relative[MOST];
+    float *wide = (float *)malloc(sizeof(float) * N * N), *p = (float *)malloc(sizeof(float) * N * N);
+    bench_table("Luminance range: 3 x 3 boxes of 1024 x 1024 pixels, relative to each box's own mean", "decades\trepresentation\tmedian_relative\tp99_relative\tdefault");
+    bench_plot("Error against the range of luminance; x=decades; y=p99_relative; by=representation; log=y; style=linespoints");
+    make_picture(wide, N, HDR14);
+    for (int decades = 0; decades <= 14; decades += 2) {
+        sat_image image = sat_image_f32(p, N, N, 1);
+        for (size_t i = 0; i < (size_t)N * N; i++) p[i] = powf(wide[i], (float)decades / 14);
+        for (size_t r = 0; r < sizeof representations / sizeof *representations; r++) {
+            sat_options o = sat_defaults();
+            sat_table *t;
+            uint64_t state = 1;
+            o.kind = representations[r].kind;
+            o.tile = representations[r].tile;
+            o.subtract_mean = representations[r].subtract_mean;
+            o.max_box_area = SIDE * SIDE;
+            if (sat_create(&t, N, N, 1, &o) != SAT_OK) continue;
+            sat_build(t, &image);
+            for (int i = 0; i < MOST; i++) {
+                int x = support_below(&state, N - SIDE), y = support_below(&state, N - SIDE);
+                double exact = exact_sum(p, N, x, y, x + SIDE, y + SIDE);
+                relative[i] = fabs(sat_sum(t, 0, x, y, x + SIDE, y + SIDE) - exact) / exact;
+            }
+            qsort(relative, MOST, sizeof *relative, support_compare_doubles);
+            bench_row("%d\t%s\t%.2g\t%.2g\t%d", decades, representations[r].name, relative[MOST / 2] + 1e-17, relative[MOST * 99 / 100] + 1e-17,
+                      representations[r].kind == SAT_KIND_TILED && representations[r].tile == 32);
+            sat_destroy(t);
+        }
+    }
+    free(wide);
+    free(p);
 }
 
 /* ---- lookups */
@@ -245,7 +281,7 @@ static void bench_lookups(void)
         if (sat_create(&tables[k], n, n, 1, &o) == SAT_OK) sat_build(tables[k], &image);
     }
     bench_table("Lookup: random boxes, time against the float table", "kind\tradius\ttime_ratio\tdefault");
-    bench_plot("Lookup time; x=radius; y=time_ratio; by=kind; log=x; style=lines");
+    bench_plot("Lookup time; x=radius; y=time_ratio; by=kind; log=x; style=linespoints");
     for (int r = 0; r < 6; r++) {
         uint64_t state = 9;
         for (int i = 0; i < LOOKUPS; i++) {
@@ -371,7 +407,7 @@ static void bench_scans(void)
     float *in = (float *)malloc(N * 4), *out = (float *)malloc(N * 4);
     support_fill(in, N, 0, 1, 3);
     bench_table("k-ary scans of 2^20 floats: work and time against the sequential scan", "algorithm\tk\tpasses\tadds_a_value\taccesses_a_value\tnodes_a_value\ttime_ratio\terror_ulp\tdefault");
-    bench_plot("Accesses a value; x=k; y=accesses_a_value; by=algorithm; style=lines");
+    bench_plot("Accesses a value; x=k; y=accesses_a_value; by=algorithm; style=linespoints");
     bench_note("these are the algorithms of the GPU; on a CPU the sequential scan is the fast one");
     for (int a = 1; a < 3; a++)
         for (int i = 0; i < 7; i++) {
@@ -381,7 +417,7 @@ static void bench_scans(void)
             long double exact = 0;
             work.options.algorithm = (sat_scan_algorithm)a;
             work.options.k = ks[i];
-            double ratio = bench_ratio(scan, &work, scan, &peer, bench_rounds(5)).ratio;
+            double ratio = bench_ratio(scan, &work, scan, &peer, bench_quick() ? 2 : 5).ratio;
             work.options.counters = &c;
             scan(&work);
             for (int j = 0; j < N; j++) {
@@ -407,6 +443,7 @@ int main(void)
     bench_bounds();
     bench_scans();
     bench_precision();
+    bench_luminance_range();
 #endif
     return 0;
 }

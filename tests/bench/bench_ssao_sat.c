@@ -277,8 +277,8 @@ static void error_against_time(void)
     measure_times(scores, rounds);
     bench_table("Error against time: 3 scenes x radii 0.1, 0.25, 0.6, one thread",
                 "method\ttime_ratio\trmse\tssim\trmse_held_out\trmse_other_scene\tms\tto_gtao_half_ratio\tto_ssao_ratio\tto_hbao_half_ratio\tdefault");
-    bench_plot("RMSE against time (1 = minimalist); x=time_ratio; y=rmse; by=method; log=x");
-    bench_plot("RMSE on a scene held out; x=time_ratio; y=rmse_other_scene; by=method; log=x");
+    bench_plot("RMSE against time (1 = minimalist); x=time_ratio; y=rmse; by=method; log=xy; picture=plot_ssao_sat");
+    bench_plot("RMSE on a scene held out; x=time_ratio; y=rmse_other_scene; by=method; log=xy");
     bench_note("rmse: one parameter set a method for all nine pictures. rmse_held_out: gain and power from the other two scenes. rmse_other_scene: "
                "the same parameters on a scene with other objects that nothing was fitted to.");
     for (m = 0; m < ALL; m++)
@@ -293,7 +293,7 @@ static void radius_table(void)
     static const int which[] = {0, 5, 8, OURS + REF_SSAO, OURS + REF_GTAO_HALF};
     int i, r, k, rounds = bench_rounds(5);
     bench_table("Time against radius (three scenes together)", "method\tradius\tms\tto_smallest_ratio");
-    bench_plot("Time against radius; x=radius; y=ms; by=method; style=lines");
+    bench_plot("Time against radius; x=radius; y=ms; by=method; style=linespoints");
     for (i = 0; i < 5; i++) {
         double base = 0;
         for (r = 0; r < REF_RADII; r++) {
@@ -311,9 +311,11 @@ static void radius_table(void)
 /* Slomp 2012, figure 5.16 and table 5.1: every method at sizes up to 2048; half-resolution variants as in the thesis. */
 static void resolution_table(void)
 {
-    int size, top = bench_quick() ? 512 : 2048, m;
+    static const char *const names[4] = {"traditional", "horizon-based", "refined (5.3.5)", "slabs"}, *const published[4] = {"1.71", "2.44", "1", ""};
+    int size, top = bench_quick() ? 512 : 2048, m, half_size = 0;
+    double half[4] = {0, 0, 0, 0};
     bench_table("Figure 5.16 re-made: time against resolution, scene 0, R = 0.25", "method\tsize\tms\tto_minimalist_ratio");
-    bench_plot("Time against resolution; x=size; y=ms; by=method; log=xy; style=lines");
+    bench_plot("Time against resolution; x=size; y=ms; by=method; log=xy; style=linespoints");
     for (size = 256; size <= top; size *= 2) {
         ref_scene s;
         ref_picture p;
@@ -333,18 +335,18 @@ static void resolution_table(void)
         }
         if (size == 1024 || bench_quick()) {
             method refined = methods[3];
-            double t[4];
             refined.options.half_resolution = 1;
-            t[0] = apply(&methods[OURS + REF_SSAO_HALF], &p, 0.25);
-            t[1] = apply(&methods[OURS + REF_HBAO_HALF], &p, 0.25);
-            t[2] = apply(&refined, &p, 0.25);
-            t[3] = apply(&methods[8], &p, 0.25);
-            printf("# table 5.1 at %d, all at half resolution: traditional %.1f ms, horizon-based %.1f ms, refined %.1f ms, slabs %.1f ms; to refined: "
-                   "%.2f %.2f 1 %.2f (the thesis, whole frames on its GPU: 1.71 2.44 1)\n", size, t[0] * 1e3, t[1] * 1e3, t[2] * 1e3, t[3] * 1e3,
-                   t[0] / t[2], t[1] / t[2], t[3] / t[2]);
+            half_size = size;
+            half[0] = apply(&methods[OURS + REF_SSAO_HALF], &p, 0.25);
+            half[1] = apply(&methods[OURS + REF_HBAO_HALF], &p, 0.25);
+            half[2] = apply(&refined, &p, 0.25);
+            half[3] = apply(&methods[8], &p, 0.25);
         }
         ref_free(&p);
     }
+    bench_table("Table 5.1 re-made: all at half resolution", "method\tsize\tms\tto_refined_ratio\tpublished_ratio");
+    bench_note("published: whole frames at 1024 x 1024 on a GTX 280");
+    for (m = 0; m < 4; m++) bench_row("%s\t%d\t%.2f\t%.2f\t%s", names[m], half_size, half[m] * 1e3, half[m] / half[2], published[m]);
 }
 
 typedef struct job { ssao_sat *ao; ssao_sat_input in; float *bent; } job;
@@ -463,46 +465,65 @@ static void motion_table(void)
     free(last_z);
 }
 
-/* Box means of 1/z over 17 x 17 pixels: the formats of 5.5 and 4.6 against integers modulo 2^32. */
+/* Largest error of means of 1/z over 17 x 17 pixels, in depth steps R / z^2, by table format, where R covers a pixel. */
+static double format_error(const float *z, int size, int kind)
+{
+    float *result = (float *)malloc((size_t)size * (size_t)size * 4);
+    ssao_sat_options o = ssao_sat_defaults();
+    ssao_sat_input in = ssao_sat_input_linear(z, size, size, 0.8);
+    ssao_sat *ao;
+    uint64_t state = 1;
+    double worst = 0;
+    int k;
+    o.method = SSAO_SAT_PLANE;
+    o.half_resolution = 0;
+    o.float_table = kind;
+    o.max_pixels = 8;
+    if (ssao_sat_create(&ao, size, size, &o) != SAT_OK || ssao_sat_apply(ao, result, 0, &in, NULL) != SAT_OK) exit(1);
+    for (k = 0; k < 4000; k++) {
+        int x = support_below(&state, size - 17), y = support_below(&state, size - 17), u, v;
+        ssao_sat__region r;
+        double sum = 0, centre = (double)z[(size_t)(y + 8) * (size_t)size + (size_t)(x + 8)];
+        ssao_sat_stats stats;
+        if (!(0.25 * 0.5 * size / tan(0.4) > centre)) continue;
+        memset(&stats, 0, sizeof stats);
+        ssao_sat__set_region(&r, ao, (float)x + 8.5f, (float)y + 8.5f, 8.5f, 8.5f);
+        ssao_sat__look_up(&r, ao, 4, 0, &stats);
+        for (v = r.y[0]; v < r.y[4]; v++)
+            for (u = r.x[0]; u < r.x[4]; u++) sum += 1 / (double)z[(size_t)v * (size_t)size + (size_t)u];
+        sum /= (r.x[4] - r.x[0]) * (r.y[4] - r.y[0]);
+        worst = fmax(worst, fabs((double)ssao_sat__mean(&r, ao, 0, 0, 4, 4) - sum) * centre * centre / 0.25);
+    }
+    ssao_sat_destroy(ao);
+    free(result);
+    return worst;
+}
+
+/* The formats of 5.5 and 4.6 against integers modulo 2^32: larger tables, and deeper scenes. */
 static void format_table(void)
 {
     static const char *const names[] = {"uint32 modulo 2^32", "float", "float less mean"};
-    int size, kind;
+    int size, kind, decades;
     bench_table("Largest error of a box mean of 1/z, in units of one depth step R / z^2, R = 0.25 (1/10 shows)", "table\tsize\tlargest_error");
-    bench_plot("Table formats; x=size; y=largest_error; by=table; log=xy; style=lines");
-    for (size = 512; size <= (bench_quick() ? 512 : 4096); size *= 2)
+    bench_plot("Table formats; x=size; y=largest_error; by=table; log=xy; style=linespoints");
+    for (size = 128; size <= (bench_quick() ? 512 : 4096); size *= 2)
         for (kind = 0; kind < 3; kind++) {
             size_t n = (size_t)size * (size_t)size, i;
-            float *z = (float *)malloc(n * 4), *result = (float *)malloc(n * 4);
-            ssao_sat_options o = ssao_sat_defaults();
-            ssao_sat_input in = ssao_sat_input_linear(z, size, size, 0.8);
-            ssao_sat *ao;
-            uint64_t state = 1;
-            double worst = 0;
-            int k;
+            float *z = (float *)malloc(n * 4);
             for (i = 0; i < n; i++) z[i] = pictures[0].z[(i / (size_t)size) % (size_t)side * (size_t)side + (i % (size_t)size) % (size_t)side];
-            o.method = SSAO_SAT_PLANE;
-            o.half_resolution = 0;
-            o.float_table = kind;
-            o.max_pixels = 8;
-            if (ssao_sat_create(&ao, size, size, &o) != SAT_OK || ssao_sat_apply(ao, result, 0, &in, NULL) != SAT_OK) exit(1);
-            for (k = 0; k < 4000; k++) {
-                int x = support_below(&state, size - 17), y = support_below(&state, size - 17), u, v;
-                ssao_sat__region r;
-                double sum = 0, centre = (double)z[(size_t)(y + 8) * (size_t)size + (size_t)(x + 8)];
-                ssao_sat_stats stats;
-                memset(&stats, 0, sizeof stats);
-                ssao_sat__set_region(&r, ao, (float)x + 8.5f, (float)y + 8.5f, 8.5f, 8.5f);
-                ssao_sat__look_up(&r, ao, 4, 0, &stats);
-                for (v = r.y[0]; v < r.y[4]; v++)
-                    for (u = r.x[0]; u < r.x[4]; u++) sum += 1 / (double)z[(size_t)v * (size_t)size + (size_t)u];
-                sum /= (r.x[4] - r.x[0]) * (r.y[4] - r.y[0]);
-                worst = fmax(worst, fabs((double)ssao_sat__mean(&r, ao, 0, 0, 4, 4) - sum) * centre * centre / 0.25);
-            }
-            bench_row("%s\t%d\t%.2e", names[kind], size, worst);
-            ssao_sat_destroy(ao);
+            bench_row("%s\t%d\t%.2e", names[kind], size, format_error(z, size, kind));
             free(z);
-            free(result);
+        }
+    bench_table("The same against the range of depth: 512 x 512 pixels, the farthest so many decades behind the nearest", "table\tdecades\tlargest_error");
+    bench_plot("Table formats; x=decades; y=largest_error; by=table; log=y; style=linespoints");
+    for (decades = 1; decades <= 6; decades++)
+        for (kind = 0; kind < 3; kind++) {
+            float *z = (float *)malloc(512 * 512 * 4);
+            uint64_t state = 7;
+            int i;
+            for (i = 0; i < 512 * 512; i++) z[i] = powf(10, (float)decades * ((float)(i / 512) / 511 * 0.9f + 0.1f * (float)support_uniform(&state)));
+            bench_row("%s\t%d\t%.2e", names[kind], decades, format_error(z, 512, kind));
+            free(z);
         }
 }
 

@@ -209,7 +209,7 @@ static void published_table(int sizes)
     int i, j;
     bench_table("Generation of a table on the GPU, R32F (Slomp 2012, table 4.1)",
                 "number\twidth\theight\tk\tRD_ms\tBT_ms\tRD_BT_ratio\tcompute_ms\tRD_error\tBT_error");
-    bench_plot("Recursive doubling and balanced tree; x=number; y=RD_BT_ratio; by=k; style=lines");
+    bench_plot("Recursive doubling and balanced tree; x=number; y=RD_BT_ratio; by=k; style=linespoints");
     bench_note("RD recursive doubling, BT balanced tree, compute: the tree with a compute shader for the way down;"
                " errors: median relative error of 11 x 11 box sums, pixels uniform in [0, 1]");
     for (j = 0; j < 4; j++) {

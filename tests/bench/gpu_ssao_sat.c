@@ -241,7 +241,7 @@ int main(void)
     bench_row("ratio to SAT refined\t%.2f\t%.2f\t1\t%.2f\t%.2f", t[table][0] / t[table][4], t[table][1] / t[table][4], t[table][6] / t[table][4], t[table][5] / t[table][4]);
     bench_row("ratio in the thesis\t1.71\t2.44\t1\t\t");
     bench_table("Figure 5.16 on the GPU: time against resolution, scene 0, R = 0.25", "method\tsize\tms\tto_traditional_ratio");
-    bench_plot("Time against resolution; x=size; y=ms; by=method; log=xy; style=lines");
+    bench_plot("Time against resolution; x=size; y=ms; by=method; log=xy; style=linespoints");
     for (k = 0; k < METHODS; k++)
         for (i = 0; i < count; i++) bench_row("%s\t%d\t%.4f\t%.2f", names[k], sizes[i], t[i][k], t[i][k] / t[i][0]);
     sat__gl_close(&gpu);
