@@ -429,9 +429,10 @@ RAINDROP_DEF sat_result raindrop_gl_set_wind(raindrop_gl *gl, const float wind[3
 RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *drops, int count);
 
 /* Blends the drops over the bound framebuffer's viewport (0, 0, width, height), which should hold floats: row 0 is the
-   bottom one, as OpenGL has it. Unsorted, as published; looks as in raindrop_render but without internal
-   reflections. depth_near > 0: the depth test is on, against a depth buffer of the
-   usual perspective with these planes; depth is not written. */
+   bottom one, as OpenGL has it. Unsorted, as published; looks, streaks and depth of field as in
+   raindrop_render, without internal reflections. The first picture with streaks or a lens, and the first of flattened
+   drops, compile a program. depth_near > 0: the depth test is on, against a depth buffer of the usual perspective with
+   these planes; depth is not written. */
 RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, int width, int height, const raindrop_camera *camera,
                                            const raindrop_render_options *options, float depth_near, float depth_far);
 
