@@ -15,7 +15,7 @@ static sat_image test_sky(float *pixels, float sun)
     int x, y, c;
     for (y = 0; y < SKY_HEIGHT; y++)
         for (x = 0; x < SKY_WIDTH; x++) {
-            double v = (y + 0.5) / SKY_HEIGHT, u = (x + 0.5) / SKY_WIDTH;
+            double v = (y + 0.5) / (double)SKY_HEIGHT, u = (x + 0.5) / (double)SKY_WIDTH;
             for (c = 0; c < 3; c++) {
                 double light = v < 0.5 ? 1 + 4 * exp(-30 * ((u - 0.3) * (u - 0.3) + (v - 0.25) * (v - 0.25)) * (1 + 0.5 * c)) : 0.2;
                 pixels[3 * (y * SKY_WIDTH + x) + c] = (float)(light * (1 + 0.3 * sin(9 * u + c)) * (0.6 + 0.2 * c));
@@ -172,8 +172,8 @@ TEST(orientation_of_the_image)
     static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
     sat_image image = sat_image_f32(pixels, SKY_WIDTH, SKY_HEIGHT, 3);
     int x = 100, y = 20, k;
-    double u = (x + 0.5) / SKY_WIDTH, v = (y + 0.5) / SKY_HEIGHT, a = 6.283185307179586 * (u - 0.5), b = 3.141592653589793 * v;
-    double d[3], solid = 6.283185307179586 / SKY_WIDTH * (cos(3.141592653589793 * y / SKY_HEIGHT) - cos(3.141592653589793 * (y + 1) / SKY_HEIGHT));
+    double u = (x + 0.5) / (double)SKY_WIDTH, v = (y + 0.5) / (double)SKY_HEIGHT, a = 6.283185307179586 * (u - 0.5), b = 3.141592653589793 * v;
+    double d[3], solid = 6.283185307179586 / (double)SKY_WIDTH * (cos(3.141592653589793 * y / (double)SKY_HEIGHT) - cos(3.141592653589793 * (y + 1) / (double)SKY_HEIGHT));
     fiv_environment *e = NULL;
     fiv_environment_stats stats;
     float direction[3], power[3], normal[3], rgb[3];
