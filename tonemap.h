@@ -1908,9 +1908,10 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
         size_t at = (size_t)x * (size_t)channels;
         float *as_float = (float *)(void *)row + at;
         n = sat__min_int(TONEMAP__CHUNK, map->width - x);
-        i = 0;
 #ifdef SAT__VECTOR
         i = tonemap__shade_vector(v, pixels, channels, luminance, w->local, rho, floor, x, n, &w->stats.clamped);
+#else
+        i = 0;
 #endif
         tonemap__shade_plain(v, pixels, channels, luminance, w->local, rho, floor, x, i, n, &w->stats.clamped);
         if (channels == 4) /* alpha: before the colours, which may overwrite the input */
