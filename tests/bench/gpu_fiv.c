@@ -18,7 +18,7 @@ static int software, size;
 static fiv_environment *environment;
 static fiv_occluder *occluders[KINDS];
 static fiv_occluder_stats stats[KINDS];
-static size_t vertices[KINDS];
+static reference_mesh meshes[KINDS];
 
 static int succeeded(sat_result result, const char *message)
 {
@@ -54,25 +54,27 @@ static int open_occluder(int kind)
         for (i = 0; i < 3 * m.triangles; i++) m.indices[i] = (unsigned)file.indices[i];
         free(file.indices);
     }
-    vertices[kind] = m.vertices;
+    meshes[kind] = m;
     o.threads = support_threads(8);
     if (!succeeded(fiv_occluder_create(&occluders[kind], m.positions, m.vertices, m.indices, m.triangles, &o, &stats[kind]), "occluder")) return 0;
-    reference_mesh_free(&m);
     return succeeded(fiv_occluder_light(occluders[kind], environment, NULL), "light");
 }
 
-/* Points of a plane, in the order of its pixels. */
-static int open_receivers(sat__gl *gl, unsigned textures[2])
+/* Points of a plane, in the order of its pixels; or the vertices of the first mesh, with `alpha`, and normals away from its middle. */
+static int open_receivers(sat__gl *gl, unsigned textures[2], int on_mesh, float alpha)
 {
     float *points = (float *)malloc((size_t)size * (size_t)size * 4 * sizeof *points), *normals = (float *)calloc((size_t)size * (size_t)size * 4, sizeof *normals);
     sat__gl_state state;
     sat_result r;
-    int i;
+    int i, k;
     if (!points || !normals) return 0;
     for (i = 0; i < size * size; i++) {
         points[4 * i] = 16 * ((float)(i % size) / (float)size - 0.5f), points[4 * i + 1] = -0.8f;
-        points[4 * i + 2] = 16 * ((float)(i / size) / (float)size - 0.5f), points[4 * i + 3] = 1;
+        points[4 * i + 2] = 16 * ((float)(i / size) / (float)size - 0.5f);
         normals[4 * i + 1] = 1;
+        for (k = 0; on_mesh && k < 3; k++)
+            normals[4 * i + k] = points[4 * i + k] = (meshes[0].positions[3 * ((size_t)i % meshes[0].vertices) + (size_t)k] - stats[0].centre[k]) / stats[0].radius;
+        points[4 * i + 3] = alpha;
     }
     sat__gl_begin(gl, &state, 1);
     r = sat__gl_texture(gl, &textures[0], SAT__GL_RGBA32F, size, size, points);
@@ -103,6 +105,30 @@ static double pass_time(fiv_gl *g, const unsigned textures[2])
     return support_median(t, rounds);
 }
 
+/* Receivers on a bunny, taken for the surface of nothing and for its own. */
+static void self_row(void)
+{
+    fiv_instance instance;
+    fiv_gl_options o = fiv_gl_defaults();
+    fiv_gl *g = NULL;
+    double seconds[2] = {0, 0};
+    int k, self, ok;
+    instance.occluder = occluders[0];
+    instance.scale = 1 / stats[0].radius;
+    for (k = 0; k < 3; k++) instance.position[k] = -stats[0].centre[k] * instance.scale;
+    o.max_instances = o.self = 1;
+    ok = succeeded(fiv_gl_create(&g, context.get_proc, size, size, &o), fiv_gl_message(g)) &&
+         succeeded(fiv_gl_set_scene(g, environment, &instance, 1), fiv_gl_message(g));
+    for (self = 0; ok && self < 2; self++) {
+        unsigned textures[2] = {0, 0};
+        ok = open_receivers(&g->gl, textures, 1, (float)(1 + self));
+        if (ok) seconds[self] = pass_time(g, textures);
+        g->gl.DeleteTextures(2, textures);
+    }
+    if (ok) bench_row("1 bunny\t%.3f\t%.3f\t%.2f", 1e3 * seconds[0], 1e3 * seconds[1], seconds[1] / seconds[0]);
+    fiv_gl_destroy(g);
+}
+
 static int scene_row(const char *name, int count, int kinds, double fps)
 {
     fiv_instance instances[64];
@@ -118,11 +144,11 @@ static int scene_row(const char *name, int count, int kinds, double fps)
         instances[i].occluder = occluders[kind];
         instances[i].scale = 1 / stats[kind].radius;
         for (k = 0; k < 3; k++) instances[i].position[k] = -stats[kind].centre[k] * instances[i].scale + (k == 1 || count == 1 ? 0 : 14 * (float)support_uniform(&seed) - 7);
-        total += vertices[kind];
+        total += meshes[kind].vertices;
     }
     for (k = 0; k < kinds; k++) memory += 1e-6 * (double)stats[k].table_bytes;
     o.max_instances = count;
-    ok = succeeded(fiv_gl_create(&g, context.get_proc, size, size, &o), fiv_gl_message(g)) && open_receivers(&g->gl, textures);
+    ok = succeeded(fiv_gl_create(&g, context.get_proc, size, size, &o), fiv_gl_message(g)) && open_receivers(&g->gl, textures, 0, 1);
     if (ok) {
         ok = succeeded(fiv_gl_set_scene(g, environment, instances, (size_t)count), fiv_gl_message(g));
         g->gl.Finish();
@@ -158,7 +184,9 @@ int main(void)
     bench_plot("Frames a second; x=objects; y=fps; log=xy");
     for (i = 0; scenes[i].name && !(bench_quick() && i > 3); i++) scene_row(scenes[i].name, scenes[i].count, scenes[i].kinds, scenes[i].fps);
     printf("# note: %d x %d pixels; upload: all vectors again, after a new light\n", size, size);
-    for (i = 0; i < KINDS; i++) fiv_occluder_destroy(occluders[i]);
+    bench_table("Self-shadows: receivers on the mesh, as on another object's surface and as on its own (eq 13)", "scene\tother_ms\tself_ms\tself_ratio");
+    self_row();
+    for (i = 0; i < KINDS; i++) fiv_occluder_destroy(occluders[i]), reference_mesh_free(&meshes[i]);
     fiv_environment_destroy(environment);
     gl_context_close(&context);
     return 0;
