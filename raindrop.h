@@ -3776,13 +3776,14 @@ RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *g)
 {
     sat_allocator memory;
     sat__gl *gl;
-    int i;
+    int i, kind;
     if (!g) return;
     gl = &g->gl;
     memory = g->allocator;
     if (gl->vertex_array) { /* the context was good enough to open */
-        for (i = 0; i < 4 * RAINDROP__GL_KINDS; i++)
-            if (g->draw[i / RAINDROP__GL_KINDS][i % RAINDROP__GL_KINDS]) gl->DeleteProgram(g->draw[i / RAINDROP__GL_KINDS][i % RAINDROP__GL_KINDS]);
+        for (i = 0; i < 4; i++)
+            for (kind = 0; kind < RAINDROP__GL_KINDS; kind++)
+                if (g->draw[i][kind]) gl->DeleteProgram(g->draw[i][kind]);
         if (g->advance) gl->DeleteProgram(g->advance);
         if (g->target) gl->DeleteFramebuffers(1, &g->target);
         gl->DeleteTextures(1, &g->scratch);
@@ -4012,7 +4013,7 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     if (frame.options.look == RAINDROP_LOOK_MAP && !g->options.map) return SAT_ERR_ARGUMENT;
     if (!g->count) return SAT_OK;
     if (!raindrop__is_sprite(&frame) && (frame.camera.exposure > 0 || frame.camera.aperture > 0)) kind |= RAINDROP__GL_SOFT;
-    result = raindrop__gl_draw_program(g, frame.options.look, kind);
+    result = raindrop__gl_draw_program(g, (int)frame.options.look, kind);
     if (result != SAT_OK) return result;
     gl = &g->gl;
     program = g->draw[frame.options.look][kind];
