@@ -3240,22 +3240,24 @@ RAINDROP_DEF const char *raindrop_gl_glsl(void)
 {
     return "#ifndef RAINDROP_GLSL\n"
            "#define RAINDROP_GLSL\n"
-           "struct raindrop_ray { vec3 reflected, refracted; float fresnel, transmit, footprint; };\n"
+           "struct raindrop_ray { vec3 reflected, refracted; float fresnel, transmit, footprint; vec2 polarised, turn; };\n"
            "void raindrop_surface(inout raindrop_ray ray, float ci, float cr, float n, bool total) {\n"
            "    float a = (ci - n * cr) / (ci + n * cr + 1e-12), c = (n * ci - cr) / (n * ci + cr + 1e-12);\n"
-           "    float fs = total ? 1.0 : a * a, fp = total ? 1.0 : c * c, turn = (cr - ci / n) * (ci * cr + (1.0 - ci * ci) / n);\n"
-           "    ray.fresnel = 0.5 * (fs + fp);\n"
-           "    ray.transmit = 0.5 * ((1.0 - fs) * (1.0 - fs) + (1.0 - fp) * (1.0 - fp));\n"
-           "    ray.footprint = total ? 2.0 : 2.0 * sqrt(abs((1.0 / (ci + 1e-6) - 1.0 / (n * cr + 1e-6)) * turn));\n"
+           "    float b2 = 1.0 - ci * ci, cd = ci * cr + b2 / n, sd = cr - ci / n;\n"
+           "    vec2 f = total ? vec2(1.0) : vec2(a * a, c * c), enter = 1.0 - f;\n"
+           "    ray.turn = vec2(1.0 - 2.0 * b2 * sd * sd, 2.0 * sd * cd);\n"
+           "    ray.polarised = f;\n"
+           "    ray.fresnel = 0.5 * (f.x + f.y);\n"
+           "    ray.transmit = 0.5 * dot(enter, enter);\n"
+           "    ray.footprint = total ? 2.0 : sqrt(abs(2.0 * (1.0 / (ci + 1e-6) - 1.0 / (n * cr + 1e-6)) * ray.turn.y));\n"
            "}\n"
            "raindrop_ray raindrop_trace(vec3 d, vec3 p, float one_minus_b2, float n) {\n"
            "    raindrop_ray ray;\n"
            "    float m = clamp(one_minus_b2, 0.0, 1.0), b2 = 1.0 - m, inside = (m + (n - 1.0) * (n + 1.0)) / (n * n);\n"
-           "    float ci = sqrt(m), cr = sqrt(max(inside, 0.0)), cd = ci * cr + b2 / n, sd = cr - ci / n;\n"
            "    bool total = inside <= 0.0 && n < 1.0;\n"
-           "    ray.reflected = (2.0 * b2 - 1.0) * d + 2.0 * ci * p;\n"
-           "    ray.refracted = total ? ray.reflected : (1.0 - 2.0 * b2 * sd * sd) * d - 2.0 * sd * cd * p;\n"
-           "    raindrop_surface(ray, ci, cr, n, total);\n"
+           "    raindrop_surface(ray, sqrt(m), sqrt(max(inside, 0.0)), n, total);\n"
+           "    ray.reflected = (2.0 * b2 - 1.0) * d + 2.0 * sqrt(m) * p;\n"
+           "    ray.refracted = total ? ray.reflected : ray.turn.x * d - ray.turn.y * p;\n"
            "    return ray;\n"
            "}\n"
            "#endif\n";
@@ -3382,10 +3384,13 @@ static const char raindrop__glsl_shade[] =
     "uniform vec4 view;\n"
     "uniform vec2 optics;\n" /* index, whether the exit has Fresnel factors */
     "layout(location = 0) out vec4 colour;\n"
+    "float pixel_width() { return sqrt(dot(seen.xyz, seen.xyz) - 1.0) / view.z; }\n" /* in radii */
+    "vec3 mirrored(raindrop_ray ray, float blur) {\n"
+    "    return ray.fresnel * look(ray.reflected, blur * (2.0 * pixel_width() + 1.0 / view.z));\n"
+    "}\n"
     "vec3 shade(raindrop_ray ray, float blur) {\n"
-    "    float pixel = 1.0 / view.z, width = sqrt(dot(seen.xyz, seen.xyz) - 1.0) * pixel, pass = optics.y > 0.5 ? ray.transmit : 1.0 - ray.fresnel;\n"
-    "    return ray.fresnel * look(ray.reflected, blur * (2.0 * width + pixel)) +\n"
-    "           pass * look(ray.refracted, blur * abs(ray.footprint * width - pixel));\n"
+    "    float pass = optics.y > 0.5 ? ray.transmit : 1.0 - ray.fresnel;\n"
+    "    return mirrored(ray, blur) + pass * look(ray.refracted, blur * abs(ray.footprint * pixel_width() - 1.0 / view.z));\n"
     "}\n";
 
 /* LOOK 0 and 1. */
@@ -3427,6 +3432,38 @@ static const char raindrop__glsl_draw_sprite[] =
     "#endif\n"
     "}\n";
 
+/* raindrop__large_colour and raindrop__add_orders. */
+static const char raindrop__glsl_orders[] =
+    "#ifdef ORDERS\n"
+    "uniform vec2 orders;\n" /* their number, radius in pixels from which drops have them */
+    "vec3 add_orders(vec3 d, vec3 p, float m) {\n"
+    "    raindrop_ray ray = raindrop_trace(d, p, m, optics.x);\n"
+    "    float n = optics.x, b2 = 1.0 - m, cr = sqrt(max((m + (n - 1.0) * (n + 1.0)) / (n * n), 0.0));\n"
+    "    vec2 turn = ray.turn, once = vec2(2.0 * b2 / (n * n) - 1.0, 2.0 * cr / n), enter = 1.0 - ray.polarised, inside = enter;\n"
+    "    vec3 sum = mirrored(ray, 1.0);\n"
+    "    for (int k = 0; k <= int(orders.x); k++) {\n"
+    "        vec2 leave = k == int(orders.x) && optics.y < 0.5 ? vec2(1.0) : enter;\n"
+    "        float footprint = sqrt(abs(2.0 * (1.0 / (sqrt(m) + 1e-6) - float(k + 1) / (n * cr + 1e-6)) * turn.y));\n"
+    "        sum += 0.5 * dot(inside, leave) * look(turn.x * d - turn.y * p, abs(footprint * pixel_width() - 1.0 / view.z));\n"
+    "        turn = vec2(turn.x * once.x - b2 * turn.y * once.y, turn.y * once.x + turn.x * once.y);\n"
+    "        inside *= ray.polarised;\n"
+    "    }\n"
+    "    return sum;\n"
+    "}\n"
+    "vec3 large_colour(vec3 d, vec3 p, float m) {\n" /* four rays at the rim */
+    "    float b = sqrt(1.0 - m), width = pixel_width(), taps = 0.0;\n"
+    "    if (1.0 - b > 3.0 * width || width > 0.25) return add_orders(d, p, m);\n"
+    "    vec3 sum = vec3(0.0);\n"
+    "    for (int j = 0; j < 4; j++) {\n"
+    "        float at = b + (0.25 * float(j) - 0.375) * width;\n"
+    "        if (at >= 1.0 || at <= 0.0) continue;\n"
+    "        sum += add_orders(d, p * (at / b), (1.0 - at) * (1.0 + at));\n"
+    "        taps += 1.0;\n"
+    "    }\n"
+    "    return sum / taps;\n"
+    "}\n"
+    "#endif\n";
+
 /* raindrop_trace_spheroid behind raindrop__flat_cover. */
 static const char raindrop__glsl_flat[] =
     "#ifdef FLAT\n"
@@ -3452,19 +3489,27 @@ static const char raindrop__glsl_flat[] =
 
 /* LOOK 2 and 3: raindrop__batch_rays, raindrop__draw_far, and with SOFT raindrop__draw_soft and raindrop__draw_far_soft. */
 static const char raindrop__glsl_draw_ray[] =
-    /* the pixel's ray and the drop, `at` from the projection of the centre; returns the share of the pixel that is covered */
-    "float trace(out raindrop_ray ray, vec2 at) {\n"
+    /* the pixel's ray through the drop whose centre is projected `at` from here; cover: the share of the pixel it takes */
+    "struct fragment { raindrop_ray ray; vec3 d, p; float one_minus_b2, cover; };\n"
+    "fragment trace(vec2 at) {\n"
+    "    fragment f;\n"
     "    vec3 d = vec3((gl_FragCoord.xy - view.xy) / view.z, 1.0), q = vec3(at * place.w, 0.0);\n"
     "    float l2 = dot(d, d), t = dot(q, d) / l2;\n"
     "    vec3 p = q - t * d;\n"
     "    float b2 = dot(p, p), b = sqrt(max(b2, 1e-12)), slope = length(p.xy * (place.w - t / view.z)) / b;\n"
-    "    d = (d.x * right + d.y * up - d.z * back) / sqrt(l2);\n"
-    "    p = p.x * right + p.y * up - p.z * back;\n"
+    "    f.d = (d.x * right + d.y * up - d.z * back) / sqrt(l2);\n"
+    "    f.p = p.x * right + p.y * up - p.z * back;\n"
     "#ifdef FLAT\n"
-    "    if (seen.w < 1.0) return trace_flat(ray, d, p);\n"
+    "    if (seen.w < 1.0) {\n"
+    "        f.cover = trace_flat(f.ray, f.d, f.p);\n"
+    "        return f;\n"
+    "    }\n"
     "#endif\n"
-    "    ray = raindrop_trace(d, p * min(1.0, 0.999 / b), max(1.0 - b2, 0.001999), optics.x);\n"
-    "    return clamp(0.5 + (1.0 - b) / max(slope, 1e-9), 0.0, 1.0);\n"
+    "    f.p *= min(1.0, 0.999 / b);\n"
+    "    f.one_minus_b2 = max(1.0 - b2, 0.001999);\n"
+    "    f.ray = raindrop_trace(f.d, f.p, f.one_minus_b2, optics.x);\n"
+    "    f.cover = clamp(0.5 + (1.0 - b) / max(slope, 1e-9), 0.0, 1.0);\n"
+    "    return f;\n"
     "}\n"
     "#ifdef SOFT\n"
     "flat in vec4 path;\n"
@@ -3490,17 +3535,13 @@ static const char raindrop__glsl_draw_ray[] =
     "    int samples = !moves ? 1 : r < 6.0 ? 4 : r < 24.0 ? 8 : 16;\n"
     "    float blur = 2.0 * path.z + (moves ? max(min(2.0 * r, length1) / float(samples), 1.0) : 1.0);\n"
     "    vec3 sum = vec3(0.0);\n"
-    "    for (int j = 0; j < samples; j++) {\n"
-    "        raindrop_ray ray;\n"
-    "        trace(ray, at - along * mix(from, to, (float(j) + 0.5) / float(samples)));\n"
-    "        sum += shade(ray, blur);\n"
-    "    }\n"
+    "    for (int j = 0; j < samples; j++)\n"
+    "        sum += shade(trace(at - along * mix(from, to, (float(j) + 0.5) / float(samples))).ray, blur);\n"
     "    colour.rgb = sum / float(samples);\n"
     "}\n"
     "#endif\n"
     "void main() {\n"
     "    vec2 at = gl_FragCoord.xy - place.xy;\n"
-    "    raindrop_ray ray;\n"
     "#ifdef SOFT\n"
     "    if (path.w > 0.0) {\n"
     "        draw_soft(at);\n"
@@ -3513,9 +3554,13 @@ static const char raindrop__glsl_draw_ray[] =
     "        colour = vec4(far_colour.rgb, cut.x * cut.y);\n"
     "        return;\n"
     "    }\n"
-    "    float alpha = trace(ray, at);\n"
-    "    if (alpha <= 0.0) discard;\n"
-    "    colour = vec4(shade(ray, 1.0), alpha);\n"
+    "    fragment f = trace(at);\n"
+    "    if (f.cover <= 0.0) discard;\n"
+    "#ifdef ORDERS\n"
+    "    if (place.z >= orders.y && seen.w >= 1.0) colour = vec4(large_colour(f.d, f.p, f.one_minus_b2), f.cover);\n"
+    "    else\n"
+    "#endif\n"
+    "    colour = vec4(shade(f.ray, 1.0), f.cover);\n"
     "}\n";
 
 /* raindrop__step and raindrop__reenter in floats. */
@@ -3635,7 +3680,8 @@ static const char raindrop__glsl_advance[] =
 
 enum { RAINDROP__GL_TEXTURE_MIN_LOD_LINEAR = 0x2703 }; /* GL_LINEAR_MIPMAP_LINEAR */
 
-enum { RAINDROP__GL_SOFT = 1, RAINDROP__GL_FLAT = 2, RAINDROP__GL_KINDS = 4 }; /* sums: what a program knows beside still spheres */
+/* What a program knows beside still spheres that do without internal reflections: sums. */
+enum { RAINDROP__GL_SOFT = 1, RAINDROP__GL_FLAT = 2, RAINDROP__GL_ORDERS = 4, RAINDROP__GL_KINDS = 8 };
 
 struct raindrop_gl {
     sat__gl gl;
@@ -3665,7 +3711,7 @@ RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl) { return gl 
 /* The program of a look and a kind, built when it is first asked for. */
 static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int kind)
 {
-    const char *library[3], *vertex[2], *fragment[4];
+    const char *library[3], *vertex[2], *fragment[5];
     sat__gl_shaders shaders;
     if (g->draw[look][kind]) return SAT_OK;
     memset(&shaders, 0, sizeof shaders);
@@ -3673,9 +3719,10 @@ static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int
     library[1] = raindrop__glsl_environment;
     vertex[0] = raindrop__glsl_draw_vertex;
     fragment[0] = raindrop__glsl_shade;
-    fragment[1] = look <= RAINDROP_LOOK_SPRITE ? raindrop__glsl_draw_sprite : raindrop__glsl_flat;
-    fragment[2] = look <= RAINDROP_LOOK_SPRITE ? NULL : raindrop__glsl_draw_ray;
-    library[2] = vertex[1] = fragment[3] = NULL;
+    fragment[1] = look <= RAINDROP_LOOK_SPRITE ? raindrop__glsl_draw_sprite : raindrop__glsl_orders;
+    fragment[2] = look <= RAINDROP_LOOK_SPRITE ? NULL : raindrop__glsl_flat;
+    fragment[3] = raindrop__glsl_draw_ray;
+    library[2] = vertex[1] = fragment[4] = NULL;
     shaders.name = "raindrop: drops";
     shaders.library = library;
     shaders.vertex = vertex;
@@ -3684,6 +3731,7 @@ static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int
     if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
     if (kind & RAINDROP__GL_SOFT) sat__gl_define(&g->gl, "SOFT", 1);
     if (kind & RAINDROP__GL_FLAT) sat__gl_define(&g->gl, "FLAT", 1);
+    if (kind & RAINDROP__GL_ORDERS) sat__gl_define(&g->gl, "ORDERS", 1);
     return sat__gl_build(&g->gl, &g->draw[look][kind], &shaders);
 }
 
@@ -3983,6 +4031,7 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
     v[3] = camera->exposure;
     sat__gl_set_float4(gl, program, "shutter", v);
     sat__gl_set_float2(gl, program, "lens", camera->aperture, camera->focus_distance);
+    sat__gl_set_float2(gl, program, "orders", (float)frame->options.orders, frame->options.orders_radius);
     sat__gl_set_float2(gl, program, "optics", g->n, (float)(frame->options.exit_fresnel != 0));
     sat__gl_set_float2(gl, program, "environment_size", (float)g->resolution, (float)g->levels);
     sat__gl_set_texture(gl, program, "environment", 0, g->environment);
@@ -4009,10 +4058,12 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     frame.height = height;
     if (!g || !g->environment || !g->drops[0] || width < 1 || height < 1 || width > 32768 || height > 32768) return SAT_ERR_ARGUMENT;
     if (!raindrop__camera_is_valid(&frame.camera) || (unsigned)frame.options.look > RAINDROP_LOOK_AUTO) return SAT_ERR_ARGUMENT;
+    if (frame.options.orders < 0 || frame.options.orders > 3 || !(frame.options.orders_radius >= 0)) return SAT_ERR_ARGUMENT;
     if (!(depth_near >= 0) || (depth_near > 0 && !(depth_far > depth_near))) return SAT_ERR_ARGUMENT;
     if (frame.options.look == RAINDROP_LOOK_MAP && !g->options.map) return SAT_ERR_ARGUMENT;
     if (!g->count) return SAT_OK;
     if (!raindrop__is_sprite(&frame) && (frame.camera.exposure > 0 || frame.camera.aperture > 0)) kind |= RAINDROP__GL_SOFT;
+    if (!raindrop__is_sprite(&frame) && frame.options.orders > 0) kind |= RAINDROP__GL_ORDERS;
     result = raindrop__gl_draw_program(g, (int)frame.options.look, kind);
     if (result != SAT_OK) return result;
     gl = &g->gl;

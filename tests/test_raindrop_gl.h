@@ -14,10 +14,21 @@ typedef struct rg_scene {
     double key;
 } rg_scene;
 
+static raindrop_environment *rg_environment(float n)
+{
+    float *sky = (float *)malloc(sizeof(float) * 3 * 256 * 128);
+    sat_image image = sat_image_f32(sky, 256, 128, 3);
+    raindrop_environment_options o = raindrop_environment_defaults();
+    raindrop_environment *environment = NULL;
+    reference_sky(sky, 256, 128);
+    o.n = n;
+    EXPECT_EQ(raindrop_environment_create(&environment, &image, &o, NULL), SAT_OK);
+    free(sky);
+    return environment;
+}
+
 static int rg_open(rg_scene *s)
 {
-    float *sky;
-    sat_image image;
     sat__gl_state state;
     memset(s, 0, sizeof *s);
     if (!gl_context_open(&s->context, 3, 3)) {
@@ -25,11 +36,7 @@ static int rg_open(rg_scene *s)
         return 0;
     }
     EXPECT_EQ(sat__gl_open(&s->gl, s->context.get_proc), SAT_OK);
-    sky = (float *)malloc(sizeof(float) * 3 * 256 * 128);
-    reference_sky(sky, 256, 128);
-    image = sat_image_f32(sky, 256, 128, 3);
-    EXPECT_EQ(raindrop_environment_create(&s->environment, &image, NULL, NULL), SAT_OK);
-    free(sky);
+    s->environment = rg_environment(RAINDROP_WATER);
     EXPECT_EQ(raindrop_map_create(&s->map, 256, 32, RAINDROP_WATER, NULL), SAT_OK);
     s->camera = raindrop_camera_defaults();
     s->camera.fov_y = 1.3f;
@@ -248,6 +255,72 @@ TEST(raindrop_gl_flattens_as_the_cpu)
     raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
     raindrop_rain_destroy(spheres);
+    rg_close(&s);
+}
+
+/* Internal reflections in drops of some size, among smaller ones. */
+TEST(raindrop_gl_reflects_inside_as_the_cpu)
+{
+    rg_scene s;
+    raindrop_gl_options g_options = raindrop_gl_defaults();
+    raindrop_render_options o = raindrop_render_defaults();
+    raindrop_rain *rain = rg_rain(60, 0.06f, 6);
+    raindrop_gl *g = NULL;
+    int orders, exit;
+    if (!rg_open(&s)) return;
+    g_options.quads = 1;
+    s.camera.near_distance = 0.001f;
+    o.sort = 0;
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &g_options), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    for (orders = 1; orders <= 3; orders++)
+        for (exit = 0; exit < 2; exit++) {
+            double error;
+            o.orders = orders;
+            o.orders_radius = 6;
+            o.exit_fresnel = exit;
+            error = rg_compare(&s, g, rain, &o);
+            EXPECT(error < 5e-4);
+            REPORT(exit ? "orders, only the last one's own light" : "orders", error, "RMSE from the CPU");
+            o.orders_radius = 1e9f;
+            memcpy(s.gpu, s.background, sizeof(float) * 3 * RG_W * RG_H);
+            EXPECT_EQ(raindrop_render(s.gpu, RG_W * 12, RG_W, RG_H, NULL, &s.camera, rain, s.environment, &o, NULL), SAT_OK);
+            EXPECT(reference_rmse(s.gpu, s.cpu, NULL, RG_W * RG_H, s.key) > 20 * error);
+        }
+    o.look = RAINDROP_LOOK_RAY; /* out of range: an error, as on the CPU */
+    o.orders = 4;
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, &o, 0, 0), SAT_ERR_ARGUMENT);
+    raindrop_gl_destroy(g);
+    raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
+
+/* Air in water, total reflection and all: round with orders, flattened, and blurred. */
+TEST(raindrop_gl_bubbles_as_on_the_cpu)
+{
+    rg_scene s;
+    raindrop_gl_options g_options = raindrop_gl_defaults();
+    raindrop_render_options o = raindrop_render_defaults();
+    raindrop_rain *rain = rg_rain(60, 0.06f, 6);
+    raindrop_gl *g = NULL;
+    int i, kind;
+    if (!rg_open(&s)) return;
+    raindrop_environment_destroy(s.environment);
+    s.environment = rg_environment(1 / RAINDROP_WATER);
+    g_options.quads = 1;
+    o.sort = 0;
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &g_options), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    for (kind = 0; kind < 3; kind++) {
+        double error;
+        for (i = 0; i < rain->count; i++) rain->drops[i].axis_ratio = kind == 1 ? 0.7f : 1;
+        s.camera.aperture = kind == 2 ? 0.001f : 0;
+        error = rg_compare(&s, g, rain, &o);
+        EXPECT(error < 5e-4);
+        REPORT(kind == 2 ? "blurred bubbles" : kind ? "flattened bubbles" : "bubbles", error, "RMSE from the CPU");
+    }
+    raindrop_gl_destroy(g);
+    raindrop_rain_destroy(rain);
     rg_close(&s);
 }
 
@@ -530,10 +603,11 @@ TEST(raindrop_gl_shaders_are_es)
         int i;
         for (i = 0; i < rain->count; i++) rain->drops[i].axis_ratio = kind & RAINDROP__GL_FLAT ? 0.8f : 1;
         s.camera.exposure = kind & RAINDROP__GL_SOFT ? 0.001f : 0;
+        r.orders = kind & RAINDROP__GL_ORDERS ? 2 : 0;
         EXPECT(rg_compare(&s, g, rain, &r) < 5e-4);
     }
     EXPECT_EQ(raindrop_gl_advance(g, 0.01), SAT_OK);
-    EXPECT_EQ(rg_shaders, 2 * (4 + RAINDROP__GL_KINDS - 1) + 2);
+    EXPECT_EQ(rg_shaders, 2 * (4 + RAINDROP__GL_KINDS) + 2 - 2);
     EXPECT(rg_longest < 4096);
     if (system("glslangValidator --version >/dev/null 2>&1") == 0) EXPECT_EQ(rg_valid, rg_shaders);
     raindrop_gl_destroy(g);
