@@ -196,6 +196,9 @@ static inline uint64_t support_random(uint64_t *state)
     return z ^ (z >> 31);
 }
 
+/* The larger one, and NaN when either is: the largest error of a test must not hide one that is no number. */
+static inline double support_larger(double a, double b) { return a >= b || a != a ? a : b; }
+
 /* uniform in [0, 1) */
 static inline double support_uniform(uint64_t *state)
 {

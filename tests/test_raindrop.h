@@ -240,10 +240,10 @@ TEST(raindrop_orders_share_all_the_power)
         sum = (double)ray.fresnel;
         for (k = 0; k < 600; k++) {
             raindrop_trace_order(&order, d, p, (1 - b) * (1 + b), 1.33f, k);
-            if (k == 3) worst_rest = fmax(worst_rest, fabs(sum + (double)order.rest - 1));
+            if (k == 3) worst_rest = support_larger(worst_rest, fabs(sum + (double)order.rest - 1));
             sum += (double)order.weight;
         }
-        worst = fmax(worst, fabs(sum - 1));
+        worst = support_larger(worst, fabs(sum - 1));
     }
     EXPECT(worst <= 1e-6);
     EXPECT(worst_rest <= 1e-6);
@@ -294,8 +294,8 @@ TEST(raindrop_spheroids_are_traced)
         if (truth.b > 0.99L) continue;
         EXPECT_EQ(raindrop_trace_spheroid(&ray, d, p, ratio, 1.33f), truth.hit);
         if (!truth.hit) continue;
-        if (i & 1) sphere = fmax(sphere, rt_distance(ray.refract, truth.refract));
-        else flat = fmax(flat, rt_distance(ray.refract, truth.refract));
+        if (i & 1) sphere = support_larger(sphere, rt_distance(ray.refract, truth.refract));
+        else flat = support_larger(flat, rt_distance(ray.refract, truth.refract));
     }
     EXPECT(sphere <= 5e-6);
     EXPECT(flat <= 2e-5);
@@ -315,10 +315,10 @@ TEST(raindrop_spheroid_of_ratio_one_is_the_sphere)
         raindrop_trace(&a, d, p, 1 - raindrop__dot(p, p), 1.33f);
         EXPECT_EQ(raindrop_trace_spheroid(&s, d, p, 1, 1.33f), 1);
         for (c = 0; c < 3; c++) {
-            worst = fmax(worst, fabs((double)a.refract[c] - (double)s.refract[c]));
-            worst = fmax(worst, fabs((double)a.reflect[c] - (double)s.reflect[c]));
+            worst = support_larger(worst, fabs((double)a.refract[c] - (double)s.refract[c]));
+            worst = support_larger(worst, fabs((double)a.reflect[c] - (double)s.reflect[c]));
         }
-        worst = fmax(worst, fabs((double)a.fresnel - (double)s.fresnel));
+        worst = support_larger(worst, fabs((double)a.fresnel - (double)s.fresnel));
     }
     EXPECT(worst <= 1e-6);
     REPORT("spheroid of ratio 1 against the sphere, b <= 0.9", worst, "");
@@ -420,9 +420,9 @@ TEST(raindrop_map_lookup_interpolates_distances)
         raindrop_map_sample(q, map, s, 0.1f, distance);
         raindrop_sprite_ray(d, p, &m, s, 0.1f, distance);
         raindrop_trace(&ray, d, p, m, RAINDROP_WATER);
-        worst = fmax(worst, fabs((double)q[4] - (double)ray.refract[0]));
+        worst = support_larger(worst, fabs((double)q[4] - (double)ray.refract[0]));
         raindrop_map_sample(q, map, s, 0.1f, 2 * distance); /* a level too far: what a wrong bias would read */
-        off = fmax(off, fabs((double)q[4] - (double)ray.refract[0]));
+        off = support_larger(off, fabs((double)q[4] - (double)ray.refract[0]));
     }
     EXPECT(worst < 0.02);
     EXPECT(off > 3 * worst);
@@ -522,8 +522,8 @@ TEST(raindrop_environment_has_no_seams)
             raindrop__normalise(d);
             raindrop_environment_sample(rgb, environment, d, 0.05f);
             for (c = 0; c < 3; c++) {
-                worst = fmax(worst, fabs((double)rgb[c] - 1 - (double)d[c]));
-                if (i) step = fmax(step, fabs((double)rgb[c] - (double)last[c]));
+                worst = support_larger(worst, fabs((double)rgb[c] - 1 - (double)d[c]));
+                if (i) step = support_larger(step, fabs((double)rgb[c] - (double)last[c]));
                 last[c] = rgb[c];
             }
         }

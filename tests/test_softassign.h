@@ -964,7 +964,7 @@ TEST(softassign_published_is_the_pseudo_code)
         EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
         EXPECT_REL(r.soft_cost, lowest, wide ? 1e-6 : 1e-4); /* costs are floats in both */
         for (k = 0; k < n; k++) {
-            worst = fmax(worst, fabs((double)out[k] - soft[k]));
+            worst = support_larger(worst, fabs((double)out[k] - soft[k]));
             sharpest = fmax(sharpest, soft[k]);
         }
         EXPECT(sharpest > (gold ? 0.2 : 0.9)); /* the run went from blur to decision */
@@ -1122,7 +1122,7 @@ TEST(softassign_feature_means_are_exact_box_means)
                                     double wide = fmin(x1, i + 1) - fmax(x0, i), high = fmin(y1, j + 1) - fmax(y0, j);
                                     if (wide > 0 && high > 0) sum += wide * high * pixels[(j * w + i) * 3 + c];
                                 }
-                            worst = fmax(worst, fabs(sum / ((x1 - x0) * (y1 - y0)) - (double)out[at]));
+                            worst = support_larger(worst, fabs(sum / ((x1 - x0) * (y1 - y0)) - (double)out[at]));
                         }
                     }
         EXPECT(worst < 1e-3);

@@ -58,6 +58,12 @@ TEST(parallel_for_covers_each_item_once)
         }
 }
 
+TEST(the_larger_one_does_not_hide_what_is_no_number)
+{
+    EXPECT(support_larger(1, 2) == 2 && support_larger(2, 1) == 2);
+    EXPECT(isnan(support_larger(NAN, 1)) && isnan(support_larger(1, NAN)));
+}
+
 TEST(hash_and_random_numbers_are_known)
 {
     uint64_t state = 0;
