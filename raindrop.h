@@ -27,14 +27,13 @@
      filtered by the drop's own phase function.
    - Rain from a rate: Marshall-Palmer sizes, measured speeds, wind, a drag step that is exact for any dt.
    - Streaks, depth of field, primary and secondary rainbow; occlusion by scene depth; statistics of what was left out.
-   - OpenGL 3.3 / ES 3.0: sprites or quads, with all of that but internal reflections; rain falls by transform feedback.
+   - OpenGL 3.3 / ES 3.0: all of that on sprites or quads but for the order; rain falls by transform feedback.
 
    WHAT IT DOES NOT
 
    - Drops do not see the scene or each other, only the environment; they do not collide, merge, splash or run down.
    - A drop that reaches the near plane, or that the eye is in, is left out (and counted).
-   - Sprites (MAP, SPRITE) are still and in focus. Flattened drops have order 0 only. OpenGL draws unsorted, as published,
-     and knows order 0 only.
+   - Sprites (MAP, SPRITE) are still and in focus. Flattened drops have order 0 only. OpenGL draws unsorted, as published.
    - No Airy theory: no supernumerary bows.
    - It starts no thread, opens no window, creates no OpenGL context, keeps no global state.
 
@@ -72,8 +71,8 @@
    - Environment: NaN counts as 0, infinity as the largest finite value, negative light as 0; all are counted. One texel of
      1e8 stays what it is: mips and footprints spread it, or `clamp` cuts it.
    - The same bits for any number of workers; SIMD differs from plain C in the last digits. The GPU's picture is within an
-     RMSE of 5e-4 of the CPU's (tone-mapped luminance, quads, unsorted, streaks, depth of field and flattened drops
-     included; 2e-4 on llvmpipe), its drops within 3e-4 m over tens of steps.
+     RMSE of 5e-4 of the CPU's (tone-mapped luminance, quads, both unsorted; llvmpipe: 4e-5, with the longest streaks
+     2e-4), its drops within 3e-4 m over tens of steps.
 
    COST (one core, SSE2; ratios from tests/bench/bench_raindrop.c, forest environment)
 
@@ -89,6 +88,8 @@
      .0208). Boxes of a table: 20 to 150 times as long, better for small drops only (12 pixels: .036 against .049).
    - Streaks: RMSE .001 to .002 from 64 still moments, 36 to 60 times faster.
    - Sorting is 2 % of a frame.
+   - OpenGL, 125000 drops of 2 mm at 512 x 512, auto, llvmpipe (tests/bench/gpu_raindrop.c): orders 1 takes 1.1 times the
+     time of orders 0; shutter and lens on top 1.5 times that.
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(RAINDROP_IMPLEMENTATION)
@@ -429,10 +430,10 @@ RAINDROP_DEF sat_result raindrop_gl_set_wind(raindrop_gl *gl, const float wind[3
 RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *drops, int count);
 
 /* Blends the drops over the bound framebuffer's viewport (0, 0, width, height), which should hold floats: row 0 is the
-   bottom one, as OpenGL has it. Unsorted, as published; looks, streaks and depth of field as in
-   raindrop_render, without internal reflections. The first picture with streaks or a lens, and the first of flattened
-   drops, compile a program. depth_near > 0: the depth test is on, against a depth buffer of the usual perspective with
-   these planes; depth is not written. */
+   bottom one, as OpenGL has it. Unsorted, as published; else as raindrop_render. The first picture with a
+   shutter or a lens, of flattened drops, or with internal reflections compiles a program that knows them; the others do
+   not pay. depth_near > 0: the depth test is on, against a depth buffer of the usual perspective with these planes;
+   depth is not written. */
 RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, int width, int height, const raindrop_camera *camera,
                                            const raindrop_render_options *options, float depth_near, float depth_far);
 
@@ -3436,13 +3437,13 @@ static const char raindrop__glsl_draw_sprite[] =
 static const char raindrop__glsl_orders[] =
     "#ifdef ORDERS\n"
     "uniform vec2 orders;\n" /* their number, radius in pixels from which drops have them */
-    "vec3 add_orders(vec3 d, vec3 p, float m) {\n"
+    "vec3 add_orders(vec3 d, vec3 p, float m, int last) {\n"
     "    raindrop_ray ray = raindrop_trace(d, p, m, optics.x);\n"
     "    float n = optics.x, b2 = 1.0 - m, cr = sqrt(max((m + (n - 1.0) * (n + 1.0)) / (n * n), 0.0));\n"
     "    vec2 turn = ray.turn, once = vec2(2.0 * b2 / (n * n) - 1.0, 2.0 * cr / n), enter = 1.0 - ray.polarised, inside = enter;\n"
     "    vec3 sum = mirrored(ray, 1.0);\n"
-    "    for (int k = 0; k <= int(orders.x); k++) {\n"
-    "        vec2 leave = k == int(orders.x) && optics.y < 0.5 ? vec2(1.0) : enter;\n"
+    "    for (int k = 0; k <= last; k++) {\n"
+    "        vec2 leave = k == last && optics.y < 0.5 ? vec2(1.0) : enter;\n"
     "        float footprint = sqrt(abs(2.0 * (1.0 / (sqrt(m) + 1e-6) - float(k + 1) / (n * cr + 1e-6)) * turn.y));\n"
     "        sum += 0.5 * dot(inside, leave) * look(turn.x * d - turn.y * p, abs(footprint * pixel_width() - 1.0 / view.z));\n"
     "        turn = vec2(turn.x * once.x - b2 * turn.y * once.y, turn.y * once.x + turn.x * once.y);\n"
@@ -3450,17 +3451,18 @@ static const char raindrop__glsl_orders[] =
     "    }\n"
     "    return sum;\n"
     "}\n"
-    "vec3 large_colour(vec3 d, vec3 p, float m) {\n" /* four rays at the rim */
-    "    float b = sqrt(1.0 - m), width = pixel_width(), taps = 0.0;\n"
-    "    if (1.0 - b > 3.0 * width || width > 0.25) return add_orders(d, p, m);\n"
+    "vec3 still_colour(vec3 d, vec3 p, float m) {\n" /* large drops: four rays at the rim */
+    "    float b = sqrt(1.0 - m), width = pixel_width(), count = 0.0;\n"
+    "    bool is_large = place.z >= orders.y;\n"
+    "    int last = is_large ? int(orders.x) : 0, taps = is_large && 1.0 - b <= 3.0 * width && width <= 0.25 ? 4 : 1;\n"
     "    vec3 sum = vec3(0.0);\n"
-    "    for (int j = 0; j < 4; j++) {\n"
-    "        float at = b + (0.25 * float(j) - 0.375) * width;\n"
-    "        if (at >= 1.0 || at <= 0.0) continue;\n"
-    "        sum += add_orders(d, p * (at / b), (1.0 - at) * (1.0 + at));\n"
-    "        taps += 1.0;\n"
+    "    for (int j = 0; j < taps; j++) {\n"
+    "        float at = taps == 1 ? b : b + (0.25 * float(j) - 0.375) * width;\n"
+    "        if (at >= 1.0) continue;\n"
+    "        sum += add_orders(d, p * (at / max(b, 1e-9)), taps == 1 ? m : (1.0 - at) * (1.0 + at), last);\n"
+    "        count += 1.0;\n"
     "    }\n"
-    "    return sum / taps;\n"
+    "    return sum / count;\n"
     "}\n"
     "#endif\n";
 
@@ -3556,11 +3558,13 @@ static const char raindrop__glsl_draw_ray[] =
     "    }\n"
     "    fragment f = trace(at);\n"
     "    if (f.cover <= 0.0) discard;\n"
-    "#ifdef ORDERS\n"
-    "    if (place.z >= orders.y && seen.w >= 1.0) colour = vec4(large_colour(f.d, f.p, f.one_minus_b2), f.cover);\n"
-    "    else\n"
-    "#endif\n"
+    "#if defined ORDERS && defined FLAT\n"
+    "    colour = vec4(seen.w < 1.0 ? shade(f.ray, 1.0) : still_colour(f.d, f.p, f.one_minus_b2), f.cover);\n"
+    "#elif defined ORDERS\n"
+    "    colour = vec4(still_colour(f.d, f.p, f.one_minus_b2), f.cover);\n"
+    "#else\n"
     "    colour = vec4(shade(f.ray, 1.0), f.cover);\n"
+    "#endif\n"
     "}\n";
 
 /* raindrop__step and raindrop__reenter in floats. */

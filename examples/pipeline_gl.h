@@ -134,7 +134,7 @@ static inline int pipeline_gl_occlusion(pipeline_gl *g, float *open, const ssao_
     return pipeline_gl_check(g, sat__gl_read(&g->gl, open, ssao_sat_gl_texture(g->ao), SAT__GL_R32F, input->width, input->height), g->gl.message);
 }
 
-/* ---- rain: falls and is drawn on the GPU, in the order of the array and without internal reflections ---- */
+/* ---- rain: falls and is drawn on the GPU, but for the order as on the CPU ---- */
 
 /* Window depth of the usual perspective, upside down, into the depth texture. */
 static inline void pipeline_gl_depth(pipeline_gl *g, const float *depth, float near, float far)
