@@ -70,13 +70,18 @@ static raindrop_rain *published(int count)
     return rain;
 }
 
-static void frame(raindrop_gl *g, const raindrop_render_options *o, int tone)
+static void draw(raindrop_gl *g, const raindrop_render_options *o)
 {
     static const float grey[4] = {0.2f, 0.25f, 0.3f, 1};
-    raindrop_gl_advance(g, 1 / 60.0);
     gpu.BindFramebuffer(SAT__GL_FRAMEBUFFER, the.framebuffer);
     gpu.ClearBufferfv(SAT__GL_COLOR, 0, grey);
     raindrop_gl_render(g, size, size, &the.camera, o, 0, 0);
+}
+
+static void frame(raindrop_gl *g, const raindrop_render_options *o, int tone)
+{
+    raindrop_gl_advance(g, 1 / 60.0);
+    draw(g, o);
     if (tone) tonemap_gl_apply(the.tone, 0, the.texture, 1 / 60.0);
 }
 
@@ -111,7 +116,7 @@ static void table_2_2(void)
     int i, quads, last = software || bench_quick() ? 2 : 6;
     bench_table("Rain on the GPU, frames per second by number of drops (Slomp 2012, table 2.2), animation included",
                 "drops\tprimitive\tmap_fps_t\tmap_fps\tsprite_fps_t\tsprite_fps\tray_fps_t\tray_fps\tauto_fps_t\tauto_fps\tgtx280_fps_t\tgtx280_fps");
-    bench_plot("Frames per second on the GPU; x=drops; y=map_fps; by=primitive; log=xy; style=lines");
+    bench_plot("Frames per second on the GPU; x=drops; y=map_fps; by=primitive; log=xy; style=linespoints");
     bench_note("-t: with the global photographic operator; the map's rows are the published method, on half floats");
     for (quads = 0; quads < 2; quads++) {
         for (i = 0; i < last; i++) {
@@ -135,44 +140,89 @@ static void table_2_2(void)
     }
 }
 
-/* The same pictures on both sides: how far the GPU's is from the CPU's. */
-static void gpu_against_cpu(void)
+/* What a picture may ask for beside still, sharp spheres without internal reflections. */
+enum { PLAIN, SHUTTER, LENS, FLAT, ORDERS, KINDS };
+static const char *const kind_names[KINDS] = {"plain", "shutter", "lens", "flattened", "orders"};
+
+static raindrop_render_options set_kind(raindrop_gl *g, raindrop_rain *rain, int kind)
 {
-    static const char *const names[4] = {"map", "sprite", "ray", "auto"};
+    raindrop_render_options o = raindrop_render_defaults();
+    int n = 0, i;
+    const raindrop_drop *drops = raindrop_rain_drops(rain, &n);
+    raindrop_drop *flat = (raindrop_drop *)calloc((size_t)n, sizeof *flat);
+    for (i = 0; i < n; i++) flat[i] = drops[i], flat[i].axis_ratio = kind == FLAT ? 0.8f : 1;
+    raindrop_rain_set_drops(rain, flat, n);
+    raindrop_gl_set_rain(g, rain);
+    free(flat);
+    the.camera.exposure = kind == SHUTTER ? 0.001f : 0;
+    the.camera.aperture = kind == LENS ? 0.002f : 0;
+    the.camera.focus_distance = 0.5f;
+    o.orders = kind == ORDERS;
+    return o;
+}
+
+/* Time over that of the plain picture: median of paired measurements. */
+static double time_of(raindrop_gl *g, raindrop_rain *rain, int kind, raindrop_look look)
+{
+    double ratio[9], seconds[2];
+    int i, k, m, frames = software ? 2 : 50;
+    for (i = -1; i < 9; i++) { /* the first compiles and warms up */
+        for (m = 0; m < 2; m++) {
+            raindrop_render_options o = set_kind(g, rain, m ? kind : PLAIN);
+            o.look = look;
+            gpu.Finish();
+            seconds[m] = support_clock();
+            for (k = 0; k < frames; k++) draw(g, &o);
+            gpu.Finish();
+            seconds[m] = support_clock() - seconds[m];
+        }
+        if (i >= 0) ratio[i] = seconds[1] / seconds[0];
+    }
+    return support_median(ratio, 9);
+}
+
+/* How far the GPU's picture is from the CPU's, drops in the order of the array. */
+static double error_of(raindrop_gl *g, raindrop_rain *rain, int kind, raindrop_look look, float *cpu, float *got)
+{
     size_t pixels = (size_t)size * (size_t)size, k;
+    raindrop_render_options o = set_kind(g, rain, kind);
+    sat__gl_state state;
+    static const float grey[3] = {0.2f, 0.25f, 0.3f};
+    o.look = look;
+    o.map = the.map;
+    o.sort = 0;
+    o.orders_radius = kind == ORDERS ? 8 : 1e9f;
+    draw(g, &o);
+    sat__gl_begin(&gpu, &state, 1);
+    succeeded(sat__gl_read(&gpu, got, the.texture, SAT__GL_RGBA16F, size, size), gpu.message);
+    sat__gl_end(&gpu, &state);
+    for (k = 0; k < pixels; k++) memmove(got + 3 * k, got + 4 * k, 12);
+    for (k = 0; k < pixels; k++) memcpy(cpu + 3 * k, grey, 12);
+    /* bottom row first, as the GPU has it */
+    raindrop_render(cpu + 3 * (size_t)(size - 1) * (size_t)size, -12 * (ptrdiff_t)size, size, size, NULL, &the.camera, rain, the.environment, &o, NULL);
+    return reference_rmse(got, cpu, NULL, pixels, 1);
+}
+
+static void kinds_of_pictures(void)
+{
+    static const char *const looks[4] = {"map", "sprite", "ray", "auto"};
+    size_t pixels = (size_t)size * (size_t)size;
     float *cpu = (float *)malloc(pixels * 12), *got = (float *)malloc(pixels * 16);
     raindrop_rain *rain = published(software ? 50000 : 500000);
-    int look, y, c;
-    bench_table("The GPU's picture against the CPU's, unsorted, tone-mapped luminance", "look\tprimitive\trmse");
-    for (look = 0; look < 4; look++) {
-        raindrop_gl_options go = raindrop_gl_defaults();
-        raindrop_render_options o = raindrop_render_defaults();
-        raindrop_gl *g = NULL;
-        sat__gl_state state;
-        static const float grey[4] = {0.2f, 0.25f, 0.3f, 1};
-        go.map = the.map;
-        o.look = (raindrop_look)look;
-        o.map = the.map;
-        o.sort = 0;
-        o.orders_radius = 1e9f;
-        go.quads = 1;
-        if (!succeeded(raindrop_gl_create(&g, context.get_proc, &go), raindrop_gl_message(g))) exit(1);
-        raindrop_gl_set_environment(g, the.environment);
-        raindrop_gl_set_rain(g, rain);
-        gpu.BindFramebuffer(SAT__GL_FRAMEBUFFER, the.framebuffer);
-        gpu.ClearBufferfv(SAT__GL_COLOR, 0, grey);
-        raindrop_gl_render(g, size, size, &the.camera, &o, 0, 0);
-        sat__gl_begin(&gpu, &state, 1);
-        succeeded(sat__gl_read(&gpu, got, the.texture, SAT__GL_RGBA16F, size, size), gpu.message);
-        sat__gl_end(&gpu, &state);
-        for (k = 0; k < pixels; k++) memmove(got + 3 * k, got + 4 * k, 12);
-        for (k = 0; k < pixels; k++)
-            for (c = 0; c < 3; c++) cpu[3 * k + (size_t)c] = grey[c];
-        y = size - 1; /* bottom row first, as the GPU has it */
-        raindrop_render(cpu + 3 * (size_t)y * (size_t)size, -12 * (ptrdiff_t)size, size, size, NULL, &the.camera, rain, the.environment, &o, NULL);
-        bench_row("%s\tquads\t%.5f", names[look], reference_rmse(got, cpu, NULL, pixels, 1));
-        raindrop_gl_destroy(g);
-    }
+    raindrop_gl_options o = raindrop_gl_defaults();
+    raindrop_gl *g = NULL;
+    int look, kind;
+    bench_table("The GPU's picture against the CPU's, and what it costs: quads", "look\tpicture\trmse\ttime_ratio");
+    bench_note("rmse: from the CPU's, unsorted, tone-mapped luminance; time_ratio: over the plain picture, without animation");
+    o.map = the.map;
+    o.quads = 1;
+    if (!succeeded(raindrop_gl_create(&g, context.get_proc, &o), raindrop_gl_message(g))) exit(1);
+    raindrop_gl_set_environment(g, the.environment);
+    for (look = 0; look < 4; look++)
+        for (kind = 0; kind < (look < RAINDROP_LOOK_RAY ? 1 : KINDS); kind++)
+            bench_row("%s\t%s\t%.5f\t%.2f", looks[look], kind_names[kind], error_of(g, rain, kind, (raindrop_look)look, cpu, got),
+                      time_of(g, rain, kind, (raindrop_look)look));
+    raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
     free(cpu);
     free(got);
@@ -190,7 +240,7 @@ int main(void)
     size = software || bench_quick() ? 512 : 1024;
     if (!succeeded(sat__gl_open(&gpu, context.get_proc), gpu.message) || !open_scene()) return 1;
     table_2_2();
-    gpu_against_cpu();
+    kinds_of_pictures();
     tonemap_gl_destroy(the.tone);
     raindrop_map_destroy(the.map);
     raindrop_environment_destroy(the.environment);
