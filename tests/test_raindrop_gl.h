@@ -16,7 +16,7 @@ typedef struct rg_scene {
 
 static raindrop_environment *rg_environment(float n)
 {
-    float *sky = (float *)malloc(sizeof(float) * 3 * 256 * 128);
+    float *sky = (float *)calloc(3 * 256 * 128, sizeof(float));
     sat_image image = sat_image_f32(sky, 256, 128, 3);
     raindrop_environment_options o = raindrop_environment_defaults();
     raindrop_environment *environment = NULL;
@@ -246,7 +246,8 @@ TEST(raindrop_gl_flattens_as_the_cpu)
             s.camera.exposure = soft == 1 ? 0.002f : 0;
             s.camera.aperture = soft == 2 ? 0.002f : 0;
             error = rg_compare(&s, g, rain, &o);
-            REPORT(names[look], error, soft == 2 ? "RMSE from the CPU, flattened and blurred" : soft ? "RMSE from the CPU, flattened streaks" : "RMSE from the CPU, flattened");
+            REPORT(names[look], error, soft == 2 ? "RMSE from the CPU, flattened, blurred" : soft ? "RMSE from the CPU, flattened streaks"
+                                                                                                    : "RMSE from the CPU, flattened");
             EXPECT(error < 5e-4);
             memcpy(s.gpu, s.background, sizeof(float) * 3 * RG_W * RG_H);
             EXPECT_EQ(raindrop_render(s.gpu, RG_W * 12, RG_W, RG_H, NULL, &s.camera, spheres, s.environment, &o, NULL), SAT_OK);
