@@ -783,6 +783,7 @@ static void fiv__split_lights(fiv_environment *e, const sat_image *image)
     double total = 0, rest, limit, split = 0, sums[FIV_MAX_LIGHTS][3];
     float floor_rgb[3];
     int k, c, tries;
+    memset(sums, 0, sizeof sums);
     e->light_count = 0;
     for (i = 0; i < n; i++) total += fiv__patch_light(e->source + 4 * i);
     e->stats.light_share = 0;
@@ -2969,6 +2970,7 @@ static void fiv__unite_masks(int64_t taken[3], const fiv__receiver *r, const fiv
     float rgb[3];
     int i, j, k, row, members = 0;
     memset(all, 0, sizeof all);
+    memset(one, 0, sizeof one);
     for (i = 0; i < count; i++) {
         for (j = 0; j < count; j++)
             if (i != j && fiv__balls_overlap(&shadows[i], &shadows[j])) break;
@@ -3098,6 +3100,7 @@ static void fiv__run_tiles(int begin, int end, int worker, void *context)
     r.instance_count = job->instance_count;
     r.options = job->options;
     r.stats = &job->stats[worker];
+    memset(r.light_cosine, 0, sizeof r.light_cosine);
     for (i = (size_t)begin * FIV__TILE; i < last; i++) {
 #ifndef FIV_NO_SELF
         if (job->self) {
@@ -3250,6 +3253,7 @@ static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance
     fiv__cell cell;
     int k;
     rgb[0] = rgb[1] = rgb[2] = 0;
+    memset(own, 0, sizeof own);
     if (!fiv__start_receiver(r, point, normal)) return;
     fiv__gather_shadows(taken, covered, r);
     if (fiv__place(offset, world, &distance, self, point)) {
@@ -3388,7 +3392,7 @@ FIV_DEF sat_result fiv_occluder_save(const fiv_occluder *o, void *memory, size_t
     memcpy(p, o->state, n);
     memcpy(p += n, o->support, FIV__SUPPORT * FIV__SUPPORT * sizeof(float));
     memcpy(p += FIV__SUPPORT * FIV__SUPPORT * sizeof(float), o->first, (n + 1) * sizeof(uint32_t));
-    memcpy(p += (n + 1) * sizeof(uint32_t), o->words, s.words * sizeof(uint16_t));
+    memcpy(p + (n + 1) * sizeof(uint32_t), o->words, s.words * sizeof(uint16_t));
     p = (unsigned char *)memory;
     s.hash = fiv__hash(p + 16, needed - 16);
     memcpy(p, &s, sizeof s);
@@ -3475,7 +3479,7 @@ FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, siz
     memcpy(o->state, p, n);
     memcpy(o->support, p += n, FIV__SUPPORT * FIV__SUPPORT * sizeof(float));
     memcpy(o->first, p += FIV__SUPPORT * FIV__SUPPORT * sizeof(float), (n + 1) * sizeof(uint32_t));
-    memcpy(o->words, p += (n + 1) * sizeof(uint32_t), (size_t)s.words * sizeof(uint16_t));
+    memcpy(o->words, p + (n + 1) * sizeof(uint32_t), (size_t)s.words * sizeof(uint16_t));
     if (o->first[0] != 0 || o->first[n] != s.words || !fiv__words_are_valid(o)) {
         fiv_occluder_destroy(o);
         return SAT_ERR_DATA;
