@@ -172,6 +172,7 @@ check-tsan: export LIGHTSCAN_GL = none
 check-tsan:
 	+@$(call again,tsan,-g -fsanitize=thread,-O1) OPENMP=
 
+check-analyze check-compilers: export TEST_TIMEOUT = 1800
 check-analyze:
 	@RUNNER='bash tests/check_analyze.sh' tests/run.sh $(LIBS)
 check-compilers:
