@@ -1,13 +1,18 @@
 /* demo_view - the demo in a window, with keys for its options.      SPDX-License-Identifier: MIT-0 OR Unlicense
 
        demo_view                                      640x360; F1 shows the keys
-       demo_view --size 960x540 --hour night
+       demo_view --size 960x540 --hour night --gl
        demo_view --frames 3 --out shot.png            a picture of the window after three frames
 
    Needs GLFW 3 and OpenGL 3.3. */
 
 #define _POSIX_C_SOURCE 200809L
 #define LIGHTSCAN_IMPLEMENTATION
+#define PIPELINE_GL
+#define FIV_GL
+#define RAINDROP_GL
+#define SSAO_SAT_GL
+#define TONEMAP_GL
 #include "pipeline.h"
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
@@ -35,7 +40,7 @@
     memcpy(&v->name, &proc, sizeof proc);                                                          \
     if (!proc) return 0;
 enum { VIEW_TEXTURE_2D = 0x0DE1, VIEW_RGB = 0x1907, VIEW_UNSIGNED_BYTE = 0x1401, VIEW_UNPACK_ALIGNMENT = 0x0CF5, VIEW_PACK_ALIGNMENT = 0x0D05,
-       VIEW_READ_FRAMEBUFFER = 0x8CA8, VIEW_COLOR_ATTACHMENT0 = 0x8CE0, VIEW_COLOR_BUFFER_BIT = 0x4000, VIEW_LINEAR = 0x2601 };
+       VIEW_READ_FRAMEBUFFER = 0x8CA8, VIEW_FRAMEBUFFER = 0x8D40, VIEW_COLOR_ATTACHMENT0 = 0x8CE0, VIEW_COLOR_BUFFER_BIT = 0x4000, VIEW_LINEAR = 0x2601 };
 
 typedef struct view {
     VIEW_FUNCTIONS(VIEW_MEMBER)
@@ -61,6 +66,7 @@ static void view_show(view *v)
 {
     int width, height, w = v->p.options.width, h = v->p.options.height;
     glfwGetFramebufferSize(v->window, &width, &height);
+    v->BindFramebuffer(VIEW_FRAMEBUFFER, 0);
     v->BindTexture(VIEW_TEXTURE_2D, v->texture);
     v->TexImage2D(VIEW_TEXTURE_2D, 0, VIEW_RGB, w, h, 0, VIEW_RGB, VIEW_UNSIGNED_BYTE, v->p.pixels);
     v->BindFramebuffer(VIEW_READ_FRAMEBUFFER, v->framebuffer);
@@ -100,6 +106,7 @@ static void view_key(GLFWwindow *window, int key, int scan, int action, int modi
     case GLFW_KEY_ESCAPE: v->quit = 1; break;
     case GLFW_KEY_F1: v->help = !v->help; break;
     case GLFW_KEY_SPACE: v->paused = !v->paused; break;
+    case GLFW_KEY_G: o->get_proc = o->get_proc ? NULL : glfwGetProcAddress; break;
     case GLFW_KEY_S: o->shadows = !o->shadows; break;
     case GLFW_KEY_O: o->occlusion = !o->occlusion; break;
     case GLFW_KEY_R: o->rain = !o->rain; break;
@@ -122,7 +129,7 @@ static void view_key(GLFWwindow *window, int key, int scan, int action, int modi
 static void view_overlay(view *v, double seconds)
 {
     static const char *const names[] = {"", "", "scene", "shadows", "occlusion", "shade", "rain", "tone"};
-    static const char *const keys[] = {"S O R T     shadows, occlusion, rain, tone mapping", "H M P       hour, mesopic vision, operator",
+    static const char *const keys[] = {"S O R T     shadows, occlusion, rain, tone mapping", "G H M P     OpenGL, hour, mesopic vision, operator",
         "left right  turn the light", "up down     exposure", "page keys   rain", "home end    reach of occlusion", "space Esc   pause, quit"};
     common_canvas canvas;
     char text[160];
@@ -130,7 +137,7 @@ static void view_overlay(view *v, double seconds)
     int k, n;
     canvas.rgb = v->p.pixels, canvas.width = v->p.options.width, canvas.height = v->p.options.height;
     for (i = 0; i < (size_t)(v->help ? 110 : 28) * (size_t)canvas.width * 3 && i < (size_t)canvas.height * (size_t)canvas.width * 3; ++i) canvas.rgb[i] /= 3;
-    n = snprintf(text, sizeof text, "%.0f ms ", 1e3 * seconds);
+    n = snprintf(text, sizeof text, "%s %.0f ms ", v->p.options.get_proc ? "OpenGL" : "CPU", 1e3 * seconds);
     for (k = PIPELINE_SCENE; k < PIPELINE_STAGES; ++k) n += snprintf(text + n, sizeof text - (size_t)n, " %s %.0f", names[k], 1e3 * v->p.seconds[k]);
     common_text(&canvas, 6, 6, text, 1);
     snprintf(text, sizeof text, "%.0f mm/h  reach %.2f m  light %+.0f deg  exposure %+.2f  F1 keys", (double)v->wanted.rate,
@@ -174,17 +181,18 @@ static int view_open(view *v)
 
 int main(int argc, char **argv)
 {
-    int size[2] = {640, 360}, frames = 0, hour = 0, ok = 0;
+    int size[2] = {640, 360}, frames = 0, gl = 0, hour = 0, ok = 0;
     const char *word = "dusk";
     static view v;
     const common_option options[] = {
         {"size", 'z', size, "of the picture, 640x360"},
         {"hour", 's', &word, "dusk, night or noon"},
+        {"gl", 'b', &gl, "on OpenGL; key G"},
         {"frames", 'i', &frames, "end after so many; 0: go on"},
     };
     common_settings common;
     v.wanted = pipeline_defaults();
-    common_parse(&common, argc, argv, "demo_view [options]", options, 3);
+    common_parse(&common, argc, argv, "demo_view [options]", options, 4);
     hour = strcmp(word, "night") == 0 ? 1 : strcmp(word, "noon") == 0 ? 2 : strcmp(word, "dusk") == 0 ? 0 : -1;
     if (hour < 0 || frames < 0) {
         fprintf(stderr, "demo_view: --hour is dusk, night or noon; --frames at least 0\n");
@@ -199,7 +207,10 @@ int main(int argc, char **argv)
     }
     if (!pipeline_create(&v.p, &v.wanted)) fprintf(stderr, "demo_view: %s\n", v.p.message);
     else if (!view_open(&v)) fprintf(stderr, "demo_view: no window with OpenGL 3.3\n");
-    else ok = view_loop(&v, frames, common.out);
+    else {
+        if (gl) v.wanted.get_proc = glfwGetProcAddress;
+        ok = view_loop(&v, frames, common.out);
+    }
     pipeline_destroy(&v.p);
     glfwTerminate();
     return !ok;

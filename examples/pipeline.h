@@ -115,9 +115,15 @@ static inline int pipeline_gl_done(pipeline *p, int ok)
     if (!ok) snprintf(p->message, sizeof p->message, "OpenGL: %s", p->gl ? p->gl->message : "not enough memory");
     return ok;
 }
-#define PIPELINE_ON_GL(p, call) if ((p)->gl) return pipeline_gl_done(p, call)
+static inline int pipeline_gl_ready(pipeline *p)
+{
+    if (!p->options.get_proc || p->gl) return 1;
+    return pipeline_gl_done(p, pipeline_gl_create(&p->gl, p->options.get_proc, p->options.width, p->options.height));
+}
+#define PIPELINE_ON_GL(p, call) if ((p)->options.get_proc) return pipeline_gl_done(p, call)
 #define PIPELINE_GL_FORGET(p) if ((p)->gl) (p)->gl->environment = NULL, (p)->gl->drops = NULL
 #else
+#define pipeline_gl_ready(p) 1
 #define PIPELINE_GL_FORGET(p) ((void)0)
 #define PIPELINE_ON_GL(p, call) ((void)0)
 #endif
@@ -538,10 +544,7 @@ static inline int pipeline_create(pipeline *p, const pipeline_options *options)
     scene_place(&p->scene.objects[0], -0.17f, -0.05f, 0.24f, 0.62f, 0.3f, 0.16f, 0.04f);
     scene_place(&p->scene.objects[1], 0.3f, 0.06f, 0.23f, 0.66f, 0.64f, 0.58f, 0.04f);
     p->scene.camera = raindrop_camera_look(eye, target, up, 0.62f);
-#ifdef PIPELINE_GL
-    if (options->get_proc && !pipeline_gl_done(p, pipeline_gl_create(&p->gl, options->get_proc, options->width, options->height))) return 0;
-#endif
-    return pipeline_masks(p) && pipeline_light(p);
+    return pipeline_gl_ready(p) && pipeline_masks(p) && pipeline_light(p);
 }
 
 /* Other options from the next frame on, all but size, samples, shape and threads: makes anew what they concern. */
@@ -549,7 +552,11 @@ static inline int pipeline_change(pipeline *p, const pipeline_options *options)
 {
     pipeline_options old = p->options;
     p->options = *options;
-    PIPELINE_GL_FORGET(p);
+    if (!pipeline_gl_ready(p)) return 0;
+    if (old.get_proc != options->get_proc || old.rate != options->rate) {
+        PIPELINE_GL_FORGET(p);
+        p->settled = 0;
+    }
     if (old.rate != options->rate) raindrop_rain_destroy(p->rain), p->rain = NULL;
     if (old.ao_radius != options->ao_radius) ssao_sat_destroy(p->ao), p->ao = NULL;
     if (old.ao_radius != options->ao_radius || old.shadows != options->shadows || old.occlusion != options->occlusion) p->settled = 0;

@@ -2,7 +2,8 @@
    SPDX-License-Identifier: MIT-0 OR Unlicense
 
    A renderer that keeps its pictures on the GPU does without both copies. Row 0 is the top of the picture, but for the
-   texture that the rain is drawn into, which is as OpenGL has it. */
+   texture that the rain is drawn into, which is as OpenGL has it. Unlike the headers these functions leave a framebuffer of
+   their own bound. */
 
 #ifndef PIPELINE_GL_H
 #define PIPELINE_GL_H
