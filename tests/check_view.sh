@@ -5,14 +5,26 @@ lib=$1
 dir=build/check/view
 mkdir -p "$dir"
 
-# same SHOT TOP: below row TOP the picture is the demo's, but for one step of rounding
+# same SHOT TOP [OPTION...]: below row TOP the picture is the demo's with these options, but for one step of rounding
 same() {
-    local text
-    ok "the demo runs" build/demo --size 640x360 --samples 1 --out "$dir/demo.png"
-    convert "$1" -crop "640x$((360 - $2))+0+$2" +repage "$1.a.png" && convert "$dir/demo.png" -crop "640x$((360 - $2))+0+$2" +repage "$1.b.png"
-    text=$(compare -metric PAE "$1.a.png" "$1.b.png" null: 2>&1) # "257 (0.00392157)": one code of 255
+    local shot=$1 crop="640x$((360 - $2))+0+$2" text
+    shift 2
+    ok "the demo runs" build/demo --size 640x360 --samples 1 "$@" --out "$dir/demo.png"
+    convert "$shot" -crop "$crop" +repage "$shot.a.png" && convert "$dir/demo.png" -crop "$crop" +repage "$shot.b.png"
+    text=$(compare -metric PAE "$shot.a.png" "$shot.b.png" null: 2>&1) # "257 (0.00392157)": one code of 255
     if awk -v d="${text%% *}" 'BEGIN { exit !(d ~ /^[0-9.]+$/ && d + 0 <= 257) }'; then pass
-    else fail "$1 differs from $dir/demo.png" "largest difference $text"; fi
+    else fail "$shot differs from the demo's picture $*" "largest difference $text"; fi
+}
+
+# dropped FILE: a broken file and then this one are dropped; the page names what is wrong, goes on and shows the light of the other
+dropped() {
+    local name=${1##*/} shot="$dir/web_${1##*.}.png" text
+    head -c 60 "$1" >"$dir/broken_$name"
+    rm -f "$shot"
+    text=$(timeout 150 node tests/drop.js out/web/index.html "$shot" "$dir/broken_$name" "$1" 2>&1)
+    if grep -q "^error broken_$name: ." <<<"$text"; then pass; else fail "a broken $name is not named" "$text"; fi
+    if grep -q "^ light: $name, " <<<"$text"; then pass; else fail "a dropped $name is not read" "$text"; fi
+    if [ -f "$shot" ]; then same "$shot" 0 --env "$1"; else fail "there is no screenshot of $name"; fi
 }
 
 have convert && have compare || { skip "no ImageMagick (imagemagick) to compare pictures"; finish; }
@@ -28,10 +40,12 @@ case $lib in
     web)
         [ -f out/web/demo_web.js ] || { skip "no emscripten (emscripten): make web"; finish; }
         have chromium || { skip "no chromium"; finish; }
-        ok "the page in headless Chromium" timeout 240 chromium --headless --no-sandbox --use-angle=swiftshader \
-            --enable-unsafe-swiftshader --hide-scrollbars --window-size=640,360 --virtual-time-budget=20000 --timeout=120000 \
-            --user-data-dir="$(mktemp -d)" --screenshot="$dir/web.png" "file://$PWD/out/web/index.html#test"
+        ok "the page in headless Chromium" timeout 150 node tests/drop.js out/web/index.html "$dir/web.png"
         if [ -f "$dir/web.png" ]; then same "$dir/web.png" 0; else fail "there is no screenshot"; fi
+        convert -size 96x48 'gradient:#9bf-#321' "$dir/light.hdr" && dropped "$dir/light.hdr"
+        if [ -f build/web/libexr.a ]; then
+            ok "the demo makes a light" build/demo --size 128x64 --samples 1 --out "$dir/light.png" && dropped "$dir/light.exr"
+        else skip "the page is without OpenEXR: the sources were not fetched"; fi
         ;;
 esac
 finish
