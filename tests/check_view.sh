@@ -16,6 +16,16 @@ same() {
     else fail "$shot differs from the demo's picture $*" "largest difference $text"; fi
 }
 
+# refused FILE: the page says in red why it cannot read this, and shows what it showed
+refused() {
+    local name=${1##*/} shot="$dir/web_refused.png" text
+    rm -f "$shot"
+    text=$(timeout 150 node tests/drop.js out/web/index.html "$shot" "$1" 2>&1)
+    if grep -q "^error $name: ." <<<"$text" && grep -q "seen in rgb(255, 136, 136)" <<<"$text"; then pass
+    else fail "a refused $name is not named, or not in sight" "$text"; fi
+    if [ -f "$shot" ]; then same "$shot" 0; else fail "there is no screenshot after $name"; fi
+}
+
 # dropped FILE: a broken file and then this one are dropped; the page names what is wrong, goes on and shows the light of the other
 dropped() {
     local name=${1##*/} shot="$dir/web_${1##*.}.png" text
@@ -40,11 +50,16 @@ case $lib in
     web)
         [ -f out/web/demo_web.js ] || { skip "no emscripten (emscripten): make web"; finish; }
         have chromium || { skip "no chromium"; finish; }
+        have node || { skip "no node (nodejs) to drive chromium"; finish; }
         ok "the page in headless Chromium" timeout 150 node tests/drop.js out/web/index.html "$dir/web.png"
         if [ -f "$dir/web.png" ]; then same "$dir/web.png" 0; else fail "there is no screenshot"; fi
-        convert -size 96x48 'gradient:#9bf-#321' "$dir/light.hdr" && dropped "$dir/light.hdr"
+        head -c 100 build/demo >"$dir/nothing.pfm" && refused "$dir/nothing.pfm"
+        kind=hdr; [ -f build/web/stb.o ] || kind=pfm
+        convert -size 96x48 'gradient:#9bf-#321' "$dir/light.$kind" && dropped "$dir/light.$kind"
         if [ -f build/web/libexr.a ]; then
-            ok "the demo makes a light" build/demo --size 128x64 --samples 1 --out "$dir/light.png" && dropped "$dir/light.exr"
+            rm -f "$dir/light.exr"
+            ok "the demo makes a light" build/demo --size 128x64 --samples 1 --out "$dir/light.png"
+            if [ -f "$dir/light.exr" ]; then dropped "$dir/light.exr"; else skip "no OpenEXR (libopenexr-dev) to write a light"; fi
         else skip "the page is without OpenEXR: the sources were not fetched"; fi
         ;;
 esac

@@ -32,6 +32,9 @@ async function drop(file) {
   for (const type of ["dragEnter", "dragOver", "drop"]) await send("Input.dispatchDragEvent", {type, x: 300, y: 200, data});
   await until("light.textContent.includes(" + JSON.stringify(path.basename(file)) + ") && document.title.endsWith('ms a frame')");
   console.log(await evaluate("light.className + ' ' + light.textContent"));
+  await evaluate("document.body.className = ''"); // as without #test
+  console.log(await evaluate("light.offsetHeight ? 'seen in ' + getComputedStyle(light).color : 'hidden'"));
+  await evaluate("document.body.className = 'test'");
 }
 
 async function main() {
