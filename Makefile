@@ -111,7 +111,8 @@ out/web/index.html: examples/demo_web.html out/web/demo_web.js
 	cp $< $@
 out/web/demo_web.js: build/web/demo_web.o $(WEB_STB) $(WEB_EXR)
 	@mkdir -p $(@D)
-	$(EMCC) -O1 $^ -o $@ -sALLOW_MEMORY_GROWTH=1 -sSINGLE_FILE=1 -sEXPORTED_RUNTIME_METHODS=ccall,FS -sFORCE_FILESYSTEM=1 -sENVIRONMENT=web
+	$(EMCC) -O1 $^ -o $@ -sALLOW_MEMORY_GROWTH=1 -sSINGLE_FILE=1 -sEXPORTED_RUNTIME_METHODS=ccall,FS -sFORCE_FILESYSTEM=1 -sENVIRONMENT=web \
+	    -sMIN_WEBGL_VERSION=2 -sMAX_WEBGL_VERSION=2 -lGL -lhtml5
 build/web/demo_web.o: examples/demo_web.c $(WEB_EXR) | build/web/include/stb
 	$(EMCC) -std=gnu99 -O3 -msimd128 -msse2 $(WEB) -MMD -MP -c $< -o $@
 build/web/stb.o: | build/web/include/stb

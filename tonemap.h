@@ -2231,7 +2231,7 @@ static const char tonemap__glsl_scatter[] =
     "    uint bits = floatBitsToUint(y);\n"
     "    int bin = int((bits - 0x0d800000u) >> 19);\n"
     "    gl_PointSize = 1.0;\n"
-    "    gl_Position = vec4((vec2(bin % 64, bin / 64) + 0.5) / vec2(32.0, TONEMAP_BINS / 128.0) - 1.0, 0.0, 1.0);\n"
+    "    gl_Position = vec4((vec2(bin % 64, bin / 64) + 0.5) / vec2(32.0, float(TONEMAP_BINS) / 128.0) - 1.0, 0.0, 1.0);\n"
     "    if (!(y > 0.0) || bits >= 0x71800000u) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);\n"
     "}\n";
 

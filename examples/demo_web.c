@@ -4,12 +4,18 @@
 
 #define _POSIX_C_SOURCE 200809L
 #define LIGHTSCAN_IMPLEMENTATION
-#include "pipeline.h"
 #ifdef __EMSCRIPTEN__
+#define PIPELINE_GL
+#define FIV_GL
+#define RAINDROP_GL
+#define SSAO_SAT_GL
+#define TONEMAP_GL
 #include <emscripten.h>
+#include <emscripten/html5_webgl.h>
 #else
 #define EMSCRIPTEN_KEEPALIVE
 #endif
+#include "pipeline.h"
 
 static pipeline web;
 static pipeline_options wanted;
@@ -19,6 +25,7 @@ static unsigned char *rgba;
 
 int web_create(int width, int height, int hour);
 int web_set(const char *name, double value);
+int web_use_gl(int on);
 int web_open(const char *path);
 const char *web_formats(void);
 const unsigned char *web_frame(double dt);
@@ -55,6 +62,33 @@ EMSCRIPTEN_KEEPALIVE int web_set(const char *name, double value)
     else return 0;
     return 1;
 }
+
+#ifdef __EMSCRIPTEN__
+typedef void web_function(void);
+static web_function *web_get_proc(const char *name)
+{
+    void *function = emscripten_webgl2_get_proc_address(name); /* what WebGL 1 has too is not among them */
+    return (web_function *)(function ? function : emscripten_webgl1_get_proc_address(name));
+}
+
+/* From the next picture on every stage by WebGL 2, on the canvas #stages; 0 when the browser has not what that needs. */
+EMSCRIPTEN_KEEPALIVE int web_use_gl(int on)
+{
+    static EMSCRIPTEN_WEBGL_CONTEXT_HANDLE context;
+    EmscriptenWebGLContextAttributes attributes;
+    emscripten_webgl_init_context_attributes(&attributes);
+    attributes.majorVersion = 2;
+    if (on && context <= 0) context = emscripten_webgl_create_context("#stages", &attributes);
+    if (on && (context <= 0 || emscripten_webgl_make_context_current(context) != EMSCRIPTEN_RESULT_SUCCESS ||
+               !emscripten_webgl_enable_extension(context, "EXT_color_buffer_float") ||
+               !emscripten_webgl_enable_extension(context, "EXT_float_blend"))) {
+        snprintf(message, sizeof message, "this browser has no WebGL 2 with EXT_color_buffer_float and EXT_float_blend");
+        return 0;
+    }
+    wanted.get_proc = on ? web_get_proc : NULL;
+    return 1;
+}
+#endif
 
 /* What web_open reads. */
 EMSCRIPTEN_KEEPALIVE const char *web_formats(void)
