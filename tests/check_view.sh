@@ -43,9 +43,24 @@ case $lib in
     view)
         [ -x build/demo_view ] || { skip "no GLFW (libglfw3-dev)"; finish; }
         have xvfb-run || { skip "no Xvfb (xvfb, xauth)"; finish; }
-        LIBGL_ALWAYS_SOFTWARE=1 ok "demo_view under Xvfb" timeout 120 xvfb-run -a -s "-screen 0 800x600x24" \
-            build/demo_view --frames 1 --out "$dir/view.png"
-        [ ! -f "$dir/view.png" ] || same "$dir/view.png" 28
+        export LIBGL_ALWAYS_SOFTWARE=1
+        for gl in '' --gl; do
+            rm -f "$dir/view$gl.png"
+            ok "demo_view $gl under Xvfb" timeout 120 xvfb-run -a -s "-screen 0 800x600x24" \
+                build/demo_view $gl --frames 1 --out "$dir/view$gl.png"
+            [ ! -f "$dir/view$gl.png" ] || same "$dir/view$gl.png" 28 $gl
+        done
+        have xdotool || { skip "no xdotool to press keys"; finish; }
+        rm -f "$dir/view_keys.png"
+        ok "demo_view with key G under Xvfb" timeout 120 xvfb-run -a -s "-screen 0 800x600x24" bash -c 'build/demo_view --gl --frames 15 --out "$0" &
+            xdotool search --sync --name "^lightscan$" && sleep 1 && xdotool key g; wait $!' "$dir/view_keys.png"
+        # the overlay begins with the word CPU instead of OpenGL
+        for shot in view--gl view_keys view; do
+            convert "$dir/$shot.png" -crop 18x8+6+6 +repage -colorspace gray -threshold 85% "$dir/$shot.word.png"
+        done
+        if [ "$(compare -metric AE "$dir/view.word.png" "$dir/view_keys.word.png" null: 2>&1)" = 0 ] &&
+            [ "$(compare -metric AE "$dir/view--gl.word.png" "$dir/view_keys.word.png" null: 2>&1)" != 0 ]; then pass
+        else fail "key G does not switch OpenGL off: $dir/view_keys.png"; fi
         ;;
     web)
         [ -f out/web/demo_web.js ] || { skip "no emscripten (emscripten): make web"; finish; }
