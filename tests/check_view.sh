@@ -16,6 +16,16 @@ same() {
     else fail "$shot differs from the demo's picture $*" "largest difference $text"; fi
 }
 
+# alike SHOT OPTION...: the picture is the demo's but for half a code of 255, root mean square
+alike() {
+    local shot=$1 text
+    shift
+    ok "the demo runs" build/demo --size 640x360 --samples 1 "$@" --out "$dir/demo.png"
+    text=$(compare -metric RMSE "$shot" "$dir/demo.png" null: 2>&1) # "11.9 (0.00018)"
+    if awk -v d="${text%% *}" 'BEGIN { exit !(d ~ /^[0-9.]+$/ && d + 0 <= 128) }'; then pass
+    else fail "$shot differs from the demo's picture $*" "root mean square difference $text"; fi
+}
+
 # refused FILE: the page says in red why it cannot read this, and shows what it showed
 refused() {
     local name=${1##*/} shot="$dir/web_refused.png" text
@@ -68,6 +78,9 @@ case $lib in
         have node || { skip "no node (nodejs) to drive chromium"; finish; }
         ok "the page in headless Chromium" timeout 150 node tests/drop.js out/web/index.html "$dir/web.png"
         if [ -f "$dir/web.png" ]; then same "$dir/web.png" 0; else fail "there is no screenshot"; fi
+        rm -f "$dir/web_gl.png"
+        ok "the page by WebGL" timeout 150 node tests/drop.js out/web/index.html#test-gl "$dir/web_gl.png"
+        if [ -f "$dir/web_gl.png" ]; then alike "$dir/web_gl.png" --gl; else fail "there is no screenshot by WebGL"; fi
         head -c 100 build/demo >"$dir/nothing.pfm" && refused "$dir/nothing.pfm"
         kind=hdr; [ -f build/web/stb.o ] || kind=pfm
         convert -size 96x48 'gradient:#9bf-#321' "$dir/light.$kind" && dropped "$dir/light.$kind"

@@ -1,5 +1,5 @@
 // Drops files on the page in headless Chromium, one after the other, through the DevTools protocol.
-// usage: node tests/drop.js PAGE SHOT.png FILE...   prints what the page answers to each, then takes a picture
+// usage: node tests/drop.js PAGE[#test-gl] SHOT.png FILE...   prints what the page answers to each, then takes a picture
 "use strict";
 const fs = require("fs"), os = require("os"), path = require("path");
 const [page, shot, ...files] = process.argv.slice(2);
@@ -38,7 +38,7 @@ async function drop(file) {
 }
 
 async function main() {
-  const {targetId} = await send("Target.createTarget", {url: "file://" + path.resolve(page) + "#test"});
+  const {targetId} = await send("Target.createTarget", {url: "file://" + path.resolve(page) + (page.includes("#") ? "" : "#test")});
   session = (await send("Target.attachToTarget", {targetId, flatten: true})).sessionId;
   await send("Emulation.setDeviceMetricsOverride", {width: 640, height: 360, deviceScaleFactor: 1, mobile: false});
   await until("document.title.endsWith('ms a frame')");
