@@ -90,6 +90,34 @@ TEST(gpu_equals_c)
     }
 }
 
+/* The same in GLSL ES 3.00, on the same driver. */
+static sat_gl_get_proc *es_real;
+
+static const unsigned char *SAT__GL_CALL es_string(unsigned name)
+{
+    return name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)" : test_f.GetString(name);
+}
+
+static sat_gl_proc es_procs(const char *name) { return strcmp(name, "glGetString") == 0 ? (sat_gl_proc)es_string : es_real(name); }
+
+TEST(shaders_are_es)
+{
+    ref_picture p;
+    int m;
+    if (!open_gl()) SKIP(test_gl.message);
+    p = small_picture(0, 0);
+    es_real = test_gl.get_proc, test_gl.get_proc = es_procs;
+    for (m = 0; m < 5; m++) {
+        ssao_sat_options o = ssao_sat_defaults();
+        o.method = (ssao_sat_method)m;
+        o.radius = 0.3;
+        o.half_resolution = m % 2;
+        compare(&p, o, REF_LINEAR, 1, m == SSAO_SAT_REFINED ? 0.01 : 2e-3);
+    }
+    test_gl.get_proc = es_real;
+    ref_free(&p);
+}
+
 TEST(gpu_options_and_conventions)
 {
     ref_picture p;

@@ -139,6 +139,35 @@ TEST(gl_gives_the_cpus_picture)
     screen_close(&s);
 }
 
+/* The same in GLSL ES 3.00, on the same driver. */
+static screen *es_screen;
+static sat_gl_get_proc *es_real;
+
+static const unsigned char *SAT__GL_CALL es_string(unsigned name)
+{
+    return name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)" : es_screen->gl.GetString(name);
+}
+
+static sat_gl_proc es_procs(const char *name) { return strcmp(name, "glGetString") == 0 ? (sat_gl_proc)es_string : es_real(name); }
+
+TEST(gl_shaders_are_es)
+{
+    screen s;
+    tonemap_options o = tonemap_defaults();
+    if (!screen_open(&s)) return;
+    es_screen = &s, es_real = s.context.get_proc, s.context.get_proc = es_procs;
+    o.key = o.white = 0, o.mesopic = TONEMAP_MESOPIC_LOCAL, o.soft = 0.8;
+    compare(&s, &o, 100, 90, 1, 0.002, NULL);
+    o = tonemap_defaults(), o.operation = TONEMAP_ASHIKHMIN, o.mesopic = TONEMAP_MESOPIC_UNIFORM, o.cd_per_unit = 0;
+    compare(&s, &o, 160, 120, 0, 0.005, NULL);
+    o = tonemap_defaults(), o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL, o.white = 4;
+    compare(&s, &o, 100, 90, 0, 0, NULL);
+    o = tonemap_defaults(), o.selective = 0.1;
+    compare(&s, &o, 100, 90, 0, 0.001, NULL);
+    s.context.get_proc = es_real;
+    screen_close(&s);
+}
+
 TEST(gl_takes_thin_pictures)
 {
     int sizes[][2] = {{64, 40}, {40, 27}, {38, 130}, {257, 31}}, i;
