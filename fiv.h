@@ -53,7 +53,8 @@
    fiv_irradiance takes 64 to 90 KB of stack a worker.
 
    NUMERICS
-   - Same bits for any number of workers and any order of instances (sums of parts of I_tot in 2^-40 fixed point).
+   - Same bits for any number of workers and any order of instances (sums of parts of I_tot in 2^-40 fixed point); where the
+     compiler contracts products and sums (-mfma without -ffp-contract=off), orders differ in the last digits, 1e-6.
    - NaN and negative radiance count as 0, what exceeds max_radiance as that much; all are counted. NaN receivers are black.
    - A texel of 1e8 changes no other vector: relative error of a span sum below 1e-10 (double prefixes), of a split-off light
      1e-7. Masks equal rays through the texel centres but for rays that graze an edge (2e-6 of the texels set).
