@@ -553,10 +553,8 @@ static inline int pipeline_change(pipeline *p, const pipeline_options *options)
     pipeline_options old = p->options;
     p->options = *options;
     if (!pipeline_gl_ready(p)) return 0;
-    if (old.get_proc != options->get_proc || old.rate != options->rate) {
-        PIPELINE_GL_FORGET(p);
-        p->settled = 0;
-    }
+    if (old.get_proc != options->get_proc) p->settled = 0;
+    if (old.get_proc != options->get_proc || old.rate != options->rate) PIPELINE_GL_FORGET(p);
     if (old.rate != options->rate) raindrop_rain_destroy(p->rain), p->rain = NULL;
     if (old.ao_radius != options->ao_radius) ssao_sat_destroy(p->ao), p->ao = NULL;
     if (old.ao_radius != options->ao_radius || old.shadows != options->shadows || old.occlusion != options->occlusion) p->settled = 0;
