@@ -118,7 +118,10 @@ static inline int pipeline_gl_done(pipeline *p, int ok)
 static inline int pipeline_gl_ready(pipeline *p)
 {
     if (!p->options.get_proc || p->gl) return 1;
-    return pipeline_gl_done(p, pipeline_gl_create(&p->gl, p->options.get_proc, p->options.width, p->options.height));
+    if (pipeline_gl_done(p, pipeline_gl_create(&p->gl, p->options.get_proc, p->options.width, p->options.height))) return 1;
+    pipeline_gl_destroy(p->gl);
+    p->gl = NULL;
+    return 0;
 }
 #define PIPELINE_ON_GL(p, call) if ((p)->options.get_proc) return pipeline_gl_done(p, call)
 #define PIPELINE_GL_FORGET(p) if ((p)->gl) (p)->gl->environment = NULL, (p)->gl->drops = NULL

@@ -4,6 +4,7 @@
 #include "expect.h"
 #include "support.h"
 #include "gl_context.h"
+#include "gl_es.h"
 #include "reference_fiv.h"
 
 enum { WIDTH = 40, HEIGHT = 24, COUNT = WIDTH * HEIGHT };
@@ -245,35 +246,24 @@ TEST(self_shadows_equal_the_cpu)
 #endif
 
 /* The same in GLSL ES 3.00, on the same driver. */
-static fiv_gl *test_desktop;
-
-static const unsigned char *SAT__GL_CALL test_es_string(unsigned name)
-{
-    return name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)" : test_desktop->gl.GetString(name);
-}
-
-static sat_gl_proc test_as_es(const char *name)
-{
-    return strcmp(name, "glGetString") == 0 ? (sat_gl_proc)test_es_string : scene.context.get_proc(name);
-}
-
 TEST(shaders_are_es)
 {
     fiv_gl_options o = fiv_gl_defaults();
+    fiv_gl *desktop;
     double worst, rms;
     if (!test_open(FIV_STORAGE_FLOAT, 0)) SKIP(scene.context.message);
-    test_desktop = scene.gl;
+    desktop = scene.gl;
     o.allocator = scene.gl->allocator;
 #ifndef FIV_NO_SELF
     o.self = 1;
     test_receivers_on_knots();
 #endif
-    EXPECT_EQ(fiv_gl_create(&scene.gl, test_as_es, WIDTH, HEIGHT, &o), SAT_OK);
+    EXPECT_EQ(fiv_gl_create(&scene.gl, gl_es_pretend(scene.context.get_proc), WIDTH, HEIGHT, &o), SAT_OK);
     EXPECT(scene.gl->gl.is_es);
     EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
     test_difference(&worst, &rms, 3);
     EXPECT(worst < 2e-3 && rms < 1e-4);
-    fiv_gl_destroy(test_desktop);
+    fiv_gl_destroy(desktop);
     test_close();
 }
 

@@ -1,6 +1,7 @@
 /* softassign.h on the GPU against the same methods on the CPU. Needs OSMesa (or a GPU, see gl_context.h); skips without. */
 
 #include "gl_context.h"
+#include "gl_es.h"
 #include "support.h"
 
 static gl_context test_context;
@@ -295,21 +296,12 @@ TEST(softassign_gl_refuses_and_names)
 }
 
 /* Every shader also as GLSL ES 3.00: the function table believes to be in an ES context. */
-static const unsigned char *SAT__GL_CALL es_string(unsigned name)
-{
-    return name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)" : test_gl.GetString(name);
-}
-static sat_gl_proc as_es(const char *name)
-{
-    return strcmp(name, "glGetString") == 0 ? (sat_gl_proc)es_string : test_context.get_proc(name);
-}
-
 TEST(softassign_gl_shaders_are_valid_in_es)
 {
     softassign_gl *gl = NULL;
     sat_result result;
     if (!open_gl()) return;
-    result = softassign_gl_create(&gl, as_es, NULL);
+    result = softassign_gl_create(&gl, gl_es_pretend(test_context.get_proc), NULL);
     if (!EXPECT_EQ(result, SAT_OK)) puts(softassign_gl_message(gl));
     softassign_gl_destroy(gl);
     EXPECT(strstr(softassign_gl_glsl(), "softassign_join") != NULL && strlen(softassign_gl_glsl()) < 4096);

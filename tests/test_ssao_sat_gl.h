@@ -1,5 +1,7 @@
 /* ssao_sat.h on the GPU: equal to the C code, state left alone, errors. Needs OSMesa (or a GPU, see gl_context.h); skips without. */
 
+#include "gl_es.h"
+
 enum { GL_WIDTH = 97, GL_HEIGHT = 71 };
 
 static gl_context test_gl;
@@ -91,22 +93,13 @@ TEST(gpu_equals_c)
 }
 
 /* The same in GLSL ES 3.00, on the same driver. */
-static sat_gl_get_proc *es_real;
-
-static const unsigned char *SAT__GL_CALL es_string(unsigned name)
-{
-    return name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)" : test_f.GetString(name);
-}
-
-static sat_gl_proc es_procs(const char *name) { return strcmp(name, "glGetString") == 0 ? (sat_gl_proc)es_string : es_real(name); }
-
 TEST(shaders_are_es)
 {
     ref_picture p;
     int m;
     if (!open_gl()) SKIP(test_gl.message);
     p = small_picture(0, 0);
-    es_real = test_gl.get_proc, test_gl.get_proc = es_procs;
+    test_gl.get_proc = gl_es_pretend(test_gl.get_proc);
     for (m = 0; m < 5; m++) {
         ssao_sat_options o = ssao_sat_defaults();
         o.method = (ssao_sat_method)m;
@@ -114,7 +107,7 @@ TEST(shaders_are_es)
         o.half_resolution = m % 2;
         compare(&p, o, REF_LINEAR, 1, m == SSAO_SAT_REFINED ? 0.01 : 2e-3);
     }
-    test_gl.get_proc = es_real;
+    test_gl.get_proc = gl_es_real;
     ref_free(&p);
 }
 

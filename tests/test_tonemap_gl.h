@@ -3,6 +3,7 @@
 #include "support.h"
 #include "metrics.h"
 #include "gl_context.h"
+#include "gl_es.h"
 
 typedef struct screen { gl_context context; sat__gl gl; } screen;
 
@@ -140,22 +141,12 @@ TEST(gl_gives_the_cpus_picture)
 }
 
 /* The same in GLSL ES 3.00, on the same driver. */
-static screen *es_screen;
-static sat_gl_get_proc *es_real;
-
-static const unsigned char *SAT__GL_CALL es_string(unsigned name)
-{
-    return name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)" : es_screen->gl.GetString(name);
-}
-
-static sat_gl_proc es_procs(const char *name) { return strcmp(name, "glGetString") == 0 ? (sat_gl_proc)es_string : es_real(name); }
-
 TEST(gl_shaders_are_es)
 {
     screen s;
     tonemap_options o = tonemap_defaults();
     if (!screen_open(&s)) return;
-    es_screen = &s, es_real = s.context.get_proc, s.context.get_proc = es_procs;
+    s.context.get_proc = gl_es_pretend(s.context.get_proc);
     o.key = o.white = 0, o.mesopic = TONEMAP_MESOPIC_LOCAL, o.soft = 0.8;
     compare(&s, &o, 100, 90, 1, 0.002, NULL);
     o = tonemap_defaults(), o.operation = TONEMAP_ASHIKHMIN, o.mesopic = TONEMAP_MESOPIC_UNIFORM, o.cd_per_unit = 0;
@@ -164,7 +155,7 @@ TEST(gl_shaders_are_es)
     compare(&s, &o, 100, 90, 0, 0, NULL);
     o = tonemap_defaults(), o.selective = 0.1;
     compare(&s, &o, 100, 90, 0, 0.001, NULL);
-    s.context.get_proc = es_real;
+    s.context.get_proc = gl_es_real;
     screen_close(&s);
 }
 
