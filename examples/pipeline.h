@@ -120,7 +120,7 @@ static inline int pipeline_gl_ready(pipeline *p)
     if (!p->options.get_proc || p->gl) return 1;
     if (pipeline_gl_done(p, pipeline_gl_create(&p->gl, p->options.get_proc, p->options.width, p->options.height))) return 1;
     pipeline_gl_destroy(p->gl);
-    p->gl = NULL;
+    p->gl = NULL, p->options.get_proc = NULL;
     return 0;
 }
 #define PIPELINE_ON_GL(p, call) if ((p)->options.get_proc) return pipeline_gl_done(p, call)
