@@ -368,6 +368,7 @@ FIV_DEF sat_result fiv_gl_bind(fiv_gl *gl, unsigned program, int first_unit);
 #define FIV_ASSERT(condition) SAT_ASSERT(condition)
 #endif
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -3495,6 +3496,7 @@ FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, siz
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* FIV_IMPLEMENTATION */
 
 /* ------------------------------------------------------------------------------------------------
@@ -3509,6 +3511,7 @@ FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, siz
 #endif
 #include "sat.h"
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -4047,6 +4050,7 @@ FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *g, unsigned points, unsigned normal
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* FIV_IMPLEMENTATION && FIV_GL */
 
 /* ------------------------------------------------------------------------------------------------

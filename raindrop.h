@@ -459,6 +459,7 @@ RAINDROP_DEF const char *raindrop_gl_glsl(void);
 #endif
 #include "sat.h"
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -3224,6 +3225,7 @@ RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* RAINDROP_IMPLEMENTATION */
 
 /* ------------------------------------------------------------------------------------------------
@@ -3233,6 +3235,7 @@ RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride
 #if defined(RAINDROP_IMPLEMENTATION) && defined(RAINDROP_GL) && !defined(RAINDROP__GL_IMPLEMENTED)
 #define RAINDROP__GL_IMPLEMENTED
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -4099,6 +4102,7 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* RAINDROP_IMPLEMENTATION && RAINDROP_GL */
 
 /* ------------------------------------------------------------------------------------------------

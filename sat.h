@@ -68,7 +68,8 @@
      pixel changes no box without it. TILED clamps a tile row's pixels to 3.3e35, FLOAT all pixels to 1.6e29, when their
      sums would overflow otherwise. SAT_NON_FINITE_REFUSE returns an error instead.
    - The same bits for any number of workers, for SSE2, AVX2, NEON and plain C, with and without contraction into fused
-     multiply-adds, as long as the compiler keeps to IEEE arithmetic (not with -ffast-math).
+     multiply-adds, also under -ffast-math and -Ofast, which the
+     implementation switches off for itself (gcc, clang, MSVC); only subnormals may then count as 0, as the program asked for.
    - Corners that share a tile row or column skip the sums these would cancel, so that 3 x 3 boxes beside a bright region
      keep their digits: at the 99th percentile such a table beats doubles of 8 bytes a pixel.
    - subtract_mean helps images of low contrast and harms dark boxes of high dynamic range.
@@ -442,6 +443,25 @@ SAT_DEF const char *sat_gl_glsl(void);
 #define SAT_ASSERT(condition) assert(condition)
 #endif
 
+/* IEEE arithmetic between SAT__IEEE_BEGIN and SAT__IEEE_END, whatever the program is compiled with: -ffast-math and -Ofast
+   would drop NaN and infinity and reorder sums, contraction into fused multiply-adds would change bits. Where nothing of
+   this is asked for, gcc is left alone. */
+#define SAT__PRAGMA(text) _Pragma(#text)
+#if defined(__clang__)
+#define SAT__IEEE_BEGIN SAT__PRAGMA(float_control(push)) SAT__PRAGMA(float_control(precise, on)) SAT__PRAGMA(clang fp contract(off))
+#define SAT__IEEE_END SAT__PRAGMA(float_control(pop))
+#elif defined(__GNUC__) && !defined(__TINYC__) && (defined(__FAST_MATH__) || __FINITE_MATH_ONLY__ || defined(__FP_FAST_FMAF))
+#define SAT__IEEE_BEGIN SAT__PRAGMA(GCC push_options) SAT__PRAGMA(GCC optimize("no-fast-math", "no-unsafe-math-optimizations", \
+    "no-finite-math-only", "no-associative-math", "no-reciprocal-math", "signed-zeros", "fp-contract=off"))
+#define SAT__IEEE_END SAT__PRAGMA(GCC pop_options)
+#elif defined(_MSC_VER)
+#define SAT__IEEE_BEGIN __pragma(float_control(precise, on, push)) __pragma(fp_contract(off))
+#define SAT__IEEE_END __pragma(float_control(pop))
+#else
+#define SAT__IEEE_BEGIN
+#define SAT__IEEE_END
+#endif
+
 /* Vector instructions come from the compiler's own macros; every vector loop has a plain twin. */
 #ifndef SAT_NO_SIMD
 #if defined(__SSE2__) || defined(_M_X64) || (defined(_M_IX86_FP) && _M_IX86_FP >= 2)
@@ -456,6 +476,8 @@ SAT_DEF const char *sat_gl_glsl(void);
 #include <arm_neon.h>
 #endif
 #endif
+
+SAT__IEEE_BEGIN
 
 /* ---- memory, sizes, threads */
 
@@ -623,6 +645,192 @@ static inline float sat__srgb_decode(float encoded)
 static inline float sat__luminance(float red, float green, float blue)
 {
     return 0.2126729f * red + 0.7151522f * green + 0.0721750f * blue;
+}
+
+/* ---- options: one row a field. The same table gives the defaults, checks what a caller wrote and names what is wrong;
+   a test compares it with the comments of the struct. */
+
+typedef struct sat__field {
+    const char *name;
+    size_t offset;
+    char type;       /* i: int or enum; f: float; d: double; t: sat_threads; a: sat_allocator */
+    char also;       /* a value outside [low, high] that is allowed: '0' zero, 'I' +infinity, '-' anything negative and
+                        finite, '2' (type i) only powers of two inside the range; ' ' none */
+    double initial, low, high;
+    const char *hint; /* what follows the range in a message: "TONEMAP_NO_SOFT left it out"; NULL: nothing */
+} sat__field;
+
+#define SAT__FIELD(type_of, type, name, initial, low, high, also) {#name, offsetof(type_of, name), type, also, initial, low, high, NULL}
+
+/* The value of a field as a double; 0 for threads and allocators. */
+static inline double sat__field_value(const sat__field *field, const void *options)
+{
+    const unsigned char *at = (const unsigned char *)options + field->offset;
+    double d = 0;
+    float f;
+    int i;
+    if (field->type == 'd') memcpy(&d, at, sizeof d);
+    if (field->type == 'f') {
+        memcpy(&f, at, sizeof f);
+        d = (double)f;
+    }
+    if (field->type == 'i') {
+        memcpy(&i, at, sizeof i);
+        d = i;
+    }
+    return d;
+}
+
+static inline void sat__field_set(const sat__field *field, void *options, double value)
+{
+    unsigned char *at = (unsigned char *)options + field->offset;
+    float f = (float)value;
+    int i = field->type == 'i' ? (int)value : 0;
+    if (field->type == 'd') memcpy(at, &value, sizeof value);
+    else if (field->type == 'f') memcpy(at, &f, sizeof f);
+    else if (field->type == 'i') memcpy(at, &i, sizeof i);
+}
+
+/* What X_defaults() is made of. */
+static inline void sat__fields_default(void *options, size_t size, const sat__field *fields, int count)
+{
+    int i;
+    memset(options, 0, size);
+    for (i = 0; i < count; i++) sat__field_set(&fields[i], options, fields[i].initial);
+}
+
+static inline int sat__field_is_valid(const sat__field *field, const void *options)
+{
+    const unsigned char *at = (const unsigned char *)options + field->offset;
+    double v = sat__field_value(field, options);
+    sat_allocator allocator, resolved;
+    sat_threads threads;
+    if (field->type == 't') {
+        memcpy(&threads, at, sizeof threads);
+        return sat__threads_are_valid(&threads);
+    }
+    if (field->type == 'a') {
+        memcpy(&allocator, at, sizeof allocator);
+        return sat__resolve_allocator(&resolved, &allocator);
+    }
+    if (!sat__is_finite_double(v)) return field->also == 'I' && v > 0;
+    if ((field->also == '0' && v == 0) || (field->also == '-' && v < 0)) return 1;
+    if (field->also == '2' && ((int)v & ((int)v - 1))) return 0;
+    return v >= field->low && v <= field->high;
+}
+
+/* The first field that is outside its range, or NULL. */
+static inline const sat__field *sat__fields_check(const void *options, const sat__field *fields, int count)
+{
+    int i;
+    for (i = 0; i < count; i++)
+        if (!sat__field_is_valid(&fields[i], options)) return &fields[i];
+    return NULL;
+}
+
+/* ---- sentences for X_explain: written into the caller's memory, cut where it ends */
+
+typedef struct sat__text { char *at; size_t size, used; } sat__text;
+
+static inline sat__text sat__text_begin(char *text, size_t size)
+{
+    sat__text t;
+    t.at = text;
+    t.size = text ? size : 0;
+    t.used = 0;
+    if (t.size) text[0] = 0;
+    return t;
+}
+
+static inline void sat__text_add(sat__text *t, const char *words)
+{
+    while (*words && t->used + 1 < t->size) t->at[t->used++] = *words++;
+    if (t->size) t->at[t->used] = 0;
+}
+
+/* value = 0.d[0]d[1]..d[5] * 10^(exponent + 1), rounded; returns the exponent. */
+static inline int sat__six_digits(char d[6], double value)
+{
+    int exponent = 0, i;
+    if (value > 0) {
+        exponent = (int)floor(log10(value));
+        if (exponent < -290) value = value * 1e300 / pow(10, exponent + 300);
+        else value /= pow(10, exponent);
+        value = floor(value * 1e5 + 0.5);
+        if (value >= 1e6) {
+            value /= 10;
+            exponent++;
+        }
+    }
+    for (i = 5; i >= 0; i--) {
+        d[i] = (char)('0' + (int)fmod(value, 10));
+        value = floor(value / 10);
+    }
+    return exponent;
+}
+
+/* As %.6g writes it, but with a point in every locale. */
+static inline void sat__text_number(sat__text *t, double value)
+{
+    char d[6], out[32];
+    int exponent, scientific, i, n = 0, last = 5, point;
+    if (!sat__is_finite_double(value)) {
+        sat__text_add(t, value > 0 ? "infinity" : value < 0 ? "-infinity" : "NaN");
+        return;
+    }
+    exponent = sat__six_digits(d, fabs(value));
+    scientific = exponent < -4 || exponent > 5;
+    point = scientific ? 0 : exponent;
+    while (last > 0 && d[last] == '0') last--;
+    if (value < 0) out[n++] = '-';
+    for (i = point < 0 ? point : 0; i <= last || i <= point; i++) {
+        out[n++] = i < 0 ? '0' : d[i];
+        if (i == point && i < last) out[n++] = '.';
+    }
+    if (scientific) {
+        out[n++] = 'e';
+        if (exponent < 0) out[n++] = '-';
+        exponent = exponent < 0 ? -exponent : exponent;
+        if (exponent >= 100) out[n++] = (char)('0' + exponent / 100);
+        if (exponent >= 10) out[n++] = (char)('0' + exponent / 10 % 10);
+        out[n++] = (char)('0' + exponent % 10);
+    }
+    out[n] = 0;
+    sat__text_add(t, out);
+}
+
+/* "scales is 99; 1..8" */
+static inline void sat__text_range(sat__text *t, const char *name, double value, double low, double high, char also)
+{
+    sat__text_add(t, name);
+    sat__text_add(t, " is ");
+    sat__text_number(t, value);
+    sat__text_add(t, "; ");
+    sat__text_number(t, low);
+    sat__text_add(t, "..");
+    sat__text_number(t, high);
+    if (also == '0') sat__text_add(t, " or 0");
+    if (also == 'I') sat__text_add(t, " or infinity");
+    if (also == '-') sat__text_add(t, " or negative");
+    if (also == '2') sat__text_add(t, ", a power of two");
+}
+
+/* The sentence of a field that sat__fields_check found. */
+static inline void sat__text_field(sat__text *t, const sat__field *field, const void *options)
+{
+    sat_threads threads;
+    if (field->type == 'a') {
+        sat__text_add(t, field->name);
+        sat__text_add(t, ": alloc and release are needed, both or (with stdlib) none");
+    } else if (field->type == 't') {
+        memcpy(&threads, (const unsigned char *)options + field->offset, sizeof threads);
+        if (threads.parallel_for) sat__text_range(t, "threads.workers", threads.workers, 1, 1024, ' ');
+        else sat__text_range(t, "threads.workers without parallel_for", threads.workers, 0, 1, ' ');
+    } else sat__text_range(t, field->name, sat__field_value(field, options), field->low, field->high, field->also);
+    if (field->hint) {
+        sat__text_add(t, ": ");
+        sat__text_add(t, field->hint);
+    }
 }
 
 /* ---- images */
@@ -797,7 +1005,9 @@ static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g
 /* What a sibling's implementation calls to be sure that sat.h was implemented, and in this version. */
 static inline int sat__version_matches(void) { return sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file == SAT_VERSION; }
 
+SAT__IEEE_END
 #endif /* SAT__SHARED */
+
 /* ------------------------------------------------------------------------------------------------
    For the sibling headers: OpenGL
 
@@ -1638,6 +1848,7 @@ static inline double sat__gl_timer_end(sat__gl *gl, sat__gl_timer *timer)
 #if defined(SAT_IMPLEMENTATION) && !defined(SAT_IMPLEMENTED)
 #define SAT_IMPLEMENTED
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -3447,6 +3658,7 @@ SAT_DEF sat_result sat_stream_push(sat_stream *stream, float *out_row, int *rows
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* SAT_IMPLEMENTATION */
 
 /* ------------------------------------------------------------------------------------------------
@@ -3456,6 +3668,7 @@ SAT_DEF sat_result sat_stream_push(sat_stream *stream, float *out_row, int *rows
 #if defined(SAT_IMPLEMENTATION) && defined(SAT_GL) && !defined(SAT__GL_IMPLEMENTED)
 #define SAT__GL_IMPLEMENTED
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -4197,6 +4410,7 @@ SAT_DEF const char *sat_gl_message(const sat_gl *gl) { return gl ? gl->gl.messag
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* SAT__GL_IMPLEMENTED */
 
 /* ------------------------------------------------------------------------------------------------

@@ -310,6 +310,7 @@ SOFTASSIGN_DEF const char *softassign_gl_glsl(void);
 #endif
 #include "sat.h"
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -3277,6 +3278,7 @@ SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* SOFTASSIGN_IMPLEMENTATION */
 
 /* ------------------------------------------------------------------------------------------------
@@ -3294,6 +3296,7 @@ SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride
 #endif
 #include "sat.h"
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -3894,6 +3897,7 @@ SOFTASSIGN_DEF sat_result softassign_gl_sweep(softassign_gl *gl, float *price, d
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* SOFTASSIGN_GL */
 
 /* ------------------------------------------------------------------------------------------------

@@ -313,6 +313,7 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_view(float *view, const ssao_sat_input *inpu
 #endif
 #include "sat.h"
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -1965,6 +1966,7 @@ SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao)
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* SSAO_SAT_IMPLEMENTATION */
 
 /* ------------------------------------------------------------------------------------------------
@@ -1977,6 +1979,7 @@ SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao)
 #if defined(SSAO_SAT_GL) && defined(SSAO_SAT_IMPLEMENTATION) && !defined(SSAO_SAT__GL_IMPLEMENTED)
 #define SSAO_SAT__GL_IMPLEMENTED
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -2657,6 +2660,7 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigne
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* SSAO_SAT__GL_IMPLEMENTED */
 
 /* ------------------------------------------------------------------------------------------------

@@ -253,6 +253,7 @@ TONEMAP_DEF const char *tonemap_gl_glsl(void);
 #include "sat.h"
 #include <float.h>
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -2119,6 +2120,7 @@ TONEMAP_DEF sat_result tonemap_once_u8(unsigned char *out, const float *pixels, 
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* TONEMAP_IMPLEMENTATION */
 
 /* ------------------------------------------------------------------------------------------------
@@ -2133,6 +2135,7 @@ TONEMAP_DEF sat_result tonemap_once_u8(unsigned char *out, const float *pixels, 
 #endif
 #include "sat.h"
 
+SAT__IEEE_BEGIN
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -2660,6 +2663,7 @@ TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned h
 #ifdef __cplusplus
 }
 #endif
+SAT__IEEE_END
 #endif /* TONEMAP_GL */
 
 /* ------------------------------------------------------------------------------------------------
