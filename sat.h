@@ -24,6 +24,8 @@
    - Exact tables in integers modulo 2^32 or 2^64: the same bits on CPU and GPU, for any order of additions.
    - Means over boxes with real corners, beyond the border (clip, zero, clamp, mirror, wrap), with a radius for each pixel;
      box filters of whole images, also of images that arrive a row at a time; dirty rectangles.
+   - Variance and covariance over any box, from moments about the mean of each tile: 1e4 +- 1 comes out right to 1e-3 and
+     never negative, where sums of x and x * x give noise.
    - An error bound and an expected error for every table, and a plan that picks the cheapest kind for a wanted error.
    - k-ary scans by recursive doubling and by balanced trees, with the work they do counted (Slomp 2012, chapter 4), for any
      type and operation.
@@ -33,7 +35,6 @@
 
    - No second-order (tent) tables, no tilted tables, no half-float tables: the first lose too many digits in float and
      are two box filters otherwise, nobody but Haar cascades wants the second, the third overflow at 65504.
-   - No moments: pass x and x * x as two channels; the tiled table keeps the variance.
    - It starts no thread, opens no window, creates no OpenGL context, keeps no global state.
 
    OPTIONS (macros)
@@ -184,6 +185,10 @@ SAT_DEF const char *sat_result_text(sat_result result);
 /* A packed float image. */
 SAT_DEF sat_image sat_image_f32(const float *pixels, int width, int height, int channels);
 
+/* Why an image or the arguments of a create are refused: one sentence in the caller's memory, cut at `size` bytes,
+   "tile is 99; 8..128, a power of two"; "" where they would be taken. Returns text. */
+SAT_DEF char *sat_explain_image(char *text, size_t size, const sat_image *image);
+
 /* ------------------------------------------------------------------------------------------------
    Scans: out[i] = in[0] + ... + in[i], for any associative sum (Slomp 2012, sections 4.3 to 4.5)
    ------------------------------------------------------------------------------------------------ */
@@ -205,13 +210,14 @@ typedef struct sat_scan_counters {
 
 typedef struct sat_scan_options {
     sat_scan_algorithm algorithm; /* SAT_SCAN_SEQUENTIAL */
-    int k;                        /* 4; 2..64: values summed in one step. 4 moves the fewest (7.67 n) */
-    int exclusive;                /* 0; 1: out[i] leaves in[i] out and out[0] is the identity */
+    int k;                        /* 4; 2..64; values summed in one step. 4 moves the fewest (7.67 n) */
+    int exclusive;                /* 0; 0..1; 1: out[i] leaves in[i] out and out[0] is the identity */
     sat_allocator allocator;      /* malloc; used by the two parallel algorithms only */
     sat_threads threads;          /* serial; same bits for any worker count */
     sat_scan_counters *counters;  /* NULL: not counted; otherwise overwritten */
 } sat_scan_options;
 SAT_DEF sat_scan_options sat_scan_defaults(void);
+SAT_DEF char *sat_explain_scan(char *text, size_t size, const sat_scan_options *options); /* as sat_explain_image; NULL options: the defaults */
 
 /* In place when out == in; otherwise the two must not overlap. n may be 0. Integers wrap around. */
 SAT_DEF sat_result sat_scan_f32(float *out, const float *in, size_t n, const sat_scan_options *options);
@@ -250,18 +256,20 @@ typedef enum sat_non_finite {
 
 typedef struct sat_options {
     sat_kind kind;             /* SAT_KIND_TILED */
-    int tile;                  /* 32; 8, 16, 32, 64 or 128: tile side of SAT_KIND_TILED; 64 needs 4.25 bytes, errs 4x */
-    int subtract_mean;         /* 0; 1 (FLOAT, DOUBLE): Hensley 2005. Good at low contrast; makes dark boxes of
+    int tile;                  /* 32; 8..128; a power of two: tile side of SAT_KIND_TILED; 64 needs 4.25 bytes, errs 4x */
+    int subtract_mean;         /* 0; 0..1; 1 (FLOAT, DOUBLE): Hensley 2005. Good at low contrast; makes dark boxes of
                                   HDR images about 100 times worse */
-    double quantum;            /* 0: the finest power of two that max_value and max_box_area allow; FIXED kinds only */
-    double max_value;          /* 0: as large as the kind can sum (FIXED kinds: the largest |pixel| of the first build).
-                                  > 0: pixels beyond +-max_value are clamped to it and counted */
-    double max_box_area;       /* 0: the whole table; FIXED kinds: no larger box is ever asked for */
+    double quantum;            /* 0; 0..1e300; 0: the finest power of two that max_value and max_box_area allow; FIXED kinds only */
+    double max_value;          /* 0; 0..1e300; 0: as large as the kind can sum (FIXED kinds: the largest |pixel| of the first
+                                  build). > 0: pixels beyond +-max_value are clamped to it and counted */
+    double max_box_area;       /* 0; 0..1e300; 0: the whole table; FIXED kinds: no larger box is ever asked for */
     sat_non_finite non_finite; /* SAT_NON_FINITE_CLAMP */
     sat_allocator allocator;   /* malloc; used by create and destroy only */
     sat_threads threads;       /* serial; build, update and box filters use it; same bits for any worker count */
 } sat_options;
 SAT_DEF sat_options sat_defaults(void);
+/* As sat_explain_image, for the arguments of sat_create. NULL options mean the defaults, here and in every call. */
+SAT_DEF char *sat_explain(char *text, size_t size, int width, int height, int channels, const sat_options *options);
 
 typedef struct sat_table sat_table;
 
@@ -328,6 +336,35 @@ SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, 
 SAT_DEF sat_result sat_stream_push(sat_stream *stream, float *out_row, int *rows_out, const sat_image *row);
 SAT_DEF void sat_stream_destroy(sat_stream *stream);
 
+/* ------------------------------------------------------------------------------------------------
+   Moments: variance and covariance over any box, right where the variance is small beside the mean
+   ------------------------------------------------------------------------------------------------ */
+
+typedef struct sat_moments_options {
+    int covariance;            /* 0; 0..1; 1: the products of different channels too, for sat_covariance */
+    sat_non_finite non_finite; /* SAT_NON_FINITE_CLAMP; NaN and infinity then count as the mean of their 64 x 64 tile */
+    sat_allocator allocator;   /* malloc; used by create and destroy only */
+    sat_threads threads;       /* serial; same bits for any worker count */
+} sat_moments_options;
+SAT_DEF sat_moments_options sat_moments_defaults(void);
+SAT_DEF char *sat_explain_moments(char *text, size_t size, int width, int height, int channels, const sat_moments_options *options);
+
+/* Sums of (x - m) and of (x - m)(y - m') in double, where m is the mean of the pixel's own tile: 8 bytes a pixel for each
+   channel and for each product (c squares, or c (c + 1) / 2 with covariance). One allocation, at create. */
+typedef struct sat_moments sat_moments;
+SAT_DEF sat_result sat_moments_create(sat_moments **out, int width, int height, int channels, const sat_moments_options *options);
+SAT_DEF sat_result sat_moments_build(sat_moments *moments, const sat_image *image);
+SAT_DEF void sat_moments_destroy(sat_moments *moments); /* NULL is fine */
+
+/* Over the box [x0,x1) x [y0,y1), clipped; an empty box gives 0. Divided by the number of pixels (not less one). A variance is
+   never negative. What tiles hold is joined by Chan's rule, so a lookup takes a few additions a touched tile. */
+SAT_DEF double sat_moments_mean(const sat_moments *moments, int channel, int x0, int y0, int x1, int y1);
+SAT_DEF double sat_variance(const sat_moments *moments, int channel, int x0, int y0, int x1, int y1);
+SAT_DEF double sat_covariance(const sat_moments *moments, int channel, int other, int x0, int y0, int x1, int y1);
+/* sat_covariance(channel, other) around every pixel, (2 radius + 1)^2 pixels clipped at the borders; one float a pixel,
+   rows out_stride bytes apart. channel == other: the variance. mean: NULL, or takes the mean of `channel`. */
+SAT_DEF sat_result sat_moments_filter(float *out, float *mean, ptrdiff_t out_stride, const sat_moments *moments, int channel, int other, int radius);
+
 /* A program that forgets SAT_IMPLEMENTATION fails to link, and this name says why. */
 #ifdef SAT_STATIC
 static const int sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file = SAT_VERSION;
@@ -362,18 +399,19 @@ typedef struct sat_gl_options {
     sat_gl_format format;         /* SAT_GL_TWO_FLOAT */
     sat_scan_algorithm algorithm; /* SAT_SCAN_BALANCED_TREE; or RECURSIVE_DOUBLING: half the passes, log_k n times the
                                      pixels, ahead for small tables only */
-    int k;                        /* 4; 2..64: texels read for one written */
-    int compute;                  /* 0; 1: the tree's second half by compute shaders where there is GL 4.3: one
+    int k;                        /* 4; 2..64; texels read for one written */
+    int compute;                  /* 0; 0..1; 1: the tree's second half by compute shaders where there is GL 4.3: one
                                      invocation writes k texels, so that k = 32 or 64 is best */
-    int channel;                  /* 0; 0..3: the channel of the input texture */
-    int unsigned_input;           /* 0; 1 (FIXED32): the input is an unsigned integer texture and is summed as it is */
-    double quantum;               /* 0: the finest that max_value and max_box_area allow; else a power of two. FIXED32 */
-    double max_value;             /* 1e30; > 0: pixels beyond +-max_value are clamped to it; NaN counts as 0. Lower it
-                                     for FIXED32: the quantum is proportional to it */
-    double max_box_area;          /* 0: the whole table; FIXED32: no larger box is ever asked for */
+    int channel;                  /* 0; 0..3; the channel of the input texture */
+    int unsigned_input;           /* 0; 0..1; 1 (FIXED32): the input is an unsigned integer texture and is summed as it is */
+    double quantum;               /* 0; 1e-35..1e35; a power of two. 0: the finest that max_value and max_box_area allow. FIXED32 */
+    double max_value;             /* 1e30; 1e-300..1e300; pixels beyond +-max_value are clamped to it; NaN counts as 0. Lower
+                                     it for FIXED32: the quantum is proportional to it */
+    double max_box_area;          /* 0; 0..1e300; 0: the whole table; FIXED32: no larger box is ever asked for */
     sat_allocator allocator;      /* malloc; used by create and destroy only */
 } sat_gl_options;
 SAT_DEF sat_gl_options sat_gl_defaults(void);
+SAT_DEF char *sat_explain_gl(char *text, size_t size, const sat_gl_options *options); /* as sat_explain_image */
 
 /* Belongs to the context that is current in create: it must be current in every call. Textures are made by the
    first build of a size. Every call leaves the OpenGL state as it was (but for pending errors, which are lost). */
@@ -660,6 +698,7 @@ typedef struct sat__field {
     const char *hint; /* what follows the range in a message: "TONEMAP_NO_SOFT left it out"; NULL: nothing */
 } sat__field;
 
+#define SAT__COUNT(array) ((int)(sizeof(array) / sizeof *(array)))
 #define SAT__FIELD(type_of, type, name, initial, low, high, also) {#name, offsetof(type_of, name), type, also, initial, low, high, NULL}
 
 /* The value of a field as a double; 0 for threads and allocators. */
@@ -1880,12 +1919,27 @@ SAT_DEF sat_image sat_image_f32(const float *pixels, int width, int height, int 
 
 /* ---- scans */
 
+static const sat__field sat__scan_fields[] = {
+    SAT__FIELD(sat_scan_options, 'i', algorithm, 0, 0, SAT_SCAN_BALANCED_TREE, ' '),
+    SAT__FIELD(sat_scan_options, 'i', k, 4, 2, 64, ' '),
+    SAT__FIELD(sat_scan_options, 'i', exclusive, 0, 0, 1, ' '),
+    SAT__FIELD(sat_scan_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(sat_scan_options, 't', threads, 0, 0, 0, ' '),
+};
+
 SAT_DEF sat_scan_options sat_scan_defaults(void)
 {
     sat_scan_options options;
-    memset(&options, 0, sizeof options);
-    options.k = 4;
+    sat__fields_default(&options, sizeof options, sat__scan_fields, SAT__COUNT(sat__scan_fields));
     return options;
+}
+
+SAT_DEF char *sat_explain_scan(char *text, size_t size, const sat_scan_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    const sat__field *wrong = options ? sat__fields_check(options, sat__scan_fields, SAT__COUNT(sat__scan_fields)) : NULL;
+    if (wrong) sat__text_field(&t, wrong, options);
+    return text;
 }
 
 /* One pass of a scan over elements of any type: destination and source levels and where they lie. */
@@ -2061,10 +2115,8 @@ static sat_result sat__scan_check(sat_scan_options *resolved, sat_allocator *all
                                   size_t n, const sat_scan_options *options)
 {
     *resolved = options ? *options : sat_scan_defaults();
-    if ((n && (!out || !in)) || resolved->k < 2 || resolved->k > 64) return SAT_ERR_ARGUMENT;
-    if ((unsigned)resolved->algorithm > (unsigned)SAT_SCAN_BALANCED_TREE) return SAT_ERR_ARGUMENT;
-    if (!sat__threads_are_valid(&resolved->threads)) return SAT_ERR_ARGUMENT;
-    if (!sat__resolve_allocator(allocator, &resolved->allocator)) return SAT_ERR_ARGUMENT;
+    if ((n && (!out || !in)) || sat__fields_check(resolved, sat__scan_fields, SAT__COUNT(sat__scan_fields))) return SAT_ERR_ARGUMENT;
+    sat__resolve_allocator(allocator, &resolved->allocator);
     if (n / SAT__SCAN_BLOCK >= (size_t)0x7fffffff) return SAT_ERR_SIZE;
     if (resolved->counters) memset(resolved->counters, 0, sizeof *resolved->counters);
     return SAT_OK;
@@ -2241,22 +2293,72 @@ static double *sat__above(const sat_table *t, int channel, int tile_row)
     return t->above + (size_t)channel * t->above_plane + (size_t)tile_row * t->above_stride;
 }
 
+static const sat__field sat__table_fields[] = {
+    SAT__FIELD(sat_options, 'i', kind, 0, 0, SAT_KIND_FIXED64, ' '),
+    SAT__FIELD(sat_options, 'i', tile, 32, 8, 128, '2'),
+    SAT__FIELD(sat_options, 'i', subtract_mean, 0, 0, 1, ' '),
+    SAT__FIELD(sat_options, 'd', quantum, 0, 0, 1e300, ' '),
+    SAT__FIELD(sat_options, 'd', max_value, 0, 0, 1e300, ' '),
+    SAT__FIELD(sat_options, 'd', max_box_area, 0, 0, 1e300, ' '),
+    SAT__FIELD(sat_options, 'i', non_finite, 0, 0, SAT_NON_FINITE_REFUSE, ' '),
+    SAT__FIELD(sat_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(sat_options, 't', threads, 0, 0, 0, ' '),
+};
+
 SAT_DEF sat_options sat_defaults(void)
 {
     sat_options options;
-    memset(&options, 0, sizeof options);
-    options.tile = 32;
+    sat__fields_default(&options, sizeof options, sat__table_fields, SAT__COUNT(sat__table_fields));
     return options;
+}
+
+/* Sizes that every table needs: the sentence of the first wrong one. */
+static int sat__explain_size(sat__text *t, int width, int height, int channels)
+{
+    if (width < 1 || width == 0x7fffffff) sat__text_range(t, "width", width, 1, 2147483646, ' ');
+    else if (height < 1 || height == 0x7fffffff) sat__text_range(t, "height", height, 1, 2147483646, ' ');
+    else if (channels < 1 || channels > 4) sat__text_range(t, "channels", channels, 1, 4, ' ');
+    else return 1;
+    return 0;
+}
+
+/* 1 when the options are good; else the sentence. */
+static int sat__explain_options(sat__text *t, const sat_options *o)
+{
+    const sat__field *wrong = sat__fields_check(o, sat__table_fields, SAT__COUNT(sat__table_fields));
+    if (wrong) sat__text_field(t, wrong, o);
+    else if (o->subtract_mean && o->kind != SAT_KIND_FLOAT && o->kind != SAT_KIND_DOUBLE)
+        sat__text_add(t, "subtract_mean is 1; only SAT_KIND_FLOAT and SAT_KIND_DOUBLE take it");
+    else return 1;
+    return 0;
 }
 
 static int sat__options_are_valid(const sat_options *o)
 {
-    if ((unsigned)o->kind > (unsigned)SAT_KIND_FIXED64 || (unsigned)o->non_finite > (unsigned)SAT_NON_FINITE_REFUSE) return 0;
-    if (o->tile < 8 || o->tile > 128 || (o->tile & (o->tile - 1))) return 0;
-    if (!(o->quantum >= 0) || !(o->max_value >= 0) || !(o->max_box_area >= 0)) return 0;
-    if (!sat__is_finite_double(o->quantum) || !sat__is_finite_double(o->max_value) || !sat__is_finite_double(o->max_box_area)) return 0;
-    if (o->subtract_mean && o->kind != SAT_KIND_FLOAT && o->kind != SAT_KIND_DOUBLE) return 0;
-    return sat__threads_are_valid(&o->threads);
+    sat__text ignored = sat__text_begin(NULL, 0);
+    return sat__explain_options(&ignored, o);
+}
+
+SAT_DEF char *sat_explain(char *text, size_t size, int width, int height, int channels, const sat_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (sat__explain_size(&t, width, height, channels) && options) sat__explain_options(&t, options);
+    return text;
+}
+
+SAT_DEF char *sat_explain_image(char *text, size_t size, const sat_image *image)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (!image) sat__text_add(&t, "image is NULL");
+    else if (!image->pixels) sat__text_add(&t, "image.pixels is NULL");
+    else if (image->width < 1) sat__text_range(&t, "image.width", image->width, 1, 2147483647, ' ');
+    else if (image->height < 1) sat__text_range(&t, "image.height", image->height, 1, 2147483647, ' ');
+    else if (image->channels < 1 || image->channels > 4) sat__text_range(&t, "image.channels", image->channels, 1, 4, ' ');
+    else if ((unsigned)image->format > (unsigned)SAT_F16) sat__text_range(&t, "image.format", image->format, 0, SAT_F16, ' ');
+    else if ((uintptr_t)image->pixels % sat__format_size(image->format)) sat__text_add(&t, "image.pixels is not aligned for its format");
+    else if (image->stride % (ptrdiff_t)sat__format_size(image->format)) sat__text_add(&t, "image.stride is not a multiple of its format's bytes");
+    else if (!sat__image_is_valid(image)) sat__text_add(&t, "image.stride is shorter than a row");
+    return text;
 }
 
 /* All memory of a table, in one block: with base NULL this measures it. */
@@ -3533,6 +3635,310 @@ SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_widt
     return result;
 }
 
+/* ---- moments
+
+   A tile holds local sums of d = x - m and of products d d', m the tile's mean as a float. A box takes from each tile that it
+   touches the count, the means and the co-moment; (n, mean, M) are joined pairwise (Chan, Golub, LeVeque 1983):
+
+     M = M1 + M2 + delta_x delta_y n1 n2 / (n1 + n2) */
+
+enum { SAT__MOMENT_SHIFT = 6, SAT__MOMENT_TILE = 1 << SAT__MOMENT_SHIFT };
+
+struct sat_moments {
+    sat_moments_options options;
+    sat_allocator allocator;
+    void *block;
+    size_t block_bytes, stride, plane; /* elements */
+    int width, height, channels, tiles_x, tiles_y, planes;
+    double *sums;      /* planes: channels, then products (a, b) with a <= b; corner (x + 1, y + 1) at [y][x] */
+    float *means;      /* a channel's tiles after the other */
+    float *pixels;     /* a tile of every channel, for each worker */
+    size_t *bad;       /* tiles rows' counts of NaN and infinity */
+};
+
+static const sat__field sat__moments_fields[] = {
+    SAT__FIELD(sat_moments_options, 'i', covariance, 0, 0, 1, ' '),
+    SAT__FIELD(sat_moments_options, 'i', non_finite, 0, 0, SAT_NON_FINITE_REFUSE, ' '),
+    SAT__FIELD(sat_moments_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(sat_moments_options, 't', threads, 0, 0, 0, ' '),
+};
+
+SAT_DEF sat_moments_options sat_moments_defaults(void)
+{
+    sat_moments_options options;
+    sat__fields_default(&options, sizeof options, sat__moments_fields, SAT__COUNT(sat__moments_fields));
+    return options;
+}
+
+SAT_DEF char *sat_explain_moments(char *text, size_t size, int width, int height, int channels, const sat_moments_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    const sat__field *wrong = options ? sat__fields_check(options, sat__moments_fields, SAT__COUNT(sat__moments_fields)) : NULL;
+    if (sat__explain_size(&t, width, height, channels) && wrong) sat__text_field(&t, wrong, options);
+    return text;
+}
+
+static size_t sat__moments_lay_out(sat_moments *m, unsigned char *base)
+{
+    sat__arena arena;
+    size_t workers = (size_t)sat__worker_count(&m->options.threads), channels = (size_t)m->channels, count;
+    arena.base = base;
+    arena.used = 0;
+    arena.overflow = 0;
+    m->stride = (size_t)m->width;
+    if (!sat__multiply_size(&m->plane, m->stride, (size_t)m->height) || !sat__multiply_size(&count, m->plane, (size_t)m->planes)) return 0;
+    m->sums = (double *)sat__carve(&arena, count, sizeof(double));
+    m->means = (float *)sat__carve(&arena, (size_t)m->tiles_x * (size_t)m->tiles_y * channels, sizeof(float));
+    m->pixels = (float *)sat__carve(&arena, workers * channels * SAT__MOMENT_TILE * SAT__MOMENT_TILE, sizeof(float));
+    m->bad = (size_t *)sat__carve(&arena, (size_t)m->tiles_y, sizeof(size_t));
+    return arena.overflow ? 0 : arena.used;
+}
+
+SAT_DEF sat_result sat_moments_create(sat_moments **out, int width, int height, int channels, const sat_moments_options *options)
+{
+    sat_moments m;
+    unsigned char *base;
+    sat__text ignored = sat__text_begin(NULL, 0);
+    if (!out) return SAT_ERR_ARGUMENT;
+    *out = NULL;
+    memset(&m, 0, sizeof m);
+    m.options = options ? *options : sat_moments_defaults();
+    if (!sat__explain_size(&ignored, width, height, channels)) return SAT_ERR_ARGUMENT;
+    if (sat__fields_check(&m.options, sat__moments_fields, SAT__COUNT(sat__moments_fields))) return SAT_ERR_ARGUMENT;
+    sat__resolve_allocator(&m.allocator, &m.options.allocator);
+    m.width = width;
+    m.height = height;
+    m.channels = channels;
+    m.tiles_x = (width - 1) / SAT__MOMENT_TILE + 1;
+    m.tiles_y = (height - 1) / SAT__MOMENT_TILE + 1;
+    m.planes = channels + (m.options.covariance ? channels * (channels + 1) / 2 : channels);
+    m.block_bytes = sat__moments_lay_out(&m, NULL);
+    if (!m.block_bytes || m.block_bytes > SIZE_MAX / 2 - sizeof m - SAT__LINE) return SAT_ERR_SIZE;
+    m.block_bytes += sizeof m + SAT__LINE;
+    m.block = sat__alloc(&m.allocator, m.block_bytes);
+    if (!m.block) return SAT_ERR_MEMORY;
+    memset(m.block, 0, m.block_bytes);
+    base = (unsigned char *)m.block;
+    sat__moments_lay_out(&m, sat__align64(base + sizeof m));
+    *out = (sat_moments *)m.block;
+    **out = m;
+    return SAT_OK;
+}
+
+SAT_DEF void sat_moments_destroy(sat_moments *moments)
+{
+    if (moments) {
+        sat_allocator allocator = moments->allocator;
+        sat__release(&allocator, moments->block, moments->block_bytes);
+    }
+}
+
+/* The plane of a product; without covariance only squares have one. */
+static int sat__moment_plane(const sat_moments *m, int a, int b)
+{
+    int low = sat__min_int(a, b), high = sat__max_int(a, b);
+    return m->options.covariance ? m->channels + high * (high + 1) / 2 + low : m->channels + a;
+}
+
+/* The mean of the finite pixels of a tile; the others are set to it and counted. */
+static float sat__moment_mean(float *p, int w, int h, size_t *bad)
+{
+    double sum = 0;
+    size_t found = 0;
+    int x, y;
+    float mean;
+    for (y = 0; y < h; y++)
+        for (x = 0; x < w; x++)
+            if (sat__is_finite(p[y * SAT__MOMENT_TILE + x])) sum += (double)p[y * SAT__MOMENT_TILE + x];
+            else found++;
+    mean = (size_t)w * (size_t)h > found ? (float)(sum / (double)((size_t)w * (size_t)h - found)) : 0;
+    *bad += found;
+    for (y = 0; y < h && found; y++)
+        for (x = 0; x < w; x++)
+            if (!sat__is_finite(p[y * SAT__MOMENT_TILE + x])) p[y * SAT__MOMENT_TILE + x] = mean;
+    return mean;
+}
+
+/* Local sums of (p - mean_p), or of (p - mean_p)(q - mean_q) where there is a q. */
+static void sat__moment_sums(double *out, size_t stride, const float *p, double mean_p, const float *q, double mean_q, int w, int h)
+{
+    int x, y;
+    for (y = 0; y < h; y++, out += stride, p += SAT__MOMENT_TILE, q += q ? SAT__MOMENT_TILE : 0) {
+        double run = 0;
+        for (x = 0; x < w; x++) {
+            double d = (double)p[x] - mean_p;
+            run += q ? d * ((double)q[x] - mean_q) : d;
+            out[x] = y ? out[x - (ptrdiff_t)stride] + run : run;
+        }
+    }
+}
+
+typedef struct sat__moments_build {
+    sat_moments *moments;
+    const sat_image *image;
+} sat__moments_build;
+
+static void sat__moments_rows(int begin, int end, int worker, void *context)
+{
+    const sat__moments_build *b = (const sat__moments_build *)context;
+    sat_moments *m = b->moments;
+    enum { SIDE = SAT__MOMENT_TILE, AREA = SIDE * SIDE };
+    float *tile = m->pixels + (size_t)worker * (size_t)m->channels * AREA;
+    int ty, tx, c, other, y;
+    for (ty = begin; ty < end; ty++) {
+        int y0 = ty * SIDE, h = sat__min_int(SIDE, m->height - y0);
+        m->bad[ty] = 0;
+        for (tx = 0; tx < m->tiles_x; tx++) {
+            int x0 = tx * SIDE, w = sat__min_int(SIDE, m->width - x0);
+            size_t at = (size_t)y0 * m->stride + (size_t)x0, tiles = (size_t)m->tiles_x * (size_t)m->tiles_y;
+            float mean[4];
+            for (c = 0; c < m->channels; c++) {
+                for (y = 0; y < h; y++) sat__read_row(tile + c * AREA + y * SIDE, b->image, y0 + y, x0, x0 + w, c);
+                mean[c] = sat__moment_mean(tile + c * AREA, w, h, &m->bad[ty]);
+                m->means[(size_t)c * tiles + (size_t)ty * (size_t)m->tiles_x + (size_t)tx] = mean[c];
+                sat__moment_sums(m->sums + (size_t)c * m->plane + at, m->stride, tile + c * AREA, (double)mean[c], NULL, 0, w, h);
+                for (other = m->options.covariance ? 0 : c; other <= c; other++)
+                    sat__moment_sums(m->sums + (size_t)sat__moment_plane(m, other, c) * m->plane + at, m->stride, tile + c * AREA,
+                                     (double)mean[c], tile + other * AREA, (double)mean[other], w, h);
+            }
+        }
+    }
+}
+
+SAT_DEF sat_result sat_moments_build(sat_moments *moments, const sat_image *image)
+{
+    sat__moments_build b;
+    size_t bad = 0;
+    int i;
+    if (!moments || !sat__image_is_valid(image)) return SAT_ERR_ARGUMENT;
+    if (image->width != moments->width || image->height != moments->height || image->channels != moments->channels) return SAT_ERR_MISMATCH;
+    b.moments = moments;
+    b.image = image;
+    sat__parallel_for(&moments->options.threads, moments->tiles_y, sat__moments_rows, &b);
+    for (i = 0; i < moments->tiles_y; i++) bad += moments->bad[i];
+    if (!bad || moments->options.non_finite != SAT_NON_FINITE_REFUSE) return SAT_OK;
+    memset(moments->sums, 0, moments->plane * (size_t)moments->planes * sizeof(double));
+    memset(moments->means, 0, (size_t)moments->tiles_x * (size_t)moments->tiles_y * (size_t)moments->channels * sizeof(float));
+    return SAT_ERR_NON_FINITE;
+}
+
+/* Four corners inside one tile; x0, y0 are the tile's own where a corner lies on its border. */
+static inline double sat__moment_corners(const double *p, size_t stride, int left, int top, int x0, int y0, int x1, int y1)
+{
+    const double *high = p + (size_t)(y1 - 1) * stride, *low = high - (size_t)(y1 - y0) * stride;
+    double sum = high[x1 - 1];
+    if (!left) sum -= high[x0 - 1];
+    if (!top) sum -= left ? low[x1 - 1] : low[x1 - 1] - low[x0 - 1];
+    return sum;
+}
+
+typedef struct sat__moment {
+    double n, a, b, co; /* count, means, co-moment */
+} sat__moment;
+
+static inline void sat__moment_join(sat__moment *m, const sat_moments *t, int channel, int other, int plane, int tx, int ty, const int box[4])
+{
+    size_t tiles = (size_t)t->tiles_x * (size_t)t->tiles_y, tile = (size_t)ty * (size_t)t->tiles_x + (size_t)tx;
+    int left = tx * SAT__MOMENT_TILE, top = ty * SAT__MOMENT_TILE;
+    int x0 = sat__max_int(box[0], left), y0 = sat__max_int(box[1], top);
+    int x1 = sat__min_int(box[2] - left, SAT__MOMENT_TILE) + left, y1 = sat__min_int(box[3] - top, SAT__MOMENT_TILE) + top;
+    double n = (double)(x1 - x0) * (double)(y1 - y0), both = m->n + n, a, b, co, delta_a, delta_b;
+    a = sat__moment_corners(t->sums + (size_t)channel * t->plane, t->stride, x0 == left, y0 == top, x0, y0, x1, y1);
+    b = other == channel ? a : sat__moment_corners(t->sums + (size_t)other * t->plane, t->stride, x0 == left, y0 == top, x0, y0, x1, y1);
+    co = plane < 0 ? 0 : sat__moment_corners(t->sums + (size_t)plane * t->plane, t->stride, x0 == left, y0 == top, x0, y0, x1, y1) - a * b / n;
+    if (other == channel && !(co > 0)) co = 0;
+    delta_a = (double)t->means[(size_t)channel * tiles + tile] + a / n - m->a;
+    delta_b = other == channel ? delta_a : (double)t->means[(size_t)other * tiles + tile] + b / n - m->b;
+    m->co += co + delta_a * delta_b * (m->n / both * n);
+    m->a += delta_a * (n / both);
+    m->b += delta_b * (n / both);
+    m->n = both;
+}
+
+/* plane < 0: means only. */
+static sat__moment sat__moment_box(const sat_moments *t, int channel, int other, int plane, int x0, int y0, int x1, int y1)
+{
+    sat__moment m;
+    int box[4], tx, ty;
+    m.n = m.a = m.b = m.co = 0;
+    box[0] = sat__max_int(x0, 0);
+    box[1] = sat__max_int(y0, 0);
+    box[2] = sat__min_int(x1, t->width);
+    box[3] = sat__min_int(y1, t->height);
+    if (box[0] >= box[2] || box[1] >= box[3]) return m;
+    for (ty = box[1] >> SAT__MOMENT_SHIFT; ty <= (box[3] - 1) >> SAT__MOMENT_SHIFT; ty++)
+        for (tx = box[0] >> SAT__MOMENT_SHIFT; tx <= (box[2] - 1) >> SAT__MOMENT_SHIFT; tx++)
+            sat__moment_join(&m, t, channel, other, plane, tx, ty, box);
+    return m;
+}
+
+static int sat__moment_pair_is_valid(const sat_moments *m, int channel, int other)
+{
+    if (!m || channel < 0 || other < 0 || channel >= m->channels || other >= m->channels) return 0;
+    return channel == other || m->options.covariance;
+}
+
+SAT_DEF double sat_moments_mean(const sat_moments *moments, int channel, int x0, int y0, int x1, int y1)
+{
+    return sat__moment_pair_is_valid(moments, channel, channel) ? sat__moment_box(moments, channel, channel, -1, x0, y0, x1, y1).a : 0;
+}
+
+SAT_DEF double sat_covariance(const sat_moments *moments, int channel, int other, int x0, int y0, int x1, int y1)
+{
+    sat__moment m;
+    if (!sat__moment_pair_is_valid(moments, channel, other)) return 0;
+    m = sat__moment_box(moments, channel, other, sat__moment_plane(moments, channel, other), x0, y0, x1, y1);
+    return m.n > 0 ? m.co / m.n : 0;
+}
+
+SAT_DEF double sat_variance(const sat_moments *moments, int channel, int x0, int y0, int x1, int y1)
+{
+    return sat_covariance(moments, channel, channel, x0, y0, x1, y1);
+}
+
+typedef struct sat__moments_filter {
+    const sat_moments *moments;
+    unsigned char *out, *mean;
+    ptrdiff_t stride;
+    int channel, other, radius;
+} sat__moments_filter;
+
+static void sat__moments_filter_rows(int begin, int end, int worker, void *context)
+{
+    const sat__moments_filter *f = (const sat__moments_filter *)context;
+    const sat_moments *t = f->moments;
+    int x, y, plane = sat__moment_plane(t, f->channel, f->other), r = f->radius;
+    (void)worker;
+    for (y = begin; y < end; y++) {
+        float *out = (float *)(void *)(f->out + (ptrdiff_t)y * f->stride);
+        float *mean = f->mean ? (float *)(void *)(f->mean + (ptrdiff_t)y * f->stride) : NULL;
+        for (x = 0; x < t->width; x++) {
+            sat__moment m = sat__moment_box(t, f->channel, f->other, plane, x > r ? x - r : 0, y > r ? y - r : 0,
+                                            t->width - x > r ? x + r + 1 : t->width, t->height - y > r ? y + r + 1 : t->height);
+            out[x] = (float)(m.co / m.n);
+            if (mean) mean[x] = (float)m.a;
+        }
+    }
+}
+
+SAT_DEF sat_result sat_moments_filter(float *out, float *mean, ptrdiff_t out_stride, const sat_moments *moments, int channel, int other, int radius)
+{
+    sat__moments_filter f;
+    size_t step = out_stride < 0 ? (size_t)0 - (size_t)out_stride : (size_t)out_stride;
+    if (!out || !moments || radius < 0 || !sat__moment_pair_is_valid(moments, channel, other)) return SAT_ERR_ARGUMENT;
+    if (step % sizeof(float) || (moments->height > 1 && step / sizeof(float) < (size_t)moments->width)) return SAT_ERR_ARGUMENT;
+    memset(&f, 0, sizeof f);
+    f.moments = moments;
+    f.out = (unsigned char *)out;
+    f.mean = (unsigned char *)mean;
+    f.stride = out_stride;
+    f.channel = channel;
+    f.other = other;
+    f.radius = radius;
+    sat__parallel_for(&moments->options.threads, moments->height, sat__moments_filter_rows, &f);
+    return SAT_OK;
+}
+
 /* ---- streaming
 
    The table is a ring: the last 2 radius + 2 corner rows, and the strips above the tile rows that these lie in. */
@@ -3945,29 +4351,48 @@ struct sat_gl {
     unsigned borrowed;                              /* framebuffer for a table of the caller */
 };
 
+static const sat__field sat__gl_fields[] = {
+    SAT__FIELD(sat_gl_options, 'i', format, 0, 0, SAT_GL_FIXED32, ' '),
+    SAT__FIELD(sat_gl_options, 'i', algorithm, SAT_SCAN_BALANCED_TREE, SAT_SCAN_RECURSIVE_DOUBLING, SAT_SCAN_BALANCED_TREE, ' '),
+    SAT__FIELD(sat_gl_options, 'i', k, 4, 2, 64, ' '),
+    SAT__FIELD(sat_gl_options, 'i', compute, 0, 0, 1, ' '),
+    SAT__FIELD(sat_gl_options, 'i', channel, 0, 0, 3, ' '),
+    SAT__FIELD(sat_gl_options, 'i', unsigned_input, 0, 0, 1, ' '),
+    SAT__FIELD(sat_gl_options, 'd', quantum, 0, 1e-35, 1e35, '0'),
+    SAT__FIELD(sat_gl_options, 'd', max_value, 1e30, 1e-300, 1e300, ' '),
+    SAT__FIELD(sat_gl_options, 'd', max_box_area, 0, 0, 1e300, ' '),
+    SAT__FIELD(sat_gl_options, 'a', allocator, 0, 0, 0, ' '),
+};
+
 SAT_DEF sat_gl_options sat_gl_defaults(void)
 {
     sat_gl_options options;
-    memset(&options, 0, sizeof options);
-    options.format = SAT_GL_TWO_FLOAT;
-    options.algorithm = SAT_SCAN_BALANCED_TREE;
-    options.k = 4;
-    options.max_value = 1e30;
+    sat__fields_default(&options, sizeof options, sat__gl_fields, SAT__COUNT(sat__gl_fields));
     return options;
+}
+
+static int sat__explain_gl_options(sat__text *t, const sat_gl_options *o)
+{
+    int exponent;
+    const sat__field *wrong = sat__fields_check(o, sat__gl_fields, SAT__COUNT(sat__gl_fields));
+    if (wrong) sat__text_field(t, wrong, o);
+    else if (o->unsigned_input && o->format != SAT_GL_FIXED32) sat__text_add(t, "unsigned_input is 1; only SAT_GL_FIXED32 takes it");
+    else if (o->quantum > 0 && frexp(o->quantum, &exponent) > 0.5) sat__text_add(t, "quantum is not a power of two");
+    else return 1;
+    return 0;
+}
+
+SAT_DEF char *sat_explain_gl(char *text, size_t size, const sat_gl_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (options) sat__explain_gl_options(&t, options);
+    return text;
 }
 
 static int sat__gl_options_are_valid(const sat_gl_options *o)
 {
-    int exponent;
-    if ((unsigned)o->format > (unsigned)SAT_GL_FIXED32) return 0;
-    if (o->k < 2 || o->k > 64 || o->channel < 0 || o->channel > 3) return 0;
-    if (o->algorithm != SAT_SCAN_BALANCED_TREE && o->algorithm != SAT_SCAN_RECURSIVE_DOUBLING) return 0;
-    if (o->unsigned_input && o->format != SAT_GL_FIXED32) return 0;
-    if (!(o->max_value > 0) || !sat__is_finite_double(o->max_value)) return 0;
-    if (!(o->max_box_area >= 0) || !sat__is_finite_double(o->max_box_area)) return 0;
-    if (!(o->quantum >= 0) || !sat__is_finite_double(o->quantum)) return 0;
-    if (!(o->quantum > 0)) return 1;
-    return frexp(o->quantum, &exponent) <= 0.5 && exponent > -120 && exponent < 120;
+    sat__text ignored = sat__text_begin(NULL, 0);
+    return sat__explain_gl_options(&ignored, o);
 }
 
 static unsigned sat__gl_internal(sat_gl_format format)

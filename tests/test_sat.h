@@ -555,7 +555,7 @@ TEST(box_filters_are_the_means_they_promise)
     int k, i, x, y, c;
     support_hdr_image(p, 70, 50, 3, 3);
     for (i = 0; i < 70 * 50; i++) radii[i] = (float)(i % 50) * 0.3f - 1;
-    radii[0] = (float)sqrt(-1.0);
+    radii[0] = sat__float_from_bits(0x7fc00000u);
     radii[1] = 1e30f;
     for (k = 0; k < 5; k++) {
         sat_options o = sat_defaults();
@@ -594,7 +594,7 @@ TEST(streams_equal_the_whole_image_bit_for_bit)
     sat_image view = sat_image_f32(p, W, H, 2);
     int k, r;
     support_hdr_image(p, W, H, 2, 8);
-    p[999] = (float)sqrt(-1.0);
+    p[999] = sat__float_from_bits(0x7fc00000u);
     p[2000] = (float)HUGE_VAL;
     for (k = 0; k < 5; k++)
         for (r = 0; r < 8; r++) {
@@ -653,7 +653,7 @@ TEST(tables_same_bits_for_any_worker_count)
     int k, w, c;
     support_hdr_image(p, W, H, 2, 8);
     p[777] = -p[777];
-    p[W * 150] = (float)sqrt(-1.0);
+    p[W * 150] = sat__float_from_bits(0x7fc00000u);
     for (c = 1; c <= 2; c++)
         for (k = 0; k < 5; k++) {
             uint64_t hash = 0, filter_hash = 0;
@@ -704,7 +704,7 @@ TEST(updates_equal_fresh_builds)
             int x1 = sat__min_int(W, x0 + 1 + support_below(&state, 70)), y1 = sat__min_int(H, y0 + 1 + support_below(&state, 70));
             for (y = y0; y < y1; y++)
                 for (x = x0; x < x1; x++) p[y * W + x] = (float)pow(10, 5 * support_uniform(&state)) * (i % 3 ? 1.0f : -1.0f);
-            if (i == 9) p[y0 * W + x0] = (float)sqrt(-1.0);
+            if (i == 9) p[y0 * W + x0] = sat__float_from_bits(0x7fc00000u);
             EXPECT_EQ(sat_update(t, &view, x0, y0, x1, y1), SAT_OK);
             fresh = build(&view, &o);
             EXPECT(table_hash(t, W, H, 1) == table_hash(fresh, W, H, 1));
@@ -726,7 +726,7 @@ TEST(a_bad_pixel_changes_no_box_without_it)
     int k, b, i;
     for (k = 0; k < 5; k++)
         for (b = 0; b < 5; b++) {
-            float value = b < 4 ? bad[b] : (float)sqrt(-1.0);
+            float value = b < 4 ? bad[b] : sat__float_from_bits(0x7fc00000u);
             sat_image view = sat_image_f32(p, W, H, 1);
             sat_options o = sat_defaults();
             sat_table *t, *without;
@@ -916,6 +916,213 @@ TEST(plans_keep_their_word)
         }
 }
 
+/* ---- moments */
+
+static double exact_covariance(const sat_image *view, int a, int b, int x0, int y0, int x1, int y1)
+{
+    long double n = (long double)(x1 - x0) * (y1 - y0), ma = 0, mb = 0, co = 0;
+    int x, y;
+    for (y = y0; y < y1; y++)
+        for (x = x0; x < x1; x++) {
+            ma += (long double)pixel(view, x, y, a) / n;
+            mb += (long double)pixel(view, x, y, b) / n;
+        }
+    for (y = y0; y < y1; y++)
+        for (x = x0; x < x1; x++) co += ((long double)pixel(view, x, y, a) - ma) * ((long double)pixel(view, x, y, b) - mb);
+    return (double)(co / n);
+}
+
+static sat_moments *moments_of(const sat_image *view, const sat_moments_options *o)
+{
+    sat_moments *m = NULL;
+    EXPECT_EQ(sat_moments_create(&m, view->width, view->height, view->channels, o), SAT_OK);
+    if (m) EXPECT_EQ(sat_moments_build(m, view), SAT_OK);
+    return m;
+}
+
+TEST(variance_is_right_where_it_is_small_beside_the_mean)
+{
+    enum { W = 200, H = 150 };
+    static float p[W * H], filtered_out[W * H], mean[W * H];
+    static const int sides[] = {2, 3, 11, 41, 140};
+    sat_image view = sat_image_f32(p, W, H, 1);
+    int which, s, i;
+    for (which = 0; which < 3; which++) {
+        uint64_t state = 5;
+        sat_moments *m;
+        for (i = 0; i < W * H; i++)
+            p[i] = which == 0 ? (float)(1e4 + support_gaussian(&state)) : which == 1 ? (float)(4096 + (i % W + i / W) % 2) : 65025.0f;
+        m = moments_of(&view, NULL);
+        for (s = 0; s < 5; s++)
+            for (i = 0; i < 400; i++) {
+                int x = support_below(&state, W - sides[s]), y = support_below(&state, H - sides[s]);
+                double got = sat_variance(m, 0, x, y, x + sides[s], y + sides[s]);
+                EXPECT_NEAR(got, exact_covariance(&view, 0, 0, x, y, x + sides[s], y + sides[s]), 1e-9);
+                EXPECT(got >= 0);
+                EXPECT_REL(sat_moments_mean(m, 0, x, y, x + sides[s], y + sides[s]), exact_sum(&view, 0, x, y, x + sides[s], y + sides[s]) / (sides[s] * sides[s]), 1e-13);
+            }
+        EXPECT_EQ(sat_moments_filter(filtered_out, mean, W * 4, m, 0, 0, 7), SAT_OK);
+        for (i = 0; i < W * H; i++) {
+            int x = i % W, y = i / W;
+            EXPECT_NEAR(filtered_out[i], (float)sat_variance(m, 0, x - 7, y - 7, x + 8, y + 8), 0);
+            EXPECT_NEAR(mean[i], (float)sat_moments_mean(m, 0, x - 7, y - 7, x + 8, y + 8), 0);
+        }
+        sat_moments_destroy(m);
+    }
+}
+
+TEST(covariance_of_every_pair_and_bad_pixels_leave_other_boxes_alone)
+{
+    enum { W = 130, H = 90 };
+    static float p[W * H * 3];
+    sat_image view = sat_image_f32(p, W, H, 3);
+    sat_moments_options o = sat_moments_defaults();
+    sat_moments *m, *other;
+    sat_threads threads = support_threads(3);
+    uint64_t state = 6;
+    int i, a, b;
+    for (i = 0; i < W * H; i++) {
+        double base = 100 * support_gaussian(&state);
+        p[i * 3] = (float)(1000 + base);
+        p[i * 3 + 1] = (float)(-500 - base + support_gaussian(&state));
+        p[i * 3 + 2] = (float)support_uniform(&state);
+    }
+    o.covariance = 1;
+    m = moments_of(&view, &o);
+    for (i = 0; i < 300; i++) {
+        int x = support_below(&state, W - 30), y = support_below(&state, H - 30), side = 1 + support_below(&state, 30);
+        for (a = 0; a < 3; a++)
+            for (b = 0; b < 3; b++) {
+                double scale = sqrt(exact_covariance(&view, a, a, x, y, x + side, y + side) * exact_covariance(&view, b, b, x, y, x + side, y + side));
+                EXPECT_NEAR(sat_covariance(m, a, b, x, y, x + side, y + side), exact_covariance(&view, a, b, x, y, x + side, y + side), 1e-9 * scale + 1e-9);
+            }
+    }
+    p[(45 * W + 70) * 3] = sat__float_from_bits(0x7f800000u);
+    p[(45 * W + 71) * 3 + 1] = sat__float_from_bits(0x7fc00000u);
+    o.threads = threads;
+    other = moments_of(&view, &o);
+    for (i = 0; i < 2000; i++) {
+        int box[4];
+        random_box(&state, W, H, 40, box);
+        if (box[2] > 70 && box[0] < 72 && box[3] > 45 && box[1] < 46) EXPECT(sat__is_finite_double(sat_covariance(other, 0, 1, box[0], box[1], box[2], box[3])));
+        else EXPECT_NEAR(sat_covariance(other, 0, 1, box[0], box[1], box[2], box[3]), sat_covariance(m, 0, 1, box[0], box[1], box[2], box[3]), 1e-7);
+    }
+    sat_moments_destroy(other);
+    o.non_finite = SAT_NON_FINITE_REFUSE;
+    EXPECT_EQ(sat_moments_create(&other, W, H, 3, &o), SAT_OK);
+    EXPECT_EQ(sat_moments_build(other, &view), SAT_ERR_NON_FINITE);
+    EXPECT_NEAR(sat_variance(other, 0, 0, 0, W, H), 0, 0);
+    sat_moments_destroy(other);
+    EXPECT_NEAR(sat_variance(NULL, 0, 0, 0, 5, 5), 0, 0);
+    EXPECT_NEAR(sat_variance(m, 3, 0, 0, 5, 5), 0, 0);
+    EXPECT_NEAR(sat_variance(m, 0, 5, 5, 5, 9), 0, 0);
+    sat_moments_destroy(m);
+    o = sat_moments_defaults();
+    m = NULL;
+    EXPECT_EQ(sat_moments_create(&m, W, H, 3, NULL), SAT_OK);
+    EXPECT_NEAR(sat_covariance(m, 0, 1, 0, 0, 9, 9), 0, 0);
+    EXPECT_EQ(sat_moments_build(m, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_moments_build(NULL, &view), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_moments_filter(p, NULL, W * 4, m, 0, 1, 3), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_moments_filter(NULL, NULL, W * 4, m, 0, 0, 3), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_moments_filter(p, NULL, W * 4 - 4, m, 0, 0, 3), SAT_ERR_ARGUMENT);
+    sat_moments_destroy(m);
+    EXPECT_EQ(sat_moments_create(&m, 0, H, 3, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(sat_moments_create(NULL, W, H, 3, NULL), SAT_ERR_ARGUMENT);
+}
+
+/* ---- sentences */
+
+/* Every row of a table: values outside its range are refused and named, its ends and its default are not. */
+typedef int refuse_fn(const void *options, char *text);
+
+static void walk_fields(const sat__field *fields, int count, void *options, const void *defaults, size_t bytes, refuse_fn *refused)
+{
+    int i, j;
+    for (i = 0; i < count; i++) {
+        const sat__field *f = &fields[i];
+        double bad[3], good[3];
+        char text[200];
+        if (f->type == 'a' || f->type == 't') continue;
+        bad[0] = f->type == 'i' ? f->low - 1 : f->low - 1 - fabs(f->low);
+        bad[1] = f->type == 'i' ? f->high + 1 : f->high * 2;
+        bad[2] = f->type == 'i' ? f->high + 100 : (double)sat__float_from_bits(0x7fc00000u);
+        good[0] = f->low;
+        good[1] = f->high;
+        good[2] = f->initial;
+        for (j = 0; j < 3; j++) {
+            memcpy(options, defaults, bytes);
+            sat__field_set(f, options, bad[j]);
+            EXPECT(refused(options, text));
+            if (!EXPECT(strncmp(text, f->name, strlen(f->name)) == 0)) printf("%s: \"%s\"\n", f->name, text);
+            EXPECT_EQ(sat__fields_check(options, fields, count) == f, 1);
+            memcpy(options, defaults, bytes);
+            sat__field_set(f, options, good[j]);
+            EXPECT(sat__fields_check(options, fields, count) == NULL);
+        }
+        memcpy(options, defaults, bytes);
+        EXPECT(!refused(options, text) && !text[0]);
+    }
+}
+
+static int table_refused(const void *options, char *text)
+{
+    sat_table *t = NULL;
+    sat_result r = sat_create(&t, 16, 16, 1, (const sat_options *)options);
+    sat_explain(text, 200, 16, 16, 1, (const sat_options *)options);
+    sat_destroy(t);
+    return r == SAT_ERR_ARGUMENT;
+}
+
+static int scan_refused(const void *options, char *text)
+{
+    float v[4] = {1, 2, 3, 4};
+    sat_explain_scan(text, 200, (const sat_scan_options *)options);
+    return sat_scan_f32(v, v, 4, (const sat_scan_options *)options) == SAT_ERR_ARGUMENT;
+}
+
+static int moments_refused(const void *options, char *text)
+{
+    sat_moments *m = NULL;
+    sat_result r = sat_moments_create(&m, 16, 16, 1, (const sat_moments_options *)options);
+    sat_explain_moments(text, 200, 16, 16, 1, (const sat_moments_options *)options);
+    sat_moments_destroy(m);
+    return r == SAT_ERR_ARGUMENT;
+}
+
+TEST(every_refusal_names_its_field)
+{
+    sat_options table = sat_defaults(), table_defaults = table;
+    sat_scan_options scan = sat_scan_defaults(), scan_defaults = scan;
+    sat_moments_options moments = sat_moments_defaults(), moments_defaults = moments;
+    static const float pixels[16] = {0};
+    char text[120];
+    sat_image view = sat_image_f32(pixels, 4, 2, 2);
+    walk_fields(sat__table_fields, SAT__COUNT(sat__table_fields), &table, &table_defaults, sizeof table, table_refused);
+    walk_fields(sat__scan_fields, SAT__COUNT(sat__scan_fields), &scan, &scan_defaults, sizeof scan, scan_refused);
+    walk_fields(sat__moments_fields, SAT__COUNT(sat__moments_fields), &moments, &moments_defaults, sizeof moments, moments_refused);
+    table.tile = 48;
+    EXPECT(strcmp(sat_explain(text, sizeof text, 4, 4, 1, &table), "tile is 48; 8..128, a power of two") == 0);
+    EXPECT(strcmp(sat_explain(text, sizeof text, 4, 4, 9, NULL), "channels is 9; 1..4") == 0);
+    EXPECT(strcmp(sat_explain(text, 9, 4, 4, 9, NULL), "channels") == 0);
+    EXPECT(sat_explain(NULL, 0, 4, 4, 9, NULL) == NULL);
+    table = sat_defaults();
+    table.subtract_mean = 1;
+    EXPECT(strncmp(sat_explain(text, sizeof text, 4, 4, 1, &table), "subtract_mean is 1", 18) == 0);
+    EXPECT(strcmp(sat_explain_image(text, sizeof text, &view), "") == 0);
+    EXPECT(strcmp(sat_explain_image(text, sizeof text, NULL), "image is NULL") == 0);
+#define REFUSED(member, value, words) view = sat_image_f32(pixels, 4, 2, 2); view.member = value; EXPECT(!sat__image_is_valid(&view) && strcmp(sat_explain_image(text, sizeof text, &view), words) == 0)
+    REFUSED(pixels, NULL, "image.pixels is NULL");
+    REFUSED(pixels, (const char *)pixels + 1, "image.pixels is not aligned for its format");
+    REFUSED(width, 0, "image.width is 0; 1..2.14748e9");
+    REFUSED(height, -3, "image.height is -3; 1..2.14748e9");
+    REFUSED(channels, 5, "image.channels is 5; 1..4");
+    REFUSED(format, (sat_format)4, "image.format is 4; 0..3");
+    REFUSED(stride, 28, "image.stride is shorter than a row");
+    REFUSED(stride, 33, "image.stride is not a multiple of its format's bytes");
+#undef REFUSED
+}
+
 /* ---- memory, arguments, small functions */
 
 TEST(one_allocation_at_create_and_none_afterwards)
@@ -1048,7 +1255,7 @@ TEST(srgb_there_and_back)
 {
     int i;
     for (i = 0; i <= 255; i++) EXPECT_NEAR(sat__srgb_encode(sat__srgb_decode((float)i / 255)) * 255, i, 2e-4);
-    EXPECT_NEAR(sat__srgb_encode((float)sqrt(-1.0)), 0, 0);
+    EXPECT_NEAR(sat__srgb_encode(sat__float_from_bits(0x7fc00000u)), 0, 0);
     EXPECT_NEAR(sat__srgb_encode(7), 1, 0);
     EXPECT_NEAR(sat__luminance(1, 1, 1), 1, 1e-6);
 }
