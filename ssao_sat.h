@@ -180,6 +180,7 @@ typedef struct ssao_sat_input {
     int clip_zero_to_one;      /* 0: the matrix maps depth to [-1,1] (OpenGL); 1: to [0,1] (Vulkan, Direct3D, glClipControl) */
     const uint16_t *half_depth;/* binary16 depths instead of `depth`, which is then NULL */
     float sky;                 /* LINEAR: distances >= sky are sky; 0: only infinity is */
+    int left_handed;           /* 0; 1: the camera looks along +z (Direct3D): of the matrix, the normals and the bent normals */
 } ssao_sat_input;
 
 typedef struct ssao_sat_options {
@@ -211,9 +212,9 @@ typedef struct ssao_sat_options {
 
 /* What the last call met. Counts are pixels of the tables (a quarter of the picture at half resolution). */
 typedef struct ssao_sat_stats {
-    size_t pixels;            /* of the tables; = sky + small + flat + estimated */
+    size_t pixels;            /* of the tables; = sky + tiny + flat + estimated */
     size_t sky;               /* nothing there, or depth not a positive finite number */
-    size_t small;             /* radius below min_pixels */
+    size_t tiny;              /* radius below min_pixels */
     size_t flat;              /* left out: the whole region is one plane */
     size_t estimated;
     size_t border;            /* estimated with a region that the picture's border cuts */
@@ -222,6 +223,8 @@ typedef struct ssao_sat_stats {
     size_t lookups;           /* published methods and PLANE: table entries read */
     size_t normals_replaced;  /* given normals that were NaN, infinite or zero */
     size_t normals_backfacing;/* given normals that point away from the camera: most of them, when a convention is wrong */
+    size_t normals_compared, normals_off; /* of the 32 x 32 sample; those more than 45 degrees off the normal from depth: a tenth
+                                             of them or more when the normals are not in view space */
     double nearest, farthest; /* depth range; 0, 0 when all is sky */
     size_t bytes;             /* memory the object holds */
 } ssao_sat_stats;
@@ -288,7 +291,8 @@ SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl); /* NULL is fine */
 
 /* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader. `view` is the 12 floats of ssao_sat_gl_view as vec4 view[3]:
 
-       float ssao_sat_distance(vec4 view[3], float d)                                          depth value -> distance, 0: nothing there
+       float ssao_sat_distance(vec4 view[3], ivec2 pixel, float d)                             depth value -> distance, 0: nothing there
+       float ssao_sat_distance(vec4 view[3], float d)                                          the same, but for oblique near planes
        vec3  ssao_sat_position(vec4 view[3], ivec2 pixel, float z)                             z points forward
        vec3  ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z)        the same axes */
 SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void);
@@ -398,12 +402,18 @@ static inline void ssao_sat__transpose(ssao_sat__f *m)
    ------------------------------------------------------------------------------------------------ */
 
 enum {
+    SSAO_SAT__LEVEL_BITS = 20, /* of a word; then the slab, then SSAO_SAT__ROUGH */
+    SSAO_SAT__NOTHING = 31 << SSAO_SAT__LEVEL_BITS,
+    SSAO_SAT__ROUGH = 1 << 30,  /* in the first word of a table pixel: its pixels are no plane */
     SSAO_SAT__PAD = 16,       /* words of nothing left and right of a row: neighbours may be read blindly */
     SSAO_SAT__MAX_SLABS = 16,
     SSAO_SAT__MAX_SCALES = 4,
-    SSAO_SAT__GRID = 32       /* the slabs are cut from a sample of 32 x 32 depths ... */
+    SSAO_SAT__GRID = 32,      /* the slabs are cut from a sample of 32 x 32 depths ... */
+    SSAO_SAT__TRIM = 4        /* ... less the nearest and farthest 4 of its 256 blocks */
 };
-#define SSAO_SAT__BINS 256    /* ... counted in so many bins */
+#define SSAO_SAT__BINS 256    /* the sample is counted in so many bins */
+#define SSAO_SAT__MARGIN 4.0f  /* quanta hold what is nearer than the range by this factor */
+#define SSAO_SAT__BEYOND 0.73f /* of a side's weight that the border takes, to the cells beside the pixel: a corner keeps its value */
 #define SSAO_SAT__BLOCKED 2.0f  /* length of blocked directions against occlusion, fitted */
 #define SSAO_SAT__SHARPNESS 50 /* upsampling: a neighbour off the tangent plane by 1/50 of the distance has no weight */
 #define SSAO_SAT__FAR 1e18f   /* distances beyond are sky: their squares would overflow */
@@ -426,14 +436,16 @@ static const ssao_sat__fit ssao_sat__fits[6] = {
 typedef struct ssao_sat__camera {
     double full[4];         /* ax, bx, ay, by for pixels of the picture, whose centres lie at i + 1/2 */
     float ax, bx, ay, by;   /* for pixels of the tables, centre offset included */
-    double depth_a, depth_b;/* 1/z (perspective) or z (orthographic) = depth_a d + depth_b */
+    double depth_a, depth_b;/* 1/z (perspective) or z (orthographic) = depth_a d + depth_b + tilt . pixel */
+    double tilt[2];         /* of an oblique near plane */
+    float forward;          /* z of the view space that z forward is: -1, left-handed +1 */
     int orthographic;
     float pixels;           /* table pixels per world unit, at z = 1 in perspective */
     float aspect;           /* those along y over those along x */
 } ssao_sat__camera;
 
 /* One slab: depths between two edges. Its words: count, sum of the quantised affine depth, of x, of y. */
-typedef struct ssao_sat__slab { float low, quantum, inverse; } ssao_sat__slab;
+typedef struct ssao_sat__slab { float low, quantum, inverse; uint32_t top; } ssao_sat__slab; /* levels 0 .. top */
 
 typedef struct ssao_sat__worker {
     ssao_sat_stats stats;
@@ -452,8 +464,9 @@ struct ssao_sat {
     int tables;             /* words a pixel: 4 a slab, or 1 */
     /* arrays of `capacity` rows, `stride` apart */
     float *z, *affine, *nx, *ny, *nz, *open, *blocked[3];
-    uint32_t *quantised;
-    uint8_t *slab;
+    float *lower;           /* affine depth of the pixel below: half resolution has one between two table rows */
+    uint32_t *words;        /* step x step a table pixel, rows `word_stride` apart: slab and quantised affine depth, SSAO_SAT__NOTHING */
+    size_t word_stride;
     uint32_t *row_slabs;    /* which slabs occur in the row */
     uint32_t *table, *flags;
     float *scratch;         /* per worker: a row of the picture */
@@ -466,8 +479,9 @@ struct ssao_sat {
     float radius, reach;    /* world units; reach = radius fit.reach */
     float range;            /* SLABS: world units */
     float limit, largest;   /* half sides in table pixels: allowed, and of the nearest pixel */
-    float nearest, farthest;
-    float edge[SSAO_SAT__MAX_SLABS + 1]; /* distances */
+    float nearest, farthest; /* the range that slabs and quanta follow */
+    float band_nearest, band_farthest; /* of all pixels held so far */
+    float edge[SSAO_SAT__MAX_SLABS + 1]; /* distances; what lies before the first or behind the last is in the end slabs */
     ssao_sat__slab slabs[SSAO_SAT__MAX_SLABS];
     uint32_t used_slabs;
     ssao_sat__slab value;   /* single table: how a value is quantised */
@@ -533,7 +547,7 @@ static int ssao_sat__read_axes(ssao_sat__camera *c, const float *m, int width, i
 {
     double w = c->orthographic ? (double)m[15] : -(double)m[11];
     double shift_x = c->orthographic ? -(double)m[12] : (double)m[8], shift_y = c->orthographic ? -(double)m[13] : (double)m[9];
-    double large = c->orthographic ? 1e15 : 1e6, small = c->orthographic ? 1e-15 : 1e-9;
+    double most = c->orthographic ? 1e15 : 1e6, least = c->orthographic ? 1e-15 : 1e-9;
     double top = m[5] > 0 ? 1 : -1; /* normalised y of the upper border: -1 when the matrix flips y, as Vulkan's do */
     if (bottom_up) top = -top;
     c->full[0] = 2 * w / (width * (double)m[0]);
@@ -541,42 +555,63 @@ static int ssao_sat__read_axes(ssao_sat__camera *c, const float *m, int width, i
     c->full[2] = -2 * w * top / (height * (double)m[5]);
     c->full[3] = (w * top + shift_y) / (double)m[5];
     /* rays flatter than one in a million and pixels smaller than a billionth of the distance are no view */
-    return fabs(c->full[0]) <= large && fabs(c->full[1]) <= large && fabs(c->full[2]) <= large && fabs(c->full[3]) <= large &&
-           fabs(c->full[0]) >= small && fabs(c->full[2]) >= small;
+    return fabs(c->full[0]) <= most && fabs(c->full[1]) <= most && fabs(c->full[2]) <= most && fabs(c->full[3]) <= most &&
+           fabs(c->full[0]) >= least && fabs(c->full[2]) >= least;
 }
 
-/* depth d -> 1/z (perspective) or z (orthographic), both affine in d. The kind must agree with the matrix. */
+/* depth d -> 1/z (perspective) or z (orthographic), both affine in d and, under an oblique near plane (Lengyel 2005: the third row
+   holds a plane), in the pixel. The kind must agree with the matrix. */
 static int ssao_sat__read_depth(ssao_sat__camera *c, const float *m, ssao_sat_depth kind, int zero_to_one)
 {
     double scale = zero_to_one ? 1 : 2, shift = zero_to_one ? 0 : -1; /* normalised z = scale d + shift */
-    double a, b;
+    double a, b, tx, ty;
     if (kind == SSAO_SAT_DEPTH_LINEAR) return 1;
     if (c->orthographic) {
         a = -(double)m[15] * scale / (double)m[10];
         b = ((double)m[14] - (double)m[15] * shift) / (double)m[10];
+        tx = (double)m[2] / (double)m[10];
+        ty = (double)m[6] / (double)m[10];
     } else {
         a = -(double)m[11] * scale / (double)m[14];
         b = (-(double)m[11] * shift + (double)m[10]) / (double)m[14];
+        tx = -(double)m[2] / (double)m[14];
+        ty = -(double)m[6] / (double)m[14];
     }
     c->depth_a = a;
-    c->depth_b = b;
-    if (!sat__is_finite_double(a) || !sat__is_finite_double(b) || a == 0) return 0;
+    c->depth_b = b + tx * (0.5 * c->full[0] + c->full[1]) + ty * (0.5 * c->full[2] + c->full[3]);
+    c->tilt[0] = tx * c->full[0];
+    c->tilt[1] = ty * c->full[2];
+    if (!sat__is_finite_double(a) || !sat__is_finite_double(c->depth_b) || a == 0) return 0;
+    if (!sat__is_finite_double(c->tilt[0]) || !sat__is_finite_double(c->tilt[1])) return 0;
     return (kind == SSAO_SAT_DEPTH_REVERSED) == (c->orthographic ? a < 0 : a > 0);
+}
+
+/* Perspective, orthographic, or neither. What must be 0 may be the rounding of a product of float matrices: SSAO_SAT__ROUNDING of
+   what it stands beside. */
+#define SSAO_SAT__ROUNDING 1e-5
+static int ssao_sat__read_kind(ssao_sat__camera *c, const float *m)
+{
+    double x = SSAO_SAT__ROUNDING * fabs((double)m[0]), y = SSAO_SAT__ROUNDING * fabs((double)m[5]), w;
+    double beside = SSAO_SAT__ROUNDING * fabs((double)m[14]);
+    if (m[11] < 0 && fabs((double)m[15]) <= beside && fabs((double)m[12]) <= beside && fabs((double)m[13]) <= beside) c->orthographic = 0;
+    else if (m[15] > 0 && fabs((double)m[11]) <= SSAO_SAT__ROUNDING * fabs((double)m[10]) && fabs((double)m[8]) <= x && fabs((double)m[9]) <= y)
+        c->orthographic = 1;
+    else return 0;
+    w = SSAO_SAT__ROUNDING * fabs((double)(c->orthographic ? m[15] : m[11]));
+    return fabs((double)m[4]) <= x && fabs((double)m[1]) <= y && fabs((double)m[3]) <= w && fabs((double)m[7]) <= w;
 }
 
 static int ssao_sat__read_camera(ssao_sat__camera *c, const ssao_sat_input *in, int step, int bottom_up)
 {
-    static const int zero[6] = {1, 2, 3, 4, 6, 7};
-    const float *m = in->projection;
+    float m[16];
     int i;
     memset(c, 0, sizeof *c);
+    memcpy(m, in->projection, sizeof m);
     for (i = 0; i < 16; i++)
         if (!sat__is_finite(m[i])) return 0;
-    for (i = 0; i < 6; i++)
-        if (m[zero[i]] != 0) return 0;
-    if (m[11] < 0 && m[15] == 0 && m[12] == 0 && m[13] == 0) c->orthographic = 0;
-    else if (m[11] == 0 && m[15] > 0 && m[8] == 0 && m[9] == 0) c->orthographic = 1;
-    else return 0;
+    for (i = 8; i < 12 && in->left_handed; i++) m[i] = -m[i]; /* z mirrored: what follows looks along -z */
+    c->forward = in->left_handed ? 1.0f : -1.0f;
+    if (!ssao_sat__read_kind(c, m)) return 0;
     if (m[0] == 0 || m[5] == 0 || !ssao_sat__read_axes(c, m, in->width, in->height, bottom_up)) return 0;
     if (!ssao_sat__read_depth(c, m, in->depth_kind, in->clip_zero_to_one)) return 0;
     /* table pixel (i, j) is pixel (step i, step j) of the picture */
@@ -610,7 +645,7 @@ static inline float ssao_sat__distance(const ssao_sat *s, int x, int y)
     if (in->depth_kind == SSAO_SAT_DEPTH_LINEAR) z = in->sky > 0 && d >= in->sky ? 0 : d;
     else {
         if (in->depth_kind == SSAO_SAT_DEPTH_HARDWARE ? d < 0 || d >= 1 : d <= 0 || d > 1) return 0;
-        affine = s->camera.depth_a * (double)d + s->camera.depth_b;
+        affine = s->camera.depth_a * (double)d + s->camera.depth_b + s->camera.tilt[0] * x + s->camera.tilt[1] * y;
         if (!(affine > 1e-30)) return 0;
         z = (float)(s->camera.orthographic ? affine : 1 / affine);
     }
@@ -684,7 +719,7 @@ static inline ssao_sat__vector ssao_sat__normal(const ssao_sat *s, int x, int y,
     p = (const float *)(const void *)((const unsigned char *)s->input.normals + (ptrdiff_t)y * s->input.normal_stride) + 3 * (ptrdiff_t)x;
     n.x = p[0];
     n.y = p[1];
-    n.z = -p[2];
+    n.z = s->camera.forward * p[2];
     square = n.x * n.x + n.y * n.y + n.z * n.z;
     if (!sat__is_finite(square) || !(square > 1e-20f)) {
         stats->normals_replaced++;
@@ -724,27 +759,74 @@ static void ssao_sat__read_row(const ssao_sat *s, int y, int x0, int step, float
    Depth range and slab edges
    ------------------------------------------------------------------------------------------------ */
 
-static void ssao_sat__range_rows(int begin, int end, int worker, void *context)
-{
-    ssao_sat *s = (ssao_sat *)context;
-    ssao_sat__worker *w = &s->workers[worker];
-    int x, y;
-    for (y = begin; y < end; y++)
-        for (x = 0; x < s->columns; x++) {
-            float z = ssao_sat__distance(s, x * s->step, y * s->step);
-            if (!(z > 0)) continue;
-            if (!(w->farthest > 0) || z < w->nearest) w->nearest = z;
-            if (z > w->farthest) w->farthest = z;
-        }
-}
-
 static float ssao_sat__scale_depth(const ssao_sat *s, float z) { return s->camera.orthographic ? z : logf(z); }
 
 /* Pixel i + GRID j of the sample: GRID x GRID pixels spread over the tables. */
+static inline void ssao_sat__sample_at(const ssao_sat *s, int i, int j, int *x, int *y)
+{
+    *x = (int)((2 * i + 1) * (int64_t)s->columns / (2 * SSAO_SAT__GRID)) * s->step;
+    *y = (int)((2 * j + 1) * (int64_t)s->rows / (2 * SSAO_SAT__GRID)) * s->step;
+}
+
 static inline float ssao_sat__sample(const ssao_sat *s, int i, int j)
 {
-    int x = (int)((2 * i + 1) * (int64_t)s->columns / (2 * SSAO_SAT__GRID)), y = (int)((2 * j + 1) * (int64_t)s->rows / (2 * SSAO_SAT__GRID));
-    return ssao_sat__distance(s, x * s->step, y * s->step);
+    int x, y;
+    ssao_sat__sample_at(s, i, j, &x, &y);
+    return ssao_sat__distance(s, x, y);
+}
+
+/* Keeps the TRIM + 1 least of what it is given. */
+static void ssao_sat__keep_least(float *kept, float v)
+{
+    int i;
+    if (!(v < kept[SSAO_SAT__TRIM])) return;
+    for (i = SSAO_SAT__TRIM; i > 0 && kept[i - 1] > v; i--) kept[i] = kept[i - 1];
+    kept[i] = v;
+}
+
+/* Nearest and farthest distance that slabs and quanta follow: of the sample, in blocks of 2 x 2, less the TRIM blocks with the
+   nearest and those with the farthest pixels. So no pixel and no small object (a bird, a spark) moves them. 0 when the sample
+   meets nothing. */
+static int ssao_sat__sample_range(ssao_sat *s)
+{
+    float least[SSAO_SAT__TRIM + 1], most[SSAO_SAT__TRIM + 1];
+    int i, j, k, blocks = 0, trim;
+    for (i = 0; i <= SSAO_SAT__TRIM; i++) least[i] = most[i] = 3e38f;
+    for (j = 0; j < SSAO_SAT__GRID; j += 2)
+        for (i = 0; i < SSAO_SAT__GRID; i += 2) {
+            float low = 3e38f, high = 0;
+            for (k = 0; k < 4; k++) {
+                float z = ssao_sat__sample(s, i + k % 2, j + k / 2);
+                if (!(z > 0)) continue;
+                if (z < low) low = z;
+                if (z > high) high = z;
+            }
+            if (!(high > 0)) continue;
+            blocks++;
+            ssao_sat__keep_least(least, low);
+            ssao_sat__keep_least(most, -high);
+        }
+    trim = sat__min_int(SSAO_SAT__TRIM, blocks / 16);
+    if (!blocks) return 0;
+    s->nearest = least[trim];
+    s->farthest = -most[trim];
+    if (s->farthest < s->nearest) s->farthest = s->nearest; /* half of the picture nearer than the other by a block */
+    return 1;
+}
+
+/* Without a sample: what there is lies between the sampled pixels. */
+static int ssao_sat__whole_range(ssao_sat *s)
+{
+    int x, y;
+    s->nearest = s->farthest = 0;
+    for (y = 0; y < s->height; y++)
+        for (x = 0; x < s->width; x++) {
+            float z = ssao_sat__distance(s, x, y);
+            if (!(z > 0)) continue;
+            if (!(s->farthest > 0) || z < s->nearest) s->nearest = z;
+            if (z > s->farthest) s->farthest = z;
+        }
+    return s->farthest > 0;
 }
 
 /* Share of the sample in front of each 1/BINS of the logarithmic (orthographic: linear) depth range. */
@@ -794,30 +876,43 @@ static ssao_sat__slab ssao_sat__quantise(float low, float high, double area)
     while (bits > 1 && area * ((double)((uint32_t)1 << bits)) > 2147483648.0) bits--;
     if (bits > 20) bits = 20;
     q.low = low;
-    q.quantum = (high - low) / (float)(((uint32_t)1 << bits) - 1);
+    q.top = ((uint32_t)1 << bits) - 1;
+    q.quantum = (high - low) / (float)q.top;
     q.inverse = q.quantum > 0 ? 1 / q.quantum : 0;
     if (!sat__is_finite(q.inverse)) q.inverse = 0;
     return q;
 }
 
-static inline uint32_t ssao_sat__level(const ssao_sat__slab *q, float v, uint32_t top)
+static inline uint32_t ssao_sat__level(const ssao_sat__slab *q, float v)
 {
     float level = (v - q->low) * q->inverse + 0.5f;
-    return level > 0 ? level < (float)top ? (uint32_t)level : top : 0;
+    return level > 0 ? level < (float)q->top ? (uint32_t)level : q->top : 0;
 }
 
 static inline float ssao_sat__affine(const ssao_sat *s, float z) { return s->camera.orthographic ? z : 1 / z; }
 
-/* Slabs thinner than the radius tell nothing new: a shallow picture takes fewer. */
+/* How many slabs: those thinner than the radius, or than the region that max_pixels leaves of it, tell nothing new. */
+static int ssao_sat__slab_count(const ssao_sat *s)
+{
+    double region = (double)s->limit / (double)s->camera.pixels * (s->camera.orthographic ? 1 : (double)s->nearest), thick;
+    thick = ((double)s->farthest - (double)s->nearest) / ((double)s->radius < region ? (double)s->radius : region);
+    return thick < s->options.slabs ? (int)thick + 1 : s->options.slabs;
+}
+
+/* The end slabs hold whatever is nearer or farther than the range: all of it behind, MARGIN times as near in front. */
 static void ssao_sat__prepare_slabs(ssao_sat *s)
 {
-    double cell = 2 * (double)s->largest / 3 + 2, thick = ((double)s->farthest - (double)s->nearest) / (double)s->radius;
+    double cell = (2 * (double)s->largest / (s->is_signed ? 1 : 3) + 2) * s->step;
+    float spare = s->camera.orthographic ? s->farthest - s->nearest + SSAO_SAT__MARGIN * s->radius : 0;
     int k;
-    s->frame_slabs = thick < s->options.slabs ? (int)thick + 1 : s->options.slabs;
+    s->frame_slabs = ssao_sat__slab_count(s);
     ssao_sat__cut_slabs(s);
+    if (!(spare < 1e15f)) spare = 1e15f;
     for (k = 0; k < s->frame_slabs; k++) {
-        float a = ssao_sat__affine(s, s->edge[k]), b = ssao_sat__affine(s, s->edge[k + 1]);
-        s->slabs[k] = ssao_sat__quantise(a < b ? a : b, a < b ? b : a, cell * cell);
+        float low = s->edge[k], high = s->edge[k + 1];
+        if (k == 0) low = s->camera.orthographic ? low - spare : low / SSAO_SAT__MARGIN;
+        if (s->camera.orthographic) s->slabs[k] = ssao_sat__quantise(low, k == s->frame_slabs - 1 ? high + spare : high, cell * cell);
+        else s->slabs[k] = ssao_sat__quantise(k == s->frame_slabs - 1 ? 0 : 1 / high, 1 / low, cell * cell);
     }
 }
 
@@ -831,7 +926,8 @@ static inline float ssao_sat__table_value(const ssao_sat *s, float z)
 {
     if (!(z > 0)) return s->sky_value;
     if (ssao_sat__table_is_inverse(s)) return 1 / z;
-    return s->options.method == SSAO_SAT_PLANE ? s->farthest - z : z;
+    if (s->options.method == SSAO_SAT_PLANE) return s->farthest - z;
+    return z < s->sky_value ? z : s->sky_value; /* nothing is behind the sky */
 }
 
 static void ssao_sat__prepare_value(ssao_sat *s)
@@ -839,8 +935,8 @@ static void ssao_sat__prepare_value(ssao_sat *s)
     double side = 2 * (double)s->largest + 2;
     float high;
     s->sky_value = 0;
-    if (ssao_sat__table_is_inverse(s)) high = 1 / s->nearest;
-    else if (s->options.method == SSAO_SAT_PLANE) high = s->farthest - s->nearest;
+    if (ssao_sat__table_is_inverse(s)) high = SSAO_SAT__MARGIN / s->nearest;
+    else if (s->options.method == SSAO_SAT_PLANE) high = s->farthest - s->nearest + SSAO_SAT__MARGIN * (s->radius < 1e15f ? s->radius : 1e15f);
     else high = s->sky_value = 1.05f * s->farthest;
     s->value = ssao_sat__quantise(0, high, side * side);
 }
@@ -877,55 +973,95 @@ static inline size_t ssao_sat__at(const ssao_sat *s, int y)
     return (size_t)(y - s->first) * s->stride + SSAO_SAT__PAD;
 }
 
-static void ssao_sat__classify_row(ssao_sat *s, int y)
+/* Do the pixels between those of the table lie on one plane with them? Affine depth has no second differences on planes. */
+static inline uint32_t ssao_sat__is_rough(const float *a, int x, float limit)
 {
-    size_t at = ssao_sat__at(s, y);
-    const float *z = s->z + at;
-    float *affine = s->affine + at;
-    uint8_t *slab = s->slab + at;
-    uint32_t *q = s->quantised + at, found = 0;
-    int x, k, slabs = s->frame_slabs;
-    for (x = 0; x < s->columns; x++) affine[x] = z[x] > 0 ? ssao_sat__affine(s, z[x]) : 0;
-    if (s->options.method != SSAO_SAT_SLABS) return;
-    for (x = 0; x < s->columns; x++) {
+    float c = a[x + 1];
+    return !(fabsf(a[x] + a[x + 2] - 2 * c) <= limit * c) ? (uint32_t)SSAO_SAT__ROUGH : 0;
+}
+
+#ifndef SSAO_SAT_NO_SLABS
+/* Words of one row of the picture; `affine` (columns * step + 1 of them, 0: nothing) is turned into them. */
+static void ssao_sat__classify_row(ssao_sat *s, int y, const float *z, float *affine, uint32_t *words)
+{
+    int x, k, slabs = s->frame_slabs, n = s->columns * s->step;
+    uint32_t found = 0;
+    for (x = 0; x < n; x++) affine[x] = z[x] > 0 ? ssao_sat__affine(s, z[x]) : 0;
+    affine[n] = 0;
+    for (x = 0; x < n; x++) {
         int index = 0;
+        if (!(z[x] > 0)) {
+            words[x] = SSAO_SAT__NOTHING;
+            continue;
+        }
         for (k = 1; k < slabs; k++) index += z[x] >= s->edge[k];
-        slab[x] = (uint8_t)(z[x] > 0 ? index : SSAO_SAT__MAX_SLABS);
-        q[x] = 0;
-        if (!(z[x] > 0)) continue;
-        q[x] = ssao_sat__level(&s->slabs[index], affine[x], (1u << 20) - 1);
+        words[x] = (uint32_t)index << SSAO_SAT__LEVEL_BITS | ssao_sat__level(&s->slabs[index], affine[x]);
         found |= 1u << index;
     }
-    s->row_slabs[y - s->first] = found;
+    s->row_slabs[y - s->first] |= found;
+    for (x = 0; x + 2 < n && s->step == 2; x += 2) words[x] |= ssao_sat__is_rough(affine, x, s->flat_limit);
 }
+
+/* The pixels of table row y, all of them. `scratch` holds a row of the picture twice. */
+static void ssao_sat__hold_words(ssao_sat *s, int y, float *scratch, ssao_sat__worker *w)
+{
+    int j, x, n = s->columns * s->step;
+    float *z = scratch, *affine = scratch + 2 * s->stride;
+    size_t at = ssao_sat__at(s, y);
+    s->row_slabs[y - s->first] = 0;
+    for (j = 0; j < s->step; j++) {
+        uint32_t *words = s->words + ((size_t)(y - s->first) * (size_t)s->step + (size_t)j) * s->word_stride;
+        int row = y * s->step + j;
+        for (x = 0; x < n; x++) {
+            z[x] = row < s->height && x < s->width ? ssao_sat__distance(s, x, row) : 0;
+            if (!(z[x] > 0)) continue;
+            if (!(w->farthest > 0) || z[x] < w->nearest) w->nearest = z[x];
+            if (z[x] > w->farthest) w->farthest = z[x];
+        }
+        ssao_sat__classify_row(s, y, z, affine, words);
+        for (x = 0; x < s->columns; x++) (j ? s->lower : s->affine)[at + (size_t)x] = affine[x * s->step];
+    }
+}
+#endif
 
 static void ssao_sat__hold_rows(int begin, int end, int worker, void *context)
 {
     ssao_sat *s = (ssao_sat *)context;
-    int i;
+    ssao_sat__worker *w = &s->workers[worker];
+    int i, x;
     for (i = begin; i < end; i++) {
         int y = s->first + i;
         size_t at = ssao_sat__at(s, y);
-        ssao_sat_stats unused, *stats = y >= s->begin && y < s->end ? &s->workers[worker].stats : &unused;
+        ssao_sat_stats unused, *stats = y >= s->begin && y < s->end ? &w->stats : &unused;
         memset(&unused, 0, sizeof unused);
         ssao_sat__read_row(s, y * s->step, 0, s->step, s->z + at, s->nx + at, s->ny + at, s->nz + at, stats);
-        ssao_sat__classify_row(s, y);
+#ifndef SSAO_SAT_NO_SLABS
+        if (s->options.method == SSAO_SAT_SLABS) {
+            ssao_sat__hold_words(s, y, s->scratch + (size_t)worker * 8 * s->stride, w);
+            continue;
+        }
+#endif
+        for (x = 0; x < s->columns; x++) {
+            float z = s->z[at + (size_t)x];
+            if (!(z > 0)) continue;
+            if (!(w->farthest > 0) || z < w->nearest) w->nearest = z;
+            if (z > w->farthest) w->farthest = z;
+        }
     }
 }
 
 #ifndef SSAO_SAT_NO_SLABS
-/* Count, sum of q, x and y of one slab. Rows without it are copies of the row above. */
+/* Count, sum of q, x and y of one slab over all pixels of the picture. Rows without it are copies of the row above. */
 static void ssao_sat__build_slab(ssao_sat *s, int k)
 {
     size_t stride = 4 * s->table_stride;
     uint32_t *table = s->table + 4 * (size_t)k * s->table_plane, word[4];
-    int row, x;
+    int row, x, i, step = s->step;
     memset(table, 0, stride * sizeof *table);
     word[0] = 1;
     for (row = 0; row < s->held; row++) {
         uint32_t *o = table + (size_t)(row + 1) * stride;
-        const uint32_t *above = o - stride, *level = s->quantised + (size_t)row * s->stride + SSAO_SAT__PAD;
-        const uint8_t *slab = s->slab + (size_t)row * s->stride + SSAO_SAT__PAD;
+        const uint32_t *above = o - stride, *words = s->words + (size_t)(row * step) * s->word_stride;
         ssao_sat__i sum;
         if (!(s->row_slabs[row] >> k & 1)) {
             memcpy(o, above, stride * sizeof *table);
@@ -933,13 +1069,15 @@ static void ssao_sat__build_slab(ssao_sat *s, int k)
         }
         memset(o, 0, 4 * sizeof *o);
         sum = ssao_sat__load_i(o);
-        word[3] = (uint32_t)(s->first + row); /* counted in the picture, so that bands give the same bits */
         for (x = 0; x < s->columns; x++) {
             o += 4;
             above += 4;
-            if (slab[x] == k) {
-                word[1] = level[x];
-                word[2] = (uint32_t)x;
+            for (i = 0; i < step * step; i++) {
+                uint32_t w = words[(size_t)(i / step) * s->word_stride + (size_t)(x * step + i % step)];
+                if ((int)(w >> SSAO_SAT__LEVEL_BITS & 31) != k) continue;
+                word[1] = w & ((1u << SSAO_SAT__LEVEL_BITS) - 1);
+                word[2] = (uint32_t)(x * step + i % step);
+                word[3] = (uint32_t)((s->first + row) * step + i / step); /* counted in the picture, so that bands give the same bits */
                 sum = ssao_sat__add_i(sum, ssao_sat__load_i(word));
             }
             ssao_sat__store_i(o, ssao_sat__add_i(sum, ssao_sat__load_i(above)));
@@ -967,7 +1105,7 @@ static void ssao_sat__build_value(ssao_sat *s)
                 real += v - s->mean;
                 o[x + 1] = sat__float_bits(real + sat__float_from_bits(above[x + 1]));
             } else {
-                sum += ssao_sat__level(&s->value, v, (1u << 20) - 1);
+                sum += ssao_sat__level(&s->value, v);
                 o[x + 1] = above[x + 1] + sum;
             }
         }
@@ -998,21 +1136,34 @@ static int ssao_sat__is_bent(const ssao_sat *s, const float *a, size_t at, float
     return !((fabsf(gx) + fabsf(gy)) * scale < 0.5f * s->fit.bias);
 }
 
+/* Half resolution: is anything off the plane among the pixels between those of the table? In the last column and row that is
+   asked of the pixels before. */
+static int ssao_sat__hides_bend(const ssao_sat *s, int row, int x)
+{
+    const uint32_t *words = s->words + (size_t)(2 * row) * s->word_stride + (size_t)(2 * x);
+    size_t at = (size_t)row * s->stride + SSAO_SAT__PAD + (size_t)x;
+    float c = s->lower[at];
+    if ((words[0] | words[s->word_stride]) & SSAO_SAT__ROUGH) return 1;
+    if (row == s->held - 1) return 0;
+    return !(fabsf(s->affine[at] + s->affine[at + s->stride] - 2 * c) <= s->flat_limit * c);
+}
+
 /* Table of the pixels that are no part of a plane. The border takes the differences of its inner neighbours. */
 static void ssao_sat__build_flags(ssao_sat *s)
 {
-    int row, x, small = s->held < 3 || s->columns < 3;
+    int row, x, thin = s->held < 3 || s->columns < 3;
     memset(s->flags, 0, s->table_stride * sizeof *s->flags);
     for (row = 0; row < s->held; row++) {
         uint32_t *o = s->flags + (size_t)(row + 1) * s->table_stride, sum = 0;
         const uint32_t *up = o - s->table_stride;
         size_t at = (size_t)row * s->stride + SSAO_SAT__PAD;
-        const float *a = s->affine + (size_t)(small ? row : sat__clamp_int(row, 1, s->held - 2)) * s->stride + SSAO_SAT__PAD;
+        const float *a = s->affine + (size_t)(thin ? row : sat__clamp_int(row, 1, s->held - 2)) * s->stride + SSAO_SAT__PAD;
         float ry = s->camera.ay * (float)(s->first + row) + s->camera.by;
         o[0] = 0;
         for (x = 0; x < s->columns; x++) {
             int inner = sat__clamp_int(x, 1, s->columns - 2);
-            sum += small || ssao_sat__is_bent(s, a + inner, at + (size_t)x, s->camera.ax * (float)x + s->camera.bx, ry);
+            sum += thin || ssao_sat__is_bent(s, a + inner, at + (size_t)x, s->camera.ax * (float)x + s->camera.bx, ry) ||
+                   (s->step == 2 && ssao_sat__hides_bend(s, row, x));
             o[x + 1] = up[x + 1] + sum;
         }
     }
@@ -1069,6 +1220,7 @@ typedef struct ssao_sat__point {
     int x, y;
     float z, facing, slope[2];             /* n.ray and its change a column and a row; orthographic: n.z, n.x, n.y */
     ssao_sat__f px, py, pz, nx, ny, nz;    /* the same in all lanes */
+    ssao_sat__f least;                     /* square of a millionth of the distance: nothing is nearer than that */
     ssao_sat__f occlusion[2], blocked[2][3]; /* by cell */
 } ssao_sat__point;
 
@@ -1083,25 +1235,25 @@ static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s
                                            ssao_sat__f weight)
 {
     const ssao_sat__f one = ssao_sat__set(1), zero = ssao_sat__set(0), falloff = ssao_sat__set(1 / (s->range * s->range));
-    ssao_sat__f count, affine, r, z, dx, dy, dz, square, height, near, inverse, part;
+    ssao_sat__f count, affine, r, z, dx, dy, dz, square, height, share, inverse, part;
     ssao_sat__transpose(sums); /* count, level, x, y of the four cells */
     count = sums[0];
     affine = ssao_sat__add(ssao_sat__mul(ssao_sat__set(slab->low), count), ssao_sat__mul(ssao_sat__set(slab->quantum), sums[1]));
     r = ssao_sat__div(one, s->camera.orthographic ? ssao_sat__max(count, one) : ssao_sat__max(affine, ssao_sat__set(1e-30f)));
     z = ssao_sat__mul(s->camera.orthographic ? affine : count, r);
-    dx = ssao_sat__add(ssao_sat__mul(ssao_sat__set(s->camera.ax), sums[2]), ssao_sat__mul(ssao_sat__set(s->camera.bx), count));
-    dy = ssao_sat__add(ssao_sat__mul(ssao_sat__set(s->camera.ay), sums[3]), ssao_sat__mul(ssao_sat__set(s->camera.by), count));
+    dx = ssao_sat__add(ssao_sat__mul(ssao_sat__set((float)s->camera.full[0]), sums[2]), ssao_sat__mul(ssao_sat__set(s->camera.bx), count));
+    dy = ssao_sat__add(ssao_sat__mul(ssao_sat__set((float)s->camera.full[2]), sums[3]), ssao_sat__mul(ssao_sat__set(s->camera.by), count));
     dx = ssao_sat__sub(ssao_sat__mul(dx, r), p->px);
     dy = ssao_sat__sub(ssao_sat__mul(dy, r), p->py);
     dz = ssao_sat__sub(z, p->pz);
     square = ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, dx), ssao_sat__mul(dy, dy)), ssao_sat__mul(dz, dz));
     height = ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, p->nx), ssao_sat__mul(dy, p->ny)), ssao_sat__mul(dz, p->nz));
-    near = ssao_sat__sub(one, ssao_sat__mul(square, falloff));
-    near = ssao_sat__if_positive(height, ssao_sat__mul(ssao_sat__max(zero, near), count));
-    if (!ssao_sat__any_positive(near)) return;
-    inverse = ssao_sat__div(one, ssao_sat__sqrt(ssao_sat__max(square, ssao_sat__set(1e-12f * s->range * s->range))));
+    share = ssao_sat__sub(one, ssao_sat__mul(square, falloff));
+    share = ssao_sat__if_positive(height, ssao_sat__mul(ssao_sat__max(zero, share), count));
+    if (!ssao_sat__any_positive(share)) return;
+    inverse = ssao_sat__div(one, ssao_sat__sqrt(ssao_sat__max(square, p->least)));
     part = ssao_sat__max(zero, ssao_sat__sub(ssao_sat__mul(height, inverse), ssao_sat__set(s->fit.bias)));
-    part = ssao_sat__mul(ssao_sat__mul(part, near), weight);
+    part = ssao_sat__mul(ssao_sat__mul(part, share), weight);
     p->occlusion[group] = ssao_sat__add(p->occlusion[group], part);
 #ifndef SSAO_SAT_NO_BENT
     if (s->bent_wanted) {
@@ -1147,22 +1299,34 @@ static inline void ssao_sat__add_slab(ssao_sat__point *p, const ssao_sat *s, con
     ssao_sat__add_occluders(p, s, &s->slabs[k], sides, 1, c->weight[1]);
 }
 
-/* Borders of the cells along one axis: [at - outer, at - inner) [at - inner, at + inner] (at + inner, at + outer]; 1 / length. */
-static inline void ssao_sat__cut_axis(int *border, float *per_length, int at, int inner, int outer, int end)
+/* Borders of the cells along one axis: [at - outer, at - inner) [at - inner, at + inner] (at + inner, at + outer], and what a pixel
+   of the picture weighs in them. What the picture's border takes from a side goes to the middle, less for being farther off: as if
+   the surroundings went on beyond the border, without a jump where a cell leaves the picture. */
+static inline void ssao_sat__cut_axis(int *border, float *weight, int at, int inner, int outer, int end, int step, int pixels)
 {
+    float first, last, length = (float)(outer - inner);
     int t;
     border[0] = sat__max_int(at - outer, 0);
     border[1] = sat__max_int(at - inner, 0);
     border[2] = sat__min_int(at + inner + 1, end);
     border[3] = sat__min_int(at + outer + 1, end);
-    for (t = 0; t < 3; t++) per_length[t] = border[t + 1] > border[t] ? 1 / (float)(border[t + 1] - border[t]) : 0;
+    for (t = 0; t < 3; t++) {
+        int count = sat__min_int(border[t + 1] * step, pixels) - border[t] * step;
+        weight[t] = count > 0 ? 1 / (float)count : 0;
+    }
+    if (border[0] == at - outer && border[3] == at + outer + 1) return;
+    first = (float)(border[1] - border[0]) / length;
+    last = (float)(border[3] - border[2]) / length;
+    weight[0] *= first;
+    weight[1] *= 1 + SSAO_SAT__BEYOND * (2 - first - last);
+    weight[2] *= last;
 }
 
 static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, int y, const int *inner, const int *outer, float weight)
 {
     float u[3], v[3], corners[4], sides[4];
-    ssao_sat__cut_axis(c->column, u, x, inner[0], outer[0], s->columns);
-    ssao_sat__cut_axis(c->row, v, y, inner[1], outer[1], s->rows);
+    ssao_sat__cut_axis(c->column, u, x, inner[0], outer[0], s->columns, s->step, s->width);
+    ssao_sat__cut_axis(c->row, v, y, inner[1], outer[1], s->rows, s->step, s->height);
     corners[0] = u[0] * v[0];
     corners[1] = u[2] * v[0];
     corners[2] = u[0] * v[2];
@@ -1179,10 +1343,13 @@ static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, in
    of the frustum that holds it, and its distance at least that along the axis. */
 static inline int ssao_sat__may_occlude(const ssao_sat__point *p, const ssao_sat *s, const int *outer, int k)
 {
-    float near = s->edge[k], far = s->edge[k + 1], spread = p->slope[0] * (float)outer[0] + p->slope[1] * (float)outer[1];
-    float distance = near > p->z ? near - p->z : far < p->z ? p->z - far : 0, height;
-    if (s->camera.orthographic) height = p->facing * ((p->facing > 0 ? far : near) - p->z) + spread;
-    else height = (p->facing + spread) * (p->facing + spread > 0 ? far : near) - p->facing * p->z;
+    float low = s->edge[k], high = s->edge[k + 1], spread = p->slope[0] * (float)(outer[0] + 1) + p->slope[1] * (float)(outer[1] + 1);
+    float distance, height;
+    if (k == 0 && s->band_nearest < low) low = s->band_nearest; /* the end slabs hold all that is beyond */
+    if (k == s->frame_slabs - 1 && s->band_farthest > high) high = s->band_farthest;
+    distance = low > p->z ? low - p->z : high < p->z ? p->z - high : 0;
+    if (s->camera.orthographic) height = p->facing * ((p->facing > 0 ? high : low) - p->z) + spread;
+    else height = (p->facing + spread) * (p->facing + spread > 0 ? high : low) - p->facing * p->z;
     return height > s->fit.bias * distance;
 }
 
@@ -1249,6 +1416,7 @@ static void ssao_sat__set_point(ssao_sat__point *p, const ssao_sat *s, int x, in
     p->px = ssao_sat__set((s->camera.ax * (float)x + s->camera.bx) * scale);
     p->py = ssao_sat__set((s->camera.ay * (float)y + s->camera.by) * scale);
     p->pz = ssao_sat__set(z);
+    p->least = ssao_sat__set(z * z * 1e-12f + 1e-37f);
     p->nx = ssao_sat__set(s->nx[at]);
     p->ny = ssao_sat__set(s->ny[at]);
     p->nz = ssao_sat__set(s->nz[at]);
@@ -1269,7 +1437,7 @@ static void ssao_sat__estimate_slabs(ssao_sat *s, int x, int y, ssao_sat_stats *
     fade = ssao_sat__fade(s, half_side);
     ssao_sat__set_point(&p, s, x, y, at);
     stats->cut += (size_t)cut;
-    if (!(fade > 0)) stats->small++;
+    if (!(fade > 0)) stats->tiny++;
     else if (ssao_sat__is_flat(s, x, y, half_side)) stats->flat++;
     else {
         while (first < end - 1 && s->edge[first + 1] < z - s->range) first++;
@@ -1411,6 +1579,14 @@ static float ssao_sat__published(const ssao_sat *s, ssao_sat__region *r, float z
     return deficit > 0 ? gain * deficit / s->radius : 0;
 }
 
+/* Mean of max(plane, 0) over a box, of a plane with this value at the centre and at most `spread` off it: beyond its horizon there
+   is sky, 0 in the table. Exact where the plane falls along an axis, and more than that otherwise. */
+static inline float ssao_sat__plane_mean(float centre, float spread)
+{
+    if (centre >= spread) return centre;
+    return centre > -spread ? (centre + spread) * (centre + spread) / (4 * spread) : 0;
+}
+
 /* Height of the mean over the tangent plane, for each of the boxes. In perspective the plane is 1/z = n.ray / n.P, in orthographic
    views z itself is affine: both are compared at the centre of the box, where their mean over the box lies. */
 static float ssao_sat__over_plane(const ssao_sat *s, ssao_sat__region *r, const ssao_sat__vector *n, float x, float y, float z,
@@ -1435,9 +1611,10 @@ static float ssao_sat__over_plane(const ssao_sat *s, ssao_sat__region *r, const 
     ssao_sat__look_up(r, s, step, 0, stats);
     for (j = 0; j < 4; j += step)
         for (i = 0; i < 4; i += step) {
-            float height, cx = 0.5f * (float)(r->x[i] + r->x[i + step]), cy = 0.5f * (float)(r->y[j] + r->y[j + step]);
+            float height, spread, cx = 0.5f * (float)(r->x[i] + r->x[i + step]), cy = 0.5f * (float)(r->y[j] + r->y[j + step]);
             if (!(ssao_sat__area(r, i, j, i + step, j + step) > 0)) continue;
-            height = (ssao_sat__mean(r, s, i, j, i + step, j + step) - own - gx * (cx - x) - gy * (cy - y)) * to_height;
+            spread = 0.5f * (fabsf(gx) * (float)(r->x[i + step] - r->x[i]) + fabsf(gy) * (float)(r->y[j + step] - r->y[j]));
+            height = (ssao_sat__mean(r, s, i, j, i + step, j + step) - ssao_sat__plane_mean(own + gx * (cx - x) + gy * (cy - y), spread)) * to_height;
             if (height > 0) sum += height / (1 + s->fit.range * height * height);
         }
     return sum / (float)(s->options.plane_boxes * s->options.plane_boxes);
@@ -1481,7 +1658,7 @@ static float ssao_sat__estimate_pixel(const ssao_sat *s, int x, int y, ssao_sat_
     if (!(z > 0)) { stats->sky++; return s->is_signed ? 0.0f : 1.0f; }
     half_side = ssao_sat__half_side(s, z, &cut);
     fade = ssao_sat__fade(s, half_side);
-    if (!(fade > 0)) { stats->small++; return s->is_signed ? 0.0f : 1.0f; }
+    if (!(fade > 0)) { stats->tiny++; return s->is_signed ? 0.0f : 1.0f; }
     stats->cut += (size_t)cut;
     stats->estimated++;
     n.x = s->nx[at];
@@ -1535,14 +1712,14 @@ static inline float *ssao_sat__out_row(float *out, ptrdiff_t stride, int y)
 
 #ifndef SSAO_SAT_NO_BENT
 /* Mean free direction: that of the open hemisphere, 2/3 n, less what is blocked. z turns from forward to OpenGL's. */
-static inline void ssao_sat__write_bent(float *out, float z, float nx, float ny, float nz, float bx, float by, float bz)
+static inline void ssao_sat__write_bent(const ssao_sat *s, float *out, float z, float nx, float ny, float nz, float bx, float by, float bz)
 {
     float x = (2 / 3.0f) * nx - bx, y = (2 / 3.0f) * ny - by, w = (2 / 3.0f) * nz - bz, length = sqrtf(x * x + y * y + w * w);
     if (!(z > 0)) { nx = ny = 0; nz = -1; }
     if (z > 0 && length > 1e-3f) { nx = x / length; ny = y / length; nz = w / length; }
     out[0] = nx;
     out[1] = ny;
-    out[2] = -nz;
+    out[2] = s->camera.forward * nz;
 }
 #endif
 
@@ -1555,7 +1732,7 @@ static void ssao_sat__copy_row(const ssao_sat *s, int y)
         float *bent = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
         int x;
         for (x = 0; x < s->width; x++, at++)
-            ssao_sat__write_bent(bent + 3 * x, s->z[at], s->nx[at], s->ny[at], s->nz[at], s->blocked[0][at], s->blocked[1][at], s->blocked[2][at]);
+            ssao_sat__write_bent(s, bent + 3 * x, s->z[at], s->nx[at], s->ny[at], s->nz[at], s->blocked[0][at], s->blocked[1][at], s->blocked[2][at]);
     }
 #endif
 }
@@ -1614,7 +1791,7 @@ static void ssao_sat__write_row(const ssao_sat *s, const ssao_sat__picture_row *
     if (s->bent_wanted) {
         float *bent = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
         for (x = x0, i = 0; x < s->width; x += 2, i++)
-            ssao_sat__write_bent(bent + 3 * x, r->z[i], r->nx[i], r->ny[i], r->nz[i], r->blocked[0][i], r->blocked[1][i], r->blocked[2][i]);
+            ssao_sat__write_bent(s, bent + 3 * x, r->z[i], r->nx[i], r->ny[i], r->nz[i], r->blocked[0][i], r->blocked[1][i], r->blocked[2][i]);
     }
 #endif
 }
@@ -1659,6 +1836,12 @@ static void ssao_sat__run_band(ssao_sat *s, int begin, int end)
     s->first = sat__max_int(0, begin - reserve);
     s->held = sat__min_int(s->rows, end + reserve) - s->first;
     sat__parallel_for(threads, s->held, ssao_sat__hold_rows, s);
+    for (i = 0; i < sat__worker_count(threads); i++) {
+        const ssao_sat__worker *w = &s->workers[i];
+        if (!(w->farthest > 0)) continue;
+        if (w->nearest < s->band_nearest) s->band_nearest = w->nearest;
+        if (w->farthest > s->band_farthest) s->band_farthest = w->farthest;
+    }
     s->used_slabs = 0;
     for (i = 0; i < s->held && s->options.method == SSAO_SAT_SLABS; i++) s->used_slabs |= s->row_slabs[i];
     sat__parallel_for(threads, tables, ssao_sat__build_tables, s);
@@ -1683,24 +1866,10 @@ static void ssao_sat__fill(ssao_sat *s)
                 if (z > 0) n = ssao_sat__normal(s, x, y, z, &s->workers[0].stats);
                 b[3 * x] = n.x;
                 b[3 * x + 1] = n.y;
-                b[3 * x + 2] = -n.z;
+                b[3 * x + 2] = s->camera.forward * n.z;
             }
         }
 #endif
-    }
-}
-
-static void ssao_sat__find_range(ssao_sat *s)
-{
-    int i, workers = sat__worker_count(&s->options.threads);
-    for (i = 0; i < workers; i++) memset(&s->workers[i], 0, sizeof s->workers[i]);
-    sat__parallel_for(&s->options.threads, s->rows, ssao_sat__range_rows, s);
-    s->nearest = s->farthest = 0;
-    for (i = 0; i < workers; i++) {
-        const ssao_sat__worker *w = &s->workers[i];
-        if (!(w->farthest > 0)) continue;
-        if (!(s->farthest > 0) || w->nearest < s->nearest) s->nearest = w->nearest;
-        if (w->farthest > s->farthest) s->farthest = w->farthest;
     }
 }
 
@@ -1714,9 +1883,15 @@ static float ssao_sat__sample_mean(const ssao_sat *s)
     return sum / (SSAO_SAT__GRID * SSAO_SAT__GRID);
 }
 
+/* Half side of regions, in table pixels, whose cells' sums of x and y fit 31 bits. */
+static double ssao_sat__largest_side(int columns, int rows, int step)
+{
+    return 1.5 * (sqrt(2147483648.0 / sat__max_int(columns, rows) / (step * step * step)) - 2);
+}
+
 static void ssao_sat__prepare_frame(ssao_sat *s)
 {
-    float side = (float)(1.5 * (sqrt(2147483648.0 / sat__max_int(s->columns, s->rows)) - 2)); /* sums of x and y fit 31 bits */
+    float side = (float)ssao_sat__largest_side(s->columns, s->rows, s->step);
     int cut;
     s->limit = (float)s->options.max_pixels < side ? (float)s->options.max_pixels : side;
     if (s->camera.aspect > 1) s->limit /= s->camera.aspect;
@@ -1724,6 +1899,11 @@ static void ssao_sat__prepare_frame(ssao_sat *s)
     side = ssao_sat__half_side(s, s->nearest, &cut);
     s->largest = (side > 2 ? side : 2) * (s->camera.aspect > 1 ? s->camera.aspect : 1);
     s->flat_limit = s->fit.bias / (4 * s->largest * s->camera.pixels);
+    if (!s->camera.orthographic && !(s->options.region_pixels > 0)) { /* what is nearer than the range has larger regions */
+        side *= SSAO_SAT__MARGIN;
+        if (side > s->limit) side = s->limit;
+        s->largest = (side > 2 ? side : 2) * (s->camera.aspect > 1 ? s->camera.aspect : 1);
+    }
     if (s->camera.orthographic) s->flat_limit /= s->nearest; /* relative to z there */
     if (s->flat_limit < 5e-7f) s->flat_limit = 5e-7f;         /* the rounding of float depths */
     if (s->options.method == SSAO_SAT_SLABS) {
@@ -1734,25 +1914,45 @@ static void ssao_sat__prepare_frame(ssao_sat *s)
     }
 }
 
-static void ssao_sat__run(ssao_sat *s, ssao_sat_stats *stats)
+/* Is the space of the given normals the view's? Those of the sample against the normals from depth. */
+static void ssao_sat__compare_normals(const ssao_sat *s, ssao_sat_stats *stats)
 {
-    int begin, band = s->options.band_rows ? s->options.band_rows : s->rows, i;
-    ssao_sat__find_range(s);
-    if (!(s->farthest > 0) || !(s->reach > 0) || !(s->fit.gain > 0)) ssao_sat__fill(s);
-    else {
-        ssao_sat__prepare_frame(s);
-        for (begin = 0; begin < s->rows; begin += band) ssao_sat__run_band(s, begin, sat__min_int(begin + band, s->rows));
-    }
-    if (!stats) return;
+    int i, j, x, y;
+    for (j = 0; j < SSAO_SAT__GRID && s->input.normals; j++)
+        for (i = 0; i < SSAO_SAT__GRID; i++) {
+            ssao_sat__vector given, n;
+            ssao_sat_stats unused;
+            float z = ssao_sat__sample(s, i, j);
+            if (!(z > 0)) continue;
+            memset(&unused, 0, sizeof unused);
+            ssao_sat__sample_at(s, i, j, &x, &y);
+            given = ssao_sat__normal(s, x, y, z, &unused);
+            n = ssao_sat__depth_normal(s, x, y, z);
+            stats->normals_compared++;
+            stats->normals_off += given.x * n.x + given.y * n.y + given.z * n.z < 0.7f;
+        }
+}
+
+static void ssao_sat__collect(const ssao_sat *s, ssao_sat_stats *stats, int was_filled)
+{
+    float low = 0, high = 0;
+    int i;
     memset(stats, 0, sizeof *stats);
     stats->pixels = (size_t)s->columns * (size_t)s->rows;
-    stats->nearest = (double)s->nearest;
-    stats->farthest = (double)s->farthest;
     stats->bytes = s->bytes;
+    ssao_sat__compare_normals(s, stats);
+    for (i = 0; i < sat__worker_count(&s->options.threads); i++) {
+        const ssao_sat__worker *w = &s->workers[i];
+        if (!(w->farthest > 0)) continue;
+        if (!(high > 0) || w->nearest < low) low = w->nearest;
+        if (w->farthest > high) high = w->farthest;
+    }
+    stats->nearest = (double)(was_filled ? s->nearest : low);
+    stats->farthest = (double)(was_filled ? s->farthest : high);
     for (i = 0; i < sat__worker_count(&s->options.threads); i++) {
         const ssao_sat_stats *w = &s->workers[i].stats;
         stats->sky += w->sky;
-        stats->small += w->small;
+        stats->tiny += w->tiny;
         stats->flat += w->flat;
         stats->estimated += w->estimated;
         stats->border += w->border;
@@ -1763,6 +1963,23 @@ static void ssao_sat__run(ssao_sat *s, ssao_sat_stats *stats)
         stats->normals_replaced += w->normals_replaced;
         stats->normals_backfacing += w->normals_backfacing;
     }
+}
+
+static void ssao_sat__run(ssao_sat *s, ssao_sat_stats *stats)
+{
+    int begin, band = s->options.band_rows ? s->options.band_rows : s->rows, fill;
+    memset(s->workers, 0, (size_t)sat__worker_count(&s->options.threads) * sizeof *s->workers);
+    fill = !(s->reach > 0) || !(s->fit.gain > 0);
+    if (fill) ssao_sat__whole_range(s);
+    else fill = !ssao_sat__sample_range(s) && !ssao_sat__whole_range(s);
+    if (fill) ssao_sat__fill(s);
+    else {
+        s->band_nearest = s->nearest;
+        s->band_farthest = s->farthest;
+        ssao_sat__prepare_frame(s);
+        for (begin = 0; begin < s->rows; begin += band) ssao_sat__run_band(s, begin, sat__min_int(begin + band, s->rows));
+    }
+    if (stats) ssao_sat__collect(s, stats, fill);
 }
 
 /* ------------------------------------------------------------------------------------------------
@@ -1904,8 +2121,9 @@ static int ssao_sat__lay_out(ssao_sat *s, sat__arena *arena)
     s->nz = (float *)sat__carve(arena, picture, 4);
     s->open = (float *)sat__carve(arena, picture, 4);
     for (i = 0; i < 3; i++) s->blocked[i] = (float *)sat__carve(arena, bent ? picture : 0, 4);
-    s->slab = (uint8_t *)sat__carve(arena, s->tables > 1 ? picture : 0, 1);
-    s->quantised = (uint32_t *)sat__carve(arena, s->tables > 1 ? picture : 0, 4);
+    s->lower = (float *)sat__carve(arena, s->tables > 1 && s->step == 2 ? picture : 0, 4);
+    s->word_stride = ((size_t)s->columns * (size_t)s->step + 15) / 16 * 16;
+    s->words = (uint32_t *)sat__carve(arena, s->tables > 1 ? rows * (size_t)s->step * s->word_stride : 0, 4);
     s->row_slabs = (uint32_t *)sat__carve(arena, rows, 4);
     s->table = (uint32_t *)sat__carve(arena, words, 4);
     s->flags = (uint32_t *)sat__carve(arena, s->tables > 1 ? s->table_plane : 0, 4);
@@ -1989,17 +2207,18 @@ SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void)
     return
         "#ifndef SSAO_SAT_GLSL\n"
         "#define SSAO_SAT_GLSL\n"
-        "float ssao_sat_distance(vec4 view[3], float d) {\n"
+        "float ssao_sat_distance(vec4 view[3], ivec2 pixel, float d) {\n"
         "    float z = d;\n"
         "    if (isnan(d) || isinf(d)) return 0.0;\n"
         "    if (view[1].z > 0.5) {\n"
         "        if (view[1].z < 1.5 ? d < 0.0 || d >= 1.0 : d <= 0.0 || d > 1.0) return 0.0;\n"
-        "        z = view[1].x * d + view[1].y;\n"
+        "        z = view[1].x * d + view[1].y + dot(view[2].yz, vec2(pixel));\n"
         "        if (!(z > 1e-30)) return 0.0;\n"
         "        if (view[1].w < 0.5) z = 1.0 / z;\n"
         "    } else if (view[2].x > 0.0 && d >= view[2].x) return 0.0;\n"
         "    return z > 1e-18 && z < 1e18 ? z : 0.0;\n"
         "}\n"
+        "float ssao_sat_distance(vec4 view[3], float d) { return ssao_sat_distance(view, ivec2(0), d); }\n"
         "vec3 ssao_sat_position(vec4 view[3], ivec2 pixel, float z) {\n"
         "    return vec3((view[0].xz * (vec2(pixel) + 0.5) + view[0].yw) * (view[1].w > 0.5 ? 1.0 : z), z);\n"
         "}\n"
@@ -2010,7 +2229,7 @@ SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void)
         "    for (int side = -1; side <= 1; side += 2) {\n"
         "        ivec2 q = pixel + side * along;\n"
         "        if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, textureSize(depth, 0)))) continue;\n"
-        "        float zq = ssao_sat_distance(view, texelFetch(depth, q, 0).r);\n"
+        "        float zq = ssao_sat_distance(view, q, texelFetch(depth, q, 0).r);\n"
         "        if (!(zq > 0.0)) continue;\n"
         "        float off = abs(view[1].w > 0.5 ? zq - z : 1.0 / zq - 1.0 / z);\n"
         "        if (found && off >= nearest) continue;\n"
@@ -2038,10 +2257,10 @@ static const char ssao_sat__gl_common[] =
     "uniform sampler2D depth, normals, edges;\n"
     "uniform vec4 view[3];\n"
     "uniform ivec2 size, picture;\n"
-    "float distance_at(ivec2 pixel) { return ssao_sat_distance(view, texelFetch(depth, min(pixel, picture - 1), 0).r); }\n"
+    "float distance_at(ivec2 pixel) { return ssao_sat_distance(view, pixel, texelFetch(depth, min(pixel, picture - 1), 0).r); }\n"
     "vec3 normal_at(ivec2 pixel, float z) {\n"
     "#if NORMALS\n"
-    "    vec3 n = texelFetch(normals, pixel, 0).xyz * vec3(1.0, 1.0, -1.0);\n"
+    "    vec3 n = texelFetch(normals, pixel, 0).xyz * vec3(1.0, 1.0, view[2].w);\n"
     "    float square = dot(n, n);\n"
     "    if (!isnan(square) && !isinf(square) && square > 1e-20) return n / sqrt(square);\n"
     "#endif\n"
@@ -2052,24 +2271,40 @@ static const char ssao_sat__gl_common[] =
     "float aspect() { return abs(view[0].x / view[0].z); }\n"
     "bool orthographic() { return view[1].w > 0.5; }\n";
 
-/* Nearest and farthest distance of 16 x 16 pixels. */
+/* First nearest and farthest distance in 2 x 2 of the sample, then the range without the TRIM blocks at its ends, as in C. Where
+   the sample meets nothing the range is that of nothing: 1 to 1. */
 static const char ssao_sat__gl_range[] =
     "uniform sampler2D finer;\n"
-    "uniform ivec2 fine;\n"
     "out vec4 result;\n"
     "void main() {\n"
-    "    ivec2 low = 16 * ivec2(gl_FragCoord.xy), high = min(low + 16, fine);\n"
-    "    vec2 r = vec2(1e30, 0.0);\n"
-    "    for (int y = low.y; y < high.y; y++)\n"
-    "        for (int x = low.x; x < high.x; x++) {\n"
     "#if FIRST\n"
-    "            float z = distance_at(STEP * ivec2(x, y));\n"
-    "            if (z > 0.0) r = vec2(min(r.x, z), max(r.y, z));\n"
+    "    ivec2 block = ivec2(gl_FragCoord.xy);\n"
+    "    vec2 r = vec2(3e38, 0.0);\n"
+    "    for (int k = 0; k < 4; k++) {\n"
+    "        float z = distance_at(STEP * ((2 * (2 * block + ivec2(k % 2, k / 2)) + 1) * size / (2 * GRID)));\n"
+    "        if (z > 0.0) r = vec2(min(r.x, z), max(r.y, z));\n"
+    "    }\n"
     "#else\n"
-    "            vec2 v = texelFetch(finer, ivec2(x, y), 0).xy;\n"
-    "            r = vec2(min(r.x, v.x), max(r.y, v.y));\n"
-    "#endif\n"
+    "    float least[TRIM + 1], most[TRIM + 1];\n"
+    "    int blocks = 0, trim;\n"
+    "    for (int i = 0; i <= TRIM; i++) least[i] = most[i] = 3e38;\n"
+    "    for (int k = 0; k < GRID * GRID / 4; k++) {\n"
+    "        vec2 v = texelFetch(finer, ivec2(k % (GRID / 2), k / (GRID / 2)), 0).xy;\n"
+    "        if (!(v.y > 0.0)) continue;\n"
+    "        blocks++;\n"
+    "        v.y = -v.y;\n"
+    "        for (int i = 0; i <= TRIM; i++) {\n"
+    "            float a = least[i], b = most[i];\n"
+    "            least[i] = min(a, v.x);\n"
+    "            v.x = max(a, v.x);\n"
+    "            most[i] = min(b, v.y);\n"
+    "            v.y = max(b, v.y);\n"
     "        }\n"
+    "    }\n"
+    "    trim = min(TRIM, blocks / 16);\n"
+    "    vec2 r = blocks > 0 ? vec2(least[trim], -most[trim]) : vec2(1.0);\n"
+    "    r.y = max(r.x, r.y);\n"
+    "#endif\n"
     "    result = vec4(r, 0.0, 0.0);\n"
     "}\n";
 
@@ -2090,7 +2325,7 @@ static const char ssao_sat__gl_shares[] =
     "    result = vec4(all > 0.0 ? below / all : bin / float(BINS));\n"
     "}\n";
 
-/* Texel k: edge k, and low value and quantum of slab k; the number of slabs. The same cut as in C. */
+/* Texel k: edge k; low value, quantum and highest level of slab k. The last has the farthest distance and the number of slabs. As in C. */
 static const char ssao_sat__gl_edges[] =
     "uniform sampler2D finer, shares;\n"
     "uniform vec4 region;\n" /* radius, reach, limit */
@@ -2111,32 +2346,44 @@ static const char ssao_sat__gl_edges[] =
     "}\n"
     "void main() {\n"
     "    vec2 range = texelFetch(finer, ivec2(0), 0).xy, ends = vec2(0.0);\n"
-    "    int k = int(gl_FragCoord.x), slabs = METHOD == 0 ? int(min(float(SLABS), floor((range.y - range.x) / region.x) + 1.0)) : 1, bits = 31;\n"
-    "    float largest = max(min(region.y * pixels() / (orthographic() ? 1.0 : range.x), region.z), 2.0) * max(aspect(), 1.0);\n"
+    "    float thin = min(region.x, region.z / pixels() * (orthographic() ? 1.0 : range.x));\n"
+    "    int k = int(gl_FragCoord.x), slabs = METHOD == 0 ? int(min(float(SLABS), floor((range.y - range.x) / thin) + 1.0)) : 1, bits = 31;\n"
+    "    float largest = max(min(region.y * pixels() / (orthographic() ? 1.0 : range.x / MARGIN), region.z), 2.0) * max(aspect(), 1.0);\n"
     "    float side = 2.0 * largest / (METHOD == 0 ? 3.0 : 1.0) + 2.0, first = cut(k, slabs, range), second = cut(k + 1, slabs, range);\n"
+    "    float spare = orthographic() ? min(range.y - range.x + MARGIN * region.x, 1e15) : 0.0, low = first, high = second;\n"
+    "    if (METHOD == 0) side *= float(STEP);\n"
+    "    if (k == 0) low = orthographic() ? low - spare : low / MARGIN;\n"
+    "    if (k == slabs - 1) high += spare;\n"
     "    while (bits > 1 && side * side * exp2(float(bits)) > 2147483648.0) bits--;\n"
     "    bits = min(bits, 20);\n"
-    "    if (METHOD == 0) ends = orthographic() ? vec2(first, second) : vec2(1.0 / second, 1.0 / first);\n"
-    "    else if (METHOD == 1) ends.y = orthographic() ? range.y - range.x : 1.0 / range.x;\n"
-    "    else ends.y = INVERTED == 1 ? 1.0 / range.x : 1.05 * range.y;\n"
-    "    result = vec4(first, ends.x, (ends.y - ends.x) / (exp2(float(bits)) - 1.0), float(slabs));\n"
+    "    if (METHOD == 0) ends = orthographic() ? vec2(low, high) : vec2(k == slabs - 1 ? 0.0 : 1.0 / high, 1.0 / low);\n"
+    "    else if (METHOD == 1) ends.y = orthographic() ? range.y - range.x + MARGIN * min(region.x, 1e15) : MARGIN / range.x;\n"
+    "    else ends.y = INVERTED == 1 ? MARGIN / range.x : 1.05 * range.y;\n"
+    "    float top = exp2(float(bits)) - 1.0;\n"
+    "    result = vec4(first, ends.x, (ends.y - ends.x) / top, k == SLABS ? float(slabs) : top);\n"
     "}\n";
 
 /* One word or four for every pixel and slab. */
 static const char ssao_sat__gl_words[] =
     "out uvec4 result;\n"
-    "uint level(float v, vec4 edge) { return edge.z > 0.0 ? uint(clamp((v - edge.y) / edge.z + 0.5, 0.0, 1048575.0)) : 0u; }\n"
+    "uint level(float v, vec4 edge) { return edge.z > 0.0 ? uint(clamp((v - edge.y) / edge.z + 0.5, 0.0, edge.w)) : 0u; }\n"
     "void main() {\n"
     "    ivec2 at = ivec2(gl_FragCoord.xy), tile = at / size, work = at - tile * size;\n"
-    "    float z = distance_at(STEP * work);\n"
     "    vec4 first = texelFetch(edges, ivec2(0), 0);\n"
     "    result = uvec4(0u);\n"
     "#if METHOD == 0\n"
-    "    int k = tile.y * TILES + tile.x, slab = 0, slabs = int(first.w);\n"
-    "    if (!(z > 0.0) || k >= slabs) return;\n"
-    "    for (int i = 1; i < slabs; i++) slab += int(z >= texelFetch(edges, ivec2(i, 0), 0).x);\n"
-    "    if (slab == k) result = uvec4(1u, level(orthographic() ? z : 1.0 / z, texelFetch(edges, ivec2(k, 0), 0)), uvec2(work));\n"
+    "    int k = tile.y * TILES + tile.x, slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);\n"
+    "    if (k >= slabs) return;\n"
+    "    vec4 edge = texelFetch(edges, ivec2(k, 0), 0);\n"
+    "    float next = texelFetch(edges, ivec2(k + 1, 0), 0).x;\n"
+    "    for (int i = 0; i < STEP * STEP; i++) {\n" /* all pixels of the picture */
+    "        ivec2 pixel = STEP * work + ivec2(i % STEP, i / STEP);\n"
+    "        float z = all(lessThan(pixel, picture)) ? distance_at(pixel) : 0.0;\n"
+    "        if (z > 0.0 && (k == 0 || z >= edge.x) && (k == slabs - 1 || z < next))\n"
+    "            result += uvec4(1u, level(orthographic() ? z : 1.0 / z, edge), uvec2(pixel));\n"
+    "    }\n"
     "#else\n"
+    "    float z = distance_at(STEP * work);\n"
     "    float nearest = first.x, farthest = texelFetch(edges, ivec2(SLABS, 0), 0).x, v;\n"
     "    if (METHOD == 1) v = z > 0.0 ? (orthographic() ? farthest - z : 1.0 / z) : 0.0;\n"
     "    else if (INVERTED == 1) v = z > 0.0 ? 1.0 / z : 0.0;\n"
@@ -2178,12 +2425,19 @@ static const char ssao_sat__gl_slabs[] =
     "    vec4 s = vec4(ivec4(sums));\n"
     "    if (s.x < 0.5) return 0.0;\n"
     "    float mean = (edge.y * s.x + edge.z * s.y) / s.x, z = orthographic() ? mean : 1.0 / max(mean, 1e-30);\n"
-    "    vec3 d = vec3(ray(s.zw / s.x) * (orthographic() ? 1.0 : z), z) - p;\n"
-    "    float square = dot(d, d), height = dot(d, n), near = 1.0 - square / (fit.y * fit.y);\n"
-    "    if (height <= 0.0 || near <= 0.0) return 0.0;\n"
-    "    return max(height * inversesqrt(max(square, 1e-12 * fit.y * fit.y)) - fit.z, 0.0) * near * s.x;\n"
+    "    vec3 d = vec3((view[0].xz * (s.zw / s.x + 0.5) + view[0].yw) * (orthographic() ? 1.0 : z), z) - p;\n"
+    "    float square = dot(d, d), height = dot(d, n), share = 1.0 - square / (fit.y * fit.y);\n"
+    "    if (height <= 0.0 || share <= 0.0) return 0.0;\n"
+    "    return max(height * inversesqrt(max(square, p.z * p.z * 1e-12 + 1e-37)) - fit.z, 0.0) * share * s.x;\n"
     "}\n"
-    "float slab(int k, ivec2 x[4], vec3 p, vec3 n) {\n" /* x[t] = borders along both axes */
+    /* What a pixel weighs in each third of an axis: see ssao_sat__cut_axis. */
+    "vec3 cut(ivec4 border, int outer, int inner, bool whole, int pixels) {\n"
+    "    vec3 share = vec3(1.0), count = vec3(min(STEP * border.yzw, ivec3(pixels)) - STEP * border.xyz);\n"
+    "    float a = float(border.y - border.x) / float(outer - inner), b = float(border.w - border.z) / float(outer - inner);\n"
+    "    if (!whole) share = vec3(a, 1.0 + BEYOND * (2.0 - a - b), b);\n"
+    "    return vec3(count.x > 0.0 ? share.x / count.x : 0.0, count.y > 0.0 ? share.y / count.y : 0.0, count.z > 0.0 ? share.z / count.z : 0.0);\n"
+    "}\n"
+    "float slab(int k, ivec2 x[4], vec3 u, vec3 v, vec3 p, vec3 n) {\n" /* x[t] = borders along both axes; weights of the thirds */
     "    ivec2 tile = ivec2(k % TILES, k / TILES) * size;\n"
     "    vec4 edge = texelFetch(edges, ivec2(k, 0), 0);\n"
     "    uvec4 row[4];\n"
@@ -2195,10 +2449,7 @@ static const char ssao_sat__gl_slabs[] =
     "        for (int t = 0; t < 4; t++) {\n"
     "            uvec4 below = corner(tile, x[t].x, x[j + 1].y), band = below - row[t];\n"
     "            row[t] = below;\n"
-    "            if (t > 0 && !(t == 2 && j == 1)) {\n"
-    "                int area = (x[t].x - x[t - 1].x) * (x[j + 1].y - x[j].y);\n"
-    "                if (area > 0) sum += occluder(band - last, edge, p, n) / float(area);\n"
-    "            }\n"
+    "            if (t > 0 && !(t == 2 && j == 1)) sum += occluder(band - last, edge, p, n) * u[t - 1] * v[j];\n"
     "            last = band;\n"
     "        }\n"
     "    }\n"
@@ -2210,7 +2461,7 @@ static const char ssao_sat__gl_slabs[] =
     "    result = vec4(1.0);\n"
     "    if (!(z > 0.0) || !(strength > 0.0)) return;\n"
     "    vec3 n = normal_at(STEP * work, z), p = vec3(ray(vec2(work)) * (orthographic() ? 1.0 : z), z);\n"
-    "    int slabs = int(texelFetch(edges, ivec2(0), 0).w);\n"
+    "    int slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);\n"
     "    for (int ring = 0; ring < RINGS; ring++, r /= 3.0) {\n"
     "        ivec2 inner = max(ivec2(vec2(r, r * aspect()) / 3.0 + 0.5), 1), outer = max(ivec2(vec2(r, r * aspect()) + 0.5), inner + 1);\n"
     "        float weight = ring == 0 ? WEIGHT0 : ring == 1 ? WEIGHT1 : WEIGHT2, part = 0.0;\n"
@@ -2218,10 +2469,12 @@ static const char ssao_sat__gl_slabs[] =
     "        x[1] = max(work - inner, 0);\n"
     "        x[2] = min(work + inner + 1, size);\n"
     "        x[3] = min(work + outer + 1, size);\n"
+    "        vec3 u = cut(ivec4(x[0].x, x[1].x, x[2].x, x[3].x), outer.x, inner.x, x[0].x == work.x - outer.x && x[3].x == work.x + outer.x + 1, picture.x);\n"
+    "        vec3 v = cut(ivec4(x[0].y, x[1].y, x[2].y, x[3].y), outer.y, inner.y, x[0].y == work.y - outer.y && x[3].y == work.y + outer.y + 1, picture.y);\n"
     "        for (int k = 0; k < slabs; k++) {\n"
-    "            float near = texelFetch(edges, ivec2(k, 0), 0).x, far = texelFetch(edges, ivec2(k + 1, 0), 0).x;\n"
-    "            if (far < z - fit.y || near > z + fit.y) continue;\n"
-    "            part += slab(k, x, p, n);\n"
+    "            float low = texelFetch(edges, ivec2(k, 0), 0).x, high = texelFetch(edges, ivec2(k + 1, 0), 0).x;\n"
+    "            if ((k < slabs - 1 && high < z - fit.y) || (k > 0 && low > z + fit.y)) continue;\n"
+    "            part += slab(k, x, u, v, p, n);\n"
     "        }\n"
     "        sum += weight * part;\n"
     "        total += 8.0 * weight;\n"
@@ -2279,7 +2532,9 @@ static const char ssao_sat__gl_single_main[] =
     "        for (int i = 0; i < BOXES; i++) {\n"
     "            ivec4 c = ivec4(x[i].x, x[j].y, x[i + 1].x, x[j + 1].y);\n"
     "            if (c.z <= c.x || c.w <= c.y) continue;\n"
-    "            float h = (mean(c, edge) - own - dot(g, 0.5 * vec2(c.xy + c.zw) - at)) * height;\n"
+    "            float spread = 0.5 * dot(abs(g), vec2(c.zw - c.xy)), centre = own + dot(g, 0.5 * vec2(c.xy + c.zw) - at);\n"
+    "            if (centre < spread) centre = centre > -spread ? (centre + spread) * (centre + spread) / (4.0 * spread) : 0.0;\n" /* see ssao_sat__plane_mean */
+    "            float h = (mean(c, edge) - centre) * height;\n"
     "            if (h > 0.0) sum += h / (1.0 + fit.y * h * h);\n"
     "        }\n"
     "    return sum / float(BOXES * BOXES);\n"
@@ -2337,16 +2592,16 @@ static const char ssao_sat__gl_upsample[] =
     "}\n";
 
 enum { SSAO_SAT__GL_RANGE, SSAO_SAT__GL_RANGE_FIRST, SSAO_SAT__GL_SHARES, SSAO_SAT__GL_EDGES, SSAO_SAT__GL_WORDS, SSAO_SAT__GL_SCAN, SSAO_SAT__GL_ESTIMATE,
-       SSAO_SAT__GL_UPSAMPLE, SSAO_SAT__GL_PROGRAMS, SSAO_SAT__GL_LEVELS = 5 };
+       SSAO_SAT__GL_UPSAMPLE, SSAO_SAT__GL_PROGRAMS };
 
 typedef struct ssao_sat__gl_target { unsigned texture, framebuffer; int width, height; } ssao_sat__gl_target;
 
 struct ssao_sat_gl {
     sat__gl gl;
     ssao_sat_options options;
-    int width, height, step, columns, rows, tiles, levels, normals; /* normals: as the programs were built, -1 not yet */
-    unsigned programs[SSAO_SAT__GL_PROGRAMS];
-    ssao_sat__gl_target range[SSAO_SAT__GL_LEVELS], shares, edges, table[2], open, out;
+    int width, height, step, columns, rows, tiles, is_built;
+    unsigned programs[2][SSAO_SAT__GL_PROGRAMS]; /* without and with normals */
+    ssao_sat__gl_target range[2], shares, edges, table[2], open, out;
     ssao_sat__camera camera;
     ssao_sat__fit fit;
     float view[12], limit;
@@ -2361,7 +2616,9 @@ static void ssao_sat__gl_pack_view(float *view, const ssao_sat__camera *c, const
     view[6] = (float)(int)in->depth_kind;
     view[7] = (float)c->orthographic;
     view[8] = in->sky;
-    view[9] = view[10] = view[11] = 0;
+    view[9] = (float)c->tilt[0];
+    view[10] = (float)c->tilt[1];
+    view[11] = c->forward;
 }
 
 SSAO_SAT_DEF sat_result ssao_sat_gl_view(float *view, const ssao_sat_input *input, int bottom_up)
@@ -2373,7 +2630,9 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_view(float *view, const ssao_sat_input *inpu
     return SAT_OK;
 }
 
-/* Programs depend on whether there are normals; the rest is fixed at creation. */
+/* Programs that read normals are there twice; the others once, under 0. */
+static int ssao_sat__gl_reads_normals(int which) { return which == SSAO_SAT__GL_ESTIMATE || which == SSAO_SAT__GL_UPSAMPLE; }
+
 static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *const *fragment, int normals)
 {
     const ssao_sat_options *o = &g->options;
@@ -2398,14 +2657,17 @@ static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *co
     sat__gl_define(&g->gl, "LEVELS", o->refine_levels);
     sat__gl_define(&g->gl, "BOXES", o->plane_boxes);
     sat__gl_define(&g->gl, "FIRST", which == SSAO_SAT__GL_RANGE_FIRST);
+    sat__gl_define(&g->gl, "TRIM", SSAO_SAT__TRIM);
+    sat__gl_define_float(&g->gl, "BEYOND", SSAO_SAT__BEYOND);
+    sat__gl_define_float(&g->gl, "MARGIN", SSAO_SAT__MARGIN);
     sat__gl_define_float(&g->gl, "SHARPNESS", SSAO_SAT__SHARPNESS);
     sat__gl_define_float(&g->gl, "WEIGHT0", ssao_sat__ring_weights[0]);
     sat__gl_define_float(&g->gl, "WEIGHT1", ssao_sat__ring_weights[1]);
     sat__gl_define_float(&g->gl, "WEIGHT2", ssao_sat__ring_weights[2]);
-    return sat__gl_build(&g->gl, &g->programs[which], &shaders);
+    return sat__gl_build(&g->gl, &g->programs[normals][which], &shaders);
 }
 
-static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g, int normals)
+static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g)
 {
     static const char last[] = "#define NAME refine_last\n#define CHILD\n#define LEVEL 1\n";
     static const char first[] = "#undef NAME\n#undef CHILD\n#undef LEVEL\n#define NAME refine_all\n#define LEVEL 0\n"
@@ -2419,15 +2681,16 @@ static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g, int normals)
         {ssao_sat__gl_scan, NULL}, {ssao_sat__gl_common, ssao_sat__gl_tone, ssao_sat__gl_slabs, NULL},
         {ssao_sat__gl_common, ssao_sat__gl_upsample, NULL}};
     sat_result result = SAT_OK;
-    int i;
-    for (i = 0; i < SSAO_SAT__GL_PROGRAMS && result == SAT_OK; i++) {
-        if (g->programs[i]) g->gl.DeleteProgram(g->programs[i]);
-        g->programs[i] = 0;
-        result = ssao_sat__gl_program(g, i, i == SSAO_SAT__GL_ESTIMATE && g->options.method != SSAO_SAT_SLABS ? single : text[i], normals);
-    }
-    g->normals = result == SAT_OK ? normals : -1;
+    int i, normals;
+    for (normals = 0; normals < 2; normals++)
+        for (i = 0; i < SSAO_SAT__GL_PROGRAMS && result == SAT_OK; i++) {
+            if (normals && !ssao_sat__gl_reads_normals(i)) continue;
+            result = ssao_sat__gl_program(g, i, i == SSAO_SAT__GL_ESTIMATE && g->options.method != SSAO_SAT_SLABS ? single : text[i], normals);
+        }
+    g->is_built = result == SAT_OK;
     return result;
 }
+
 /* A texture one can draw into. */
 static sat_result ssao_sat__gl_make_target(ssao_sat_gl *g, ssao_sat__gl_target *t, unsigned internal, int width, int height)
 {
@@ -2439,14 +2702,11 @@ static sat_result ssao_sat__gl_make_target(ssao_sat_gl *g, ssao_sat__gl_target *
 
 static sat_result ssao_sat__gl_make_targets(ssao_sat_gl *g)
 {
-    int w = g->columns, h = g->rows, i, slabs = g->options.method == SSAO_SAT_SLABS;
+    int i, slabs = g->options.method == SSAO_SAT_SLABS;
     int tile_rows = slabs ? (g->options.slabs + g->tiles - 1) / g->tiles : 1;
     sat_result result = SAT_OK;
-    for (g->levels = 0; result == SAT_OK && (g->levels == 0 || w > 1 || h > 1); g->levels++) {
-        w = (w + 15) / 16;
-        h = (h + 15) / 16;
-        result = ssao_sat__gl_make_target(g, &g->range[g->levels], SAT__GL_RG32F, w, h);
-    }
+    for (i = 0; i < 2 && result == SAT_OK; i++)
+        result = ssao_sat__gl_make_target(g, &g->range[i], SAT__GL_RG32F, i ? 1 : SSAO_SAT__GRID / 2, i ? 1 : SSAO_SAT__GRID / 2);
     if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->shares, SAT__GL_R32F, SSAO_SAT__BINS + 1, 1);
     if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->edges, SAT__GL_RGBA32F, g->options.slabs + 1, 1);
     for (i = 0; i < 2 && result == SAT_OK; i++)
@@ -2480,12 +2740,11 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *g
     g->columns = (width + g->step - 1) / g->step;
     g->rows = (height + g->step - 1) / g->step;
     g->tiles = o.method != SSAO_SAT_SLABS ? 1 : o.slabs > 4 ? 4 : o.slabs > 1 ? 2 : 1;
-    g->normals = -1;
     result = sat__gl_open(&g->gl, get_proc);
     if (result != SAT_OK) return result;
     sat__gl_begin(&g->gl, &state, 5);
     result = ssao_sat__gl_make_targets(g);
-    if (result == SAT_OK) result = ssao_sat__gl_build_programs(g, 1);
+    if (result == SAT_OK) result = ssao_sat__gl_build_programs(g);
     sat__gl_end(&g->gl, &state);
     return result;
 }
@@ -2505,9 +2764,9 @@ SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl)
     int i;
     if (!gl) return;
     if (gl->gl.vertex_array) {
-        for (i = 0; i < SSAO_SAT__GL_PROGRAMS; i++)
-            if (gl->programs[i]) gl->gl.DeleteProgram(gl->programs[i]);
-        for (i = 0; i < SSAO_SAT__GL_LEVELS; i++) ssao_sat__gl_drop(gl, &gl->range[i]);
+        for (i = 0; i < 2 * SSAO_SAT__GL_PROGRAMS; i++)
+            if (gl->programs[i % 2][i / 2]) gl->gl.DeleteProgram(gl->programs[i % 2][i / 2]);
+        for (i = 0; i < 2; i++) ssao_sat__gl_drop(gl, &gl->range[i]);
         for (i = 0; i < 2; i++) ssao_sat__gl_drop(gl, &gl->table[i]);
         ssao_sat__gl_drop(gl, &gl->shares);
         ssao_sat__gl_drop(gl, &gl->edges);
@@ -2522,7 +2781,7 @@ SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl)
 /* Starts a pass with the uniforms that most of them share. */
 static unsigned ssao_sat__gl_pass(ssao_sat_gl *g, int which, const ssao_sat__gl_target *to, unsigned depth, unsigned normals)
 {
-    unsigned program = g->programs[which];
+    unsigned program = g->programs[normals && ssao_sat__gl_reads_normals(which)][which];
     sat__gl *gl = &g->gl;
     sat__gl_pass(gl, program, to->framebuffer, to->width, to->height);
     gl->Uniform4fv(gl->GetUniformLocation(program, "view"), 3, g->view);
@@ -2541,15 +2800,14 @@ static void ssao_sat__gl_find_edges(ssao_sat_gl *g, unsigned depth)
     float region[4];
     unsigned program;
     int i;
-    for (i = 0; i < g->levels; i++) {
+    for (i = 0; i < 2; i++) {
         program = ssao_sat__gl_pass(g, i ? SSAO_SAT__GL_RANGE : SSAO_SAT__GL_RANGE_FIRST, &g->range[i], depth, 0);
-        sat__gl_set_int2(gl, program, "fine", i ? g->range[i - 1].width : g->columns, i ? g->range[i - 1].height : g->rows);
-        if (i) sat__gl_set_texture(gl, program, "finer", 3, g->range[i - 1].texture);
+        if (i) sat__gl_set_texture(gl, program, "finer", 3, g->range[0].texture);
         sat__gl_draw(gl);
     }
     if (g->options.method == SSAO_SAT_SLABS) {
         program = ssao_sat__gl_pass(g, SSAO_SAT__GL_SHARES, &g->shares, depth, 0);
-        sat__gl_set_texture(gl, program, "finer", 3, g->range[g->levels - 1].texture);
+        sat__gl_set_texture(gl, program, "finer", 3, g->range[1].texture);
         sat__gl_draw(gl);
     }
     program = ssao_sat__gl_pass(g, SSAO_SAT__GL_EDGES, &g->edges, depth, 0);
@@ -2559,7 +2817,7 @@ static void ssao_sat__gl_find_edges(ssao_sat_gl *g, unsigned depth)
     region[2] = g->options.region_pixels > 0 ? (float)g->options.region_pixels / (float)g->step : g->limit;
     region[3] = 0;
     sat__gl_set_float4(gl, program, "region", region);
-    sat__gl_set_texture(gl, program, "finer", 3, g->range[g->levels - 1].texture);
+    sat__gl_set_texture(gl, program, "finer", 3, g->range[1].texture);
     sat__gl_draw(gl);
 }
 
@@ -2615,8 +2873,7 @@ static sat_result ssao_sat__gl_run(ssao_sat_gl *g, unsigned out, unsigned depth,
     sat_result result = SAT_OK;
     unsigned program;
     int table;
-    if (g->normals != (normals != 0)) result = ssao_sat__gl_build_programs(g, normals != 0);
-    if (result == SAT_OK && out) {
+    if (out) {
         result = sat__gl_attach(gl, gl->framebuffer, &out, 1, 0);
         target.framebuffer = gl->framebuffer;
     }
@@ -2642,13 +2899,13 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigne
     sat__gl_state state;
     sat_result result;
     double side;
-    if (!gl || !input || !depth || out == depth || (out && out == normals) || gl->normals < 0) return SAT_ERR_ARGUMENT;
+    if (!gl || !input || !depth || out == depth || (out && out == normals) || !gl->is_built) return SAT_ERR_ARGUMENT;
     if (input->width != gl->width || input->height != gl->height) return SAT_ERR_MISMATCH;
     if ((unsigned)input->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED || !(input->sky >= 0)) return SAT_ERR_ARGUMENT;
     if (!ssao_sat__read_camera(&gl->camera, input, gl->step, gl->options.bottom_up)) return SAT_ERR_ARGUMENT;
     ssao_sat__gl_pack_view(gl->view, &gl->camera, input);
     gl->fit = ssao_sat__fit_of(&gl->options);
-    side = 1.5 * (sqrt(2147483648.0 / sat__max_int(gl->columns, gl->rows)) - 2);
+    side = ssao_sat__largest_side(gl->columns, gl->rows, gl->step);
     gl->limit = (float)(gl->options.max_pixels < side ? gl->options.max_pixels : side);
     if (gl->camera.aspect > 1) gl->limit /= gl->camera.aspect;
     sat__gl_begin(&gl->gl, &state, 5);
