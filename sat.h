@@ -256,7 +256,7 @@ typedef enum sat_non_finite {
 
 typedef struct sat_options {
     sat_kind kind;             /* SAT_KIND_TILED */
-    int tile;                  /* 32; 8..128; a power of two: tile side of SAT_KIND_TILED; 64 needs 4.25 bytes, errs 4x */
+    int tile;                  /* 64; 8..128; a power of two: tile side of SAT_KIND_TILED; 32 errs a quarter */
     int subtract_mean;         /* 0; 0..1; 1 (FLOAT, DOUBLE): Hensley 2005. Good at low contrast; makes dark boxes of
                                   HDR images about 100 times worse */
     double quantum;            /* 0; 0..1e300; 0: the finest power of two that max_value and max_box_area allow; FIXED kinds only */
@@ -317,7 +317,7 @@ SAT_DEF sat_result sat_box_filter_variable(float *out, ptrdiff_t out_stride, con
 /* Never below the absolute error of a box mean of that size anywhere in the table, against exact sums of the
    replaced pixels. Worst case, not typical: see sat_error_rms. */
 SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_width, int box_height);
-/* The root-mean-square error to expect over boxes of that size: within a factor of 3 on non-negative images whose pixels
+/* The root-mean-square error to expect over boxes of that size: within a factor of 4 on non-negative images whose pixels
    are not round numbers and, for FIXED kinds, not mostly below the quantum; an upper estimate on others. */
 SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width, int box_height);
 
@@ -2232,20 +2232,20 @@ SAT_DEF double sat_reduce_f32(const float *in, size_t n, ptrdiff_t stride, int k
 
    Corners are numbered like grid lines: corner (X, Y) holds the sum of [0,X) x [0,Y), so X = 0 and Y = 0 are a stored
    border of zeros and no lookup branches at an edge (eq 4.4 with its cases put in order). Channels are planes.
-   The tile of a corner is that of the pixel to its upper left; corner 0 belongs to tile 0. A tiled table is
+   SAT_KIND_TILED has a layout of its own, below. */
 
-     S(X, Y) = above[tile row][X] + left[Y][tile column] + local[Y][X]
+enum { SAT__LINE = 64, SAT__STRIP = 512, SAT__MAX_STRIP = 4096, SAT__MAX_TILE_SIDE = 128 };
 
-   local: float sums that restart in every tile; left: double, all columns left of the tile over the tile's own rows;
-   above: double, all rows above the tile row. */
-
-enum { SAT__LINE = 64, SAT__STRIP = 512, SAT__MAX_STRIP = 4096 };
+typedef struct sat__spike sat__spike;
+typedef struct sat__giant sat__giant;
+typedef struct sat__tile sat__tile;
 
 /* What one band of rows, or one strip of columns, met: summed in a fixed order afterwards. */
 typedef struct sat__tally {
     size_t nan, infinite, clamped;
     double sum_abs, largest;            /* of |pixel|; sum_abs of tables without negative pixels comes from corners */
-    double tile_largest, tile_squares;  /* of tile sums */
+    double tile_largest, tile_squares;  /* of the tiles' quanta */
+    int giants;                         /* tiled: entries of the tile row's list */
     int negative, overflow;             /* some pixel has its sign bit set; some sum is not finite */
 } sat__tally;
 
@@ -2259,9 +2259,18 @@ struct sat_table {
     int rows;                           /* stored corner rows; less than height + 1 only in a stream */
     size_t element, stride, plane;      /* bytes; elements between corner rows; elements between channels */
     unsigned char *sums;                /* corner (0, 0) of channel 0 */
-    double *left, *above;               /* tiled only */
-    size_t left_plane, above_plane, above_stride;
-    unsigned char *columns;             /* running column sums: a set for each channel and, tiled, for each worker */
+    double *left, *above, *whole;       /* tiled only, as all down to `ring` */
+    sat__tile *tiles;
+    sat__spike *spikes;
+    sat__giant *giants;
+    uint64_t *wide;                     /* the pool of 64-bit tiles */
+    uint32_t *tile_integers;
+    float *ring_pixels;                 /* a tile row of a stream */
+    size_t left_plane;
+    size_t wide_stride;                 /* cells of a row of a 64-bit tile */
+    int wide_quota, giant_room;         /* slots a super tile row; giants a tile row */
+    int has_giants, ring;               /* ring: a stream's, tile rows modulo tiles_y */
+    unsigned char *columns;             /* running column sums, a set for each channel */
     size_t columns_stride;
     float *pixels;                      /* one row piece a worker */
     uint64_t *integers;                 /* the same, quantised */
@@ -2275,27 +2284,15 @@ static int sat__is_fixed(sat_kind kind) { return kind == SAT_KIND_FIXED32 || kin
 
 static size_t sat__kind_size(sat_kind kind) { return kind == SAT_KIND_DOUBLE || kind == SAT_KIND_FIXED64 ? 8 : 4; }
 
-static int sat__tile_of(const sat_table *t, int corner) { return (corner - (corner > 0)) >> t->shift; }
-
 /* Corner (0, y) of a channel, where y counts stored rows. */
 static unsigned char *sat__row(const sat_table *t, int channel, int y)
 {
     return t->sums + ((size_t)channel * t->plane + (size_t)y * t->stride) * t->element;
 }
 
-static double *sat__left(const sat_table *t, int channel, int y)
-{
-    return t->left + (size_t)channel * t->left_plane + (size_t)y * (size_t)t->tiles_x;
-}
-
-static double *sat__above(const sat_table *t, int channel, int tile_row)
-{
-    return t->above + (size_t)channel * t->above_plane + (size_t)tile_row * t->above_stride;
-}
-
 static const sat__field sat__table_fields[] = {
     SAT__FIELD(sat_options, 'i', kind, 0, 0, SAT_KIND_FIXED64, ' '),
-    SAT__FIELD(sat_options, 'i', tile, 32, 8, 128, '2'),
+    SAT__FIELD(sat_options, 'i', tile, 64, 8, 128, '2'),
     SAT__FIELD(sat_options, 'i', subtract_mean, 0, 0, 1, ' '),
     SAT__FIELD(sat_options, 'd', quantum, 0, 0, 1e300, ' '),
     SAT__FIELD(sat_options, 'd', max_value, 0, 0, 1e300, ' '),
@@ -2361,13 +2358,88 @@ SAT_DEF char *sat_explain_image(char *text, size_t size, const sat_image *image)
     return text;
 }
 
+/* ---- tables: tiles of integers
+
+   A tile sums its pixels in integers modulo 2^32, rounded to a quantum of its own: the power of two for which the sum of the
+   magnitudes just fits, so that any box inside the tile is right to quantum / 2 a pixel, whatever lies elsewhere and in
+   whatever order the sums were made. What would coarsen the quantum is kept apart:
+
+     spikes    up to 8 pixels that hold most of the tile's sum, added to the boxes that contain them
+     giants    infinity and pixels beyond 1e20, in a list a tile row; one that finds it full is clamped to the largest of its
+               tile's other pixels, and counted
+     wide      a tile that mixes two ranges for good has 64-bit cells beside it, from a pool of about one a tile column for
+               every super tile row
+
+   Cells are inclusive sums within the tile, so nothing is stored for borders. Boxes of at most 3 x 3 tiles are the sum of
+   their tiles' own differences. Larger ones use sums of whole tiles that restart in every super tile of 1024 pixels:
+
+     left[y][tile]    the tiles of its tile row up to this one, rows up to y
+     above[band][x]   the tile rows up to this one, columns of the tile up to x
+     whole[band][tile] both */
+
+enum { SAT__SPIKES = 8, SAT__SUPER = 1024 };
+
+struct sat__spike {
+    uint16_t x, y; /* within the tile */
+    float value;
+};
+
+struct sat__giant {
+    int x, y; /* of the image; within the tile row */
+    float value;
+};
+
+struct sat__tile {
+    double quantum, wide_quantum;
+    int slot;   /* of the pool, from 1; 0: 32-bit cells only */
+    int spikes, wants; /* wants: wide cells would help */
+};
+
+/* The pool of 64-bit tiles is cut in super tile rows, so that whether a tile gets a slot depends on its own alone. */
+static int sat__supers(const sat_table *t)
+{
+    int super = SAT__SUPER >> t->shift;
+    return (t->tiles_y - 1) / super + 1 + t->ring;
+}
+
+static size_t sat__lay_out_tiled(sat_table *t, unsigned char *base)
+{
+    sat__arena arena;
+    size_t workers = (size_t)sat__worker_count(&t->options.threads), channels = (size_t)t->channels, tiles, cells, slots;
+    size_t area = (size_t)1 << 2 * t->shift, width = (size_t)t->width, bands = (size_t)t->tiles_y * channels;
+    arena.base = base;
+    arena.used = 0;
+    arena.overflow = 0;
+    t->stride = width < 64 ? width : (width + 15) / 16 * 16; /* aligned rows are stored past the cache */
+    t->left_plane = (size_t)t->rows * (size_t)t->tiles_x;
+    t->wide_quota = t->tiles_x + 2;
+    t->wide_stride = (size_t)sat__min_int(t->width, t->options.tile);
+    t->giant_room = sat__clamp_int(t->width, 8, 64);
+    if (!sat__multiply_size(&t->plane, t->stride, (size_t)t->rows) || !sat__multiply_size(&cells, t->plane, channels)) return 0;
+    if (!sat__multiply_size(&tiles, bands, (size_t)t->tiles_x)) return 0;
+    slots = (size_t)sat__min_int(t->wide_quota, 0x7fffffff / sat__supers(t) / 4) * (size_t)sat__supers(t) * channels;
+    t->sums = (unsigned char *)sat__carve(&arena, cells, sizeof(uint32_t));
+    t->left = (double *)sat__carve(&arena, t->left_plane * channels, sizeof(double));
+    t->above = (double *)sat__carve(&arena, bands * width, sizeof(double));
+    t->whole = (double *)sat__carve(&arena, tiles, sizeof(double));
+    t->tiles = (sat__tile *)sat__carve(&arena, tiles, sizeof(sat__tile));
+    t->spikes = (sat__spike *)sat__carve(&arena, tiles * SAT__SPIKES, sizeof(sat__spike));
+    t->giants = (sat__giant *)sat__carve(&arena, bands * (size_t)t->giant_room, sizeof(sat__giant));
+    t->wide = (uint64_t *)sat__carve(&arena, slots, (t->wide_stride << t->shift) * sizeof(uint64_t));
+    t->pixels = (float *)sat__carve(&arena, workers * area, sizeof(float));
+    t->tile_integers = (uint32_t *)sat__carve(&arena, workers * 2 * SAT__MAX_TILE_SIDE, sizeof(uint32_t));
+    t->ring_pixels = t->ring ? (float *)sat__carve(&arena, width * channels << t->shift, sizeof(float)) : NULL;
+    t->tallies = (sat__tally *)sat__carve(&arena, bands, sizeof(sat__tally));
+    return arena.overflow ? 0 : arena.used;
+}
+
 /* All memory of a table, in one block: with base NULL this measures it. */
 static size_t sat__lay_out(sat_table *t, unsigned char *base)
 {
     sat__arena arena;
     size_t line = SAT__LINE / t->element, workers = (size_t)sat__worker_count(&t->options.threads);
     size_t corners = (size_t)t->width + 1, channels = (size_t)t->channels, planes;
-    int tiled = t->options.kind == SAT_KIND_TILED;
+    if (t->options.kind == SAT_KIND_TILED) return sat__lay_out_tiled(t, base);
     arena.base = base;
     arena.used = 0;
     arena.overflow = 0;
@@ -2377,13 +2449,8 @@ static size_t sat__lay_out(sat_table *t, unsigned char *base)
     if (!sat__multiply_size(&planes, t->plane, channels) || t->plane / t->stride != (size_t)t->rows) return 0;
     t->sums = (unsigned char *)sat__carve(&arena, planes, t->element);
     if (t->sums) t->sums += (line - 1) * t->element;
-    t->left_plane = (size_t)t->rows * (size_t)t->tiles_x;
-    t->above_stride = corners;
-    t->above_plane = corners * (size_t)t->tiles_y;
-    t->left = tiled ? (double *)sat__carve(&arena, t->left_plane * channels, sizeof(double)) : NULL;
-    t->above = tiled ? (double *)sat__carve(&arena, t->above_plane * channels, sizeof(double)) : NULL;
     t->columns_stride = (corners + line) / line * line * t->element;
-    t->columns = (unsigned char *)sat__carve(&arena, tiled && workers > channels ? workers : channels, t->columns_stride);
+    t->columns = (unsigned char *)sat__carve(&arena, channels, t->columns_stride);
     t->pixels = (float *)sat__carve(&arena, workers * SAT__MAX_STRIP, sizeof(float));
     t->integers = sat__is_fixed(t->options.kind) ? (uint64_t *)sat__carve(&arena, workers * SAT__MAX_STRIP, sizeof(uint64_t)) : NULL;
     t->tallies = (sat__tally *)sat__carve(&arena, (size_t)t->bands * channels, sizeof(sat__tally));
@@ -2391,7 +2458,7 @@ static size_t sat__lay_out(sat_table *t, unsigned char *base)
 }
 
 /* rows: corner rows to store, and tile_rows: strips above to store. */
-static sat_result sat__table_create(sat_table **out, int width, int height, int rows, int tile_rows, int channels, const sat_options *options)
+static sat_result sat__table_create(sat_table **out, int width, int height, int rows, int tile_rows, int ring, int channels, const sat_options *options)
 {
     sat_table t, *table;
     unsigned char *base;
@@ -2408,6 +2475,7 @@ static sat_result sat__table_create(sat_table **out, int width, int height, int 
     while (1 << t.shift < t.options.tile) t.shift++;
     t.tiles_x = (width - 1) / t.options.tile + 1;
     t.tiles_y = tile_rows;
+    t.ring = ring;
     t.bands = t.options.kind == SAT_KIND_TILED ? t.tiles_y : (width + SAT__STRIP - 1) / SAT__STRIP;
     t.block_bytes = sat__lay_out(&t, NULL);
     if (!t.block_bytes || t.block_bytes > SIZE_MAX / 2 - sizeof t - SAT__LINE) return SAT_ERR_SIZE;
@@ -2425,11 +2493,13 @@ static sat_result sat__table_create(sat_table **out, int width, int height, int 
 
 SAT_DEF sat_result sat_create(sat_table **out, int width, int height, int channels, const sat_options *options)
 {
-    int tile = options ? options->tile : 32;
+    int tile = options ? options->tile : 64, tiled;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (tile < 1 || height < 1) return SAT_ERR_ARGUMENT;
-    return sat__table_create(out, width, height, height == 0x7fffffff ? height : height + 1, (height - 1) / tile + 1, channels, options);
+    if (height == 0x7fffffff) return SAT_ERR_ARGUMENT;
+    tiled = !options || options->kind == SAT_KIND_TILED;
+    return sat__table_create(out, width, height, tiled ? height : height + 1, (height - 1) / tile + 1, 0, channels, options);
 }
 
 SAT_DEF void sat_destroy(sat_table *table)
@@ -2817,101 +2887,576 @@ typedef struct sat__build {
     const sat_image *image;
     int care;
     int stream;                                        /* stores that bypass the cache: the table is larger than it */
-    int first_band, bands;                             /* tiled: tile rows to rebuild */
+    int first_band, bands, first_super, supers;        /* tiled: tile rows to rebuild */
     int channel, block_rows, diagonal, first_strip;    /* flat: a wavefront of blocks */
 } sat__build;
 
-/* One row of a tiled table: local sums into `row`, sums of the tiles to the left into `left`. */
-static void sat__tiled_row(const sat_table *t, const sat_image *image, int channel, int y, float *row, double *left,
-                           float *column, int worker, int care, sat__tally *tally, int stream)
+/* The slot of a tile row in a table that may be a ring of them. */
+static inline int sat__band_slot(const sat_table *t, int band) { return band < t->tiles_y ? band : band % t->tiles_y; }
+
+static inline size_t sat__tile_index(const sat_table *t, int channel, int band, int tile)
 {
-    int x0, x, tile = t->options.tile;
-    int32_t signs = 0;
-    double run = 0;
-    for (x0 = 0; x0 < t->width; x0 += SAT__MAX_STRIP) {
-        int n = sat__min_int(t->width - x0, SAT__MAX_STRIP);
-        const float *in = sat__prepare(t, image, y, x0, n, channel, worker, care, tally);
-        for (x = 0; x < n; x += tile) {
-            left[(x0 + x) >> t->shift] = run;
-            run += (double)sat__sum_row_f32(row + 1 + x0 + x, column + x0 + x, in + x, sat__min_int(n - x, tile), 0, stream, &signs);
-        }
-    }
-    tally->negative |= signs < 0;
-    tally->overflow |= !sat__is_finite_double(run);
+    return ((size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band)) * (size_t)t->tiles_x + (size_t)tile;
 }
 
-/* The largest tile sum of a tile row and the sum of their squares; magnitudes where pixels are negative. */
-static void sat__tally_band(const sat__build *b, int channel, int y0, int y1, int worker, sat__tally *tally)
+/* Row `y` of a tile row. */
+static inline uint32_t *sat__cells(const sat_table *t, int channel, int band, int y)
 {
-    const sat_table *t = b->table;
-    const float *last = (const float *)(const void *)sat__row(t, channel, y1);
-    sat__tally ignored;
-    int x, y;
-    for (x = 0; x < t->tiles_x; x++) {
-        double corner = fabs((double)last[sat__min_int((x + 1) << t->shift, t->width)]);
-        if (corner > tally->tile_largest) tally->tile_largest = corner;
-        tally->tile_squares += corner * corner;
-        if (!tally->negative) tally->sum_abs += corner;
-    }
-    if (!tally->negative) return;
-    for (y = y0; y < y1; y++)
-        for (x = 0; x < t->width; x += SAT__MAX_STRIP) {
-            int n = sat__min_int(t->width - x, SAT__MAX_STRIP);
-            sat__measure(sat__prepare(t, b->image, y, x, n, channel, worker, SAT__CLAMP_ALL, &ignored), n, tally);
-        }
+    return (uint32_t *)(void *)t->sums + (size_t)channel * t->plane + (((size_t)sat__band_slot(t, band) << t->shift) + (size_t)y) * t->stride;
 }
 
-/* Tile rows are independent but for the strips above, which are summed afterwards. A row of tiles whose sums are not
-   finite is built again: first without NaN and infinity, then, if need be, with all values clamped. */
-static void sat__build_bands(int begin, int end, int worker, void *context)
+static inline double *sat__left(const sat_table *t, int channel, int band, int y)
+{
+    return t->left + (size_t)channel * t->left_plane + (((size_t)sat__band_slot(t, band) << t->shift) + (size_t)y) * (size_t)t->tiles_x;
+}
+
+static inline double *sat__above(const sat_table *t, int channel, int band)
+{
+    return t->above + ((size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band)) * (size_t)t->width;
+}
+
+static inline uint64_t *sat__wide_cells(const sat_table *t, int slot) { return t->wide + ((((size_t)slot - 1) * t->wide_stride) << t->shift); }
+
+static double sat__spike_sum(const sat_table *t, size_t index, int x0, int y0, int x1, int y1)
+{
+    const sat__spike *s = t->spikes + index * SAT__SPIKES;
+    double sum = 0;
+    int i;
+    for (i = 0; i < t->tiles[index].spikes; i++)
+        if (s[i].x >= x0 && s[i].x < x1 && s[i].y >= y0 && s[i].y < y1) sum += (double)s[i].value;
+    return sum;
+}
+
+static double sat__wide_part(const sat_table *t, const sat__tile *tile, int x0, int y0, int x1, int y1)
+{
+    const uint64_t *high = sat__wide_cells(t, tile->slot) + (size_t)(y1 - 1) * t->wide_stride, *low = y0 ? high - (size_t)(y1 - y0) * t->wide_stride : NULL;
+    uint64_t d = high[x1 - 1];
+    if (x0) d -= high[x0 - 1];
+    if (low) d -= low[x1 - 1];
+    if (low && x0) d += low[x0 - 1];
+    return (double)(int64_t)d * tile->wide_quantum;
+}
+
+/* The part of a box inside one tile, in the tile's own coordinates. */
+static inline double sat__tile_part(const sat_table *t, int channel, int band, int tx, int x0, int y0, int x1, int y1)
+{
+    size_t index = sat__tile_index(t, channel, band, tx);
+    const sat__tile *tile = &t->tiles[index];
+    double sum;
+    if (tile->slot) sum = sat__wide_part(t, tile, x0, y0, x1, y1);
+    else {
+        const uint32_t *high = sat__cells(t, channel, band, y1 - 1) + ((size_t)tx << t->shift);
+        uint32_t d = high[x1 - 1];
+        if (x0) d -= high[x0 - 1];
+        if (y0) {
+            const uint32_t *low = high - (size_t)(y1 - y0) * t->stride;
+            d -= low[x1 - 1];
+            if (x0) d += low[x0 - 1];
+        }
+        sum = (double)(int32_t)d * tile->quantum;
+    }
+    return tile->spikes ? sum + sat__spike_sum(t, index, x0, y0, x1, y1) : sum;
+}
+
+/* An interval of pixels as tiles: those that are looked up in themselves, and a run of whole ones for the strips. */
+typedef struct sat__span {
+    int count, run0, run1;
+    int tile[3], begin[3], end[3];
+} sat__span;
+
+static inline void sat__span_of(sat__span *s, int a, int b, int shift)
+{
+    int first = a >> shift, last = (b - 1) >> shift, side = 1 << shift, i;
+    s->run0 = s->run1 = 0;
+    s->count = last - first + 1;
+    if (s->count > 3) {
+        s->count = 2;
+        s->run0 = first + 1;
+        s->run1 = last;
+    }
+    for (i = 0; i < s->count; i++) {
+        s->tile[i] = i + 1 == s->count ? last : first + i;
+        s->begin[i] = 0;
+        s->end[i] = side;
+    }
+    s->begin[0] = a - (first << shift);
+    s->end[s->count - 1] = b - (last << shift);
+}
+
+/* Sums over tiles [t0, t1) from inclusive sums that restart at every multiple of `super`; step: between tiles. */
+static double sat__run(const double *p, size_t step, int t0, int t1, int super)
+{
+    double sum = 0;
+    while (t0 < t1) {
+        int stop = sat__min_int(t1, (t0 | (super - 1)) + 1);
+        double s = p[(size_t)(stop - 1) * step];
+        if (t0 & (super - 1)) s -= p[(size_t)(t0 - 1) * step];
+        sum += s;
+        t0 = stop;
+    }
+    return sum;
+}
+
+/* The same down the tile rows of a table that may be a ring: columns [x0, x1) of a tile. */
+static double sat__run_above(const sat_table *t, int channel, const sat__span *y, int x, int x0, int x1)
+{
+    int super = SAT__SUPER >> t->shift, b = y->run0;
+    double sum = 0;
+    while (b < y->run1) {
+        int stop = sat__min_int(y->run1, (b | (super - 1)) + 1);
+        const double *high = sat__above(t, channel, stop - 1) + x, *low = b & (super - 1) ? sat__above(t, channel, b - 1) + x : NULL;
+        double s = x0 ? high[x1 - 1] - high[x0 - 1] : high[x1 - 1];
+        if (low) s -= x0 ? low[x1 - 1] - low[x0 - 1] : low[x1 - 1];
+        sum += s;
+        b = stop;
+    }
+    return sum;
+}
+
+static double sat__run_whole(const sat_table *t, int channel, const sat__span *x, const sat__span *y)
+{
+    int super = SAT__SUPER >> t->shift, b = y->run0;
+    double sum = 0;
+    while (b < y->run1) {
+        int stop = sat__min_int(y->run1, (b | (super - 1)) + 1);
+        double s = sat__run(t->whole + sat__tile_index(t, channel, stop - 1, 0), 1, x->run0, x->run1, super);
+        if (b & (super - 1)) s -= sat__run(t->whole + sat__tile_index(t, channel, b - 1, 0), 1, x->run0, x->run1, super);
+        sum += s;
+        b = stop;
+    }
+    return sum;
+}
+
+/* What the strips add to a box of more than three tiles along an axis. */
+static double sat__run_sum(const sat_table *t, int channel, const sat__span *x, const sat__span *y)
+{
+    int i, super = SAT__SUPER >> t->shift;
+    double sum = 0;
+    if (x->run1 > x->run0)
+        for (i = 0; i < y->count; i++) {
+            sum += sat__run(sat__left(t, channel, y->tile[i], y->end[i] - 1), 1, x->run0, x->run1, super);
+            if (y->begin[i]) sum -= sat__run(sat__left(t, channel, y->tile[i], y->begin[i] - 1), 1, x->run0, x->run1, super);
+        }
+    if (y->run1 > y->run0)
+        for (i = 0; i < x->count; i++) sum += sat__run_above(t, channel, y, x->tile[i] << t->shift, x->begin[i], x->end[i]);
+    if (x->run1 > x->run0 && y->run1 > y->run0) sum += sat__run_whole(t, channel, x, y);
+    return sum;
+}
+
+static double sat__giant_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+{
+    double sum = 0;
+    int band, i;
+    for (band = y0 >> t->shift; band <= (y1 - 1) >> t->shift; band++) {
+        size_t at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
+        const sat__giant *g = t->giants + at * (size_t)t->giant_room;
+        int top = band << t->shift;
+        for (i = 0; i < t->tallies[at].giants; i++)
+            if (g[i].x >= x0 && g[i].x < x1 && top + g[i].y >= y0 && top + g[i].y < y1) sum += (double)g[i].value;
+    }
+    return sum;
+}
+
+/* The sum over a box that is not empty and inside the table. */
+static double sat__tiled_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+{
+    sat__span x, y;
+    double sum = 0;
+    int i, j;
+    if ((x0 ^ (x1 - 1)) >> t->shift == 0 && (y0 ^ (y1 - 1)) >> t->shift == 0) { /* most boxes: one tile */
+        int mask = (1 << t->shift) - 1, left = x0 & ~mask, top = y0 & ~mask;
+        sum = sat__tile_part(t, channel, y0 >> t->shift, x0 >> t->shift, x0 - left, y0 - top, x1 - left, y1 - top);
+    } else {
+        sat__span_of(&x, x0, x1, t->shift);
+        sat__span_of(&y, y0, y1, t->shift);
+        for (j = 0; j < y.count; j++)
+            for (i = 0; i < x.count; i++)
+                sum += sat__tile_part(t, channel, y.tile[j], x.tile[i], x.begin[i], y.begin[j], x.end[i], y.end[j]);
+        if (x.run1 > x.run0 || y.run1 > y.run0) sum += sat__run_sum(t, channel, &x, &y);
+    }
+    return t->has_giants ? sum + sat__giant_sum(t, channel, x0, y0, x1, y1) : sum;
+}
+
+/* ---- tables: building tiles */
+
+/* Sum (four lanes, then lane 0 + 1 + 2 + 3) and largest of |pixel| of a tile in scratch memory, whose rows are padded with
+   zeros to a multiple of four. */
+typedef struct sat__extent {
+    float sum, largest;
+} sat__extent;
+
+static sat__extent sat__extent_of(const float *p, int n)
+{
+    sat__extent e;
+    float lane[4] = {0, 0, 0, 0}, top[4] = {0, 0, 0, 0};
+    int i = 0, j;
+#ifdef SAT__VECTOR
+    sat__f32x4 sum = sat__f32x4_set1(0), largest = sum;
+    for (; i < n; i += 4) {
+        sat__f32x4 v = sat__f32x4_abs(sat__f32x4_load(p + i));
+        sum = sat__f32x4_add(sum, v);
+        largest = sat__f32x4_max(largest, v);
+    }
+    sat__f32x4_store(lane, sum);
+    sat__f32x4_store(top, largest);
+#endif
+    for (; i < n; i += 4)
+        for (j = 0; j < 4; j++) {
+            float v = fabsf(p[i + j]);
+            lane[j] += v;
+            if (v > top[j]) top[j] = v;
+        }
+    e.sum = lane[0] + lane[1] + lane[2] + lane[3];
+    e.largest = top[0];
+    for (j = 1; j < 4; j++)
+        if (top[j] > e.largest) e.largest = top[j];
+    return e;
+}
+
+/* How many of n pixels, at most `most` + 1, have a magnitude above `threshold`; `at` takes the places of the first. */
+static int sat__find_above(const float *p, int n, float threshold, int *at, int most)
+{
+    int i, j, count = 0;
+    for (i = 0; i < n && count <= most; i += 4) {
+#ifdef SAT__VECTOR
+        if (!sat__i32x4_any(sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_abs(sat__f32x4_load(p + i))))) continue;
+#endif
+        for (j = 0; j < 4; j++)
+            if (fabsf(p[i + j]) > threshold && count++ < most) at[count - 1] = i + j;
+    }
+    return count;
+}
+
+/* Pixels below `threshold` that are not 0; stops at `most`. */
+static int sat__count_below(const float *p, int n, float threshold, int most)
+{
+    int i, j, count = 0;
+    for (i = 0; i < n && count < most; i += 4) {
+#ifdef SAT__VECTOR
+        if (!sat__i32x4_any(sat__f32x4_less(sat__f32x4_abs(sat__f32x4_load(p + i)), sat__f32x4_set1(threshold)))) continue;
+#endif
+        for (j = 0; j < 4; j++) {
+            float v = fabsf(p[i + j]);
+            count += v > 0 && v < threshold;
+        }
+    }
+    return count;
+}
+
+/* The smallest power of two that leaves `bits` bits for the sum of magnitudes; the margin takes all roundings up. */
+static double sat__tile_quantum(double sum, int bits)
+{
+    int exponent;
+    if (!(sum > 0)) return 0;
+    frexp(sum * 1.0001, &exponent);
+    exponent -= bits;
+    return ldexp(1.0, exponent < -149 ? -149 : exponent);
+}
+
+/* Takes spikes out of a tile while that lowers its sum to a quarter. */
+static sat__extent sat__take_spikes(const sat_table *t, size_t index, float *p, int n, sat__extent e)
+{
+    sat__spike *s = t->spikes + index * SAT__SPIKES;
+    sat__tile *tile = &t->tiles[index];
+    int at[SAT__SPIKES], i, found, side = t->options.tile;
+    tile->spikes = 0;
+    while (e.largest > e.sum / 16 && tile->spikes < SAT__SPIKES) {
+        int room = SAT__SPIKES - tile->spikes;
+        sat__extent rest;
+        found = sat__find_above(p, n, e.sum / 16, at, room);
+        if (found > room) break;
+        for (i = 0; i < found; i++) {
+            sat__spike *spike = &s[tile->spikes + i];
+            spike->x = (uint16_t)(at[i] % side);
+            spike->y = (uint16_t)(at[i] / side);
+            spike->value = p[at[i]];
+            p[at[i]] = 0;
+        }
+        rest = sat__extent_of(p, n);
+        if (rest.sum > e.sum / 4) {
+            for (i = 0; i < found; i++) p[at[i]] = s[tile->spikes + i].value;
+            break;
+        }
+        tile->spikes += found;
+        e = rest;
+    }
+    return e;
+}
+
+/* NaN becomes 0, and what lies beyond max_value is clamped to it; giants leave for their list. */
+static void sat__take_giants(const sat_table *t, float *p, int n, int left, sat__giant *list, sat__tally *tally)
+{
+    const float giant = 1e20f, limit = (float)t->limit;
+    float largest = 0, full;
+    int i, side = t->options.tile, ordinary = 0;
+    for (i = 0; i < n; i++) {
+        if (sat__is_nan(p[i])) {
+            tally->nan++;
+            p[i] = 0;
+        } else if (!sat__is_finite(p[i])) {
+            tally->infinite++;
+            p[i] = p[i] > 0 ? limit : -limit;
+        } else if (fabsf(p[i]) > limit) {
+            tally->clamped++;
+            p[i] = p[i] > 0 ? limit : -limit;
+        }
+        if (fabsf(p[i]) <= giant && p[i] != 0) {
+            ordinary = 1;
+            if (fabsf(p[i]) > largest) largest = fabsf(p[i]);
+        }
+    }
+    full = ordinary ? largest : giant;
+    for (i = 0; i < n; i++) {
+        if (!(fabsf(p[i]) > giant)) continue;
+        if (tally->giants < t->giant_room) {
+            sat__giant *g = &list[tally->giants++];
+            g->x = left + i % side;
+            g->y = i / side;
+            g->value = p[i];
+            p[i] = 0;
+        } else {
+            tally->clamped++;
+            p[i] = p[i] > 0 ? full : -full;
+        }
+    }
+}
+
+/* A tile's pixels in scratch memory, zeros beyond the image's right and lower edge. */
+static int sat__gather(const sat_table *t, const sat_image *image, int channel, int y0, int x0, float *p)
+{
+    int side = t->options.tile, w = sat__min_int(side, t->width - x0), h = sat__min_int(side, image->height - y0), y;
+    for (y = 0; y < h; y++) {
+        float *row = p + (y << t->shift);
+        if (image->format == SAT_F32 && image->channels == 1)
+            memcpy(row, (const float *)sat__image_row(image, y0 + y) + x0, (size_t)w * sizeof(float));
+        else sat__read_row(row, image, y0 + y, x0, x0 + w, channel);
+        if (w < side) memset(row + w, 0, (size_t)(side - w) * sizeof(float));
+    }
+    return h << t->shift;
+}
+
+/* out = p / quantum, rounded to nearest even. */
+static void sat__tile_integers(uint32_t *out, const float *p, int n, double quantum)
+{
+    const double magic = 6755399441055744.0;
+    double inverse = quantum > 0 ? 1 / quantum : 0;
+    int i = 0;
+#ifdef SAT__SSE2
+    if (inverse < 1e38) {
+        __m128 scale = _mm_set1_ps((float)inverse);
+        for (; i + 4 <= n; i += 4)
+            _mm_storeu_si128((__m128i *)(void *)(out + i), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(p + i), scale)));
+    }
+#endif
+    for (; i < n; i++) {
+        double shifted = (double)p[i] * inverse + magic;
+        uint64_t bits;
+        memcpy(&bits, &shifted, sizeof bits);
+        out[i] = (uint32_t)bits;
+    }
+}
+
+/* Takes a tile apart: scratch memory then holds what its cells sum. */
+static void sat__settle_tile(const sat_table *t, float *p, int n, size_t index, int left, sat__giant *list, sat__tally *tally)
+{
+    sat__tile *tile = &t->tiles[index];
+    float giant = t->limit < 1e20 ? (float)t->limit : 1e20f;
+    sat__extent e;
+    int i, first = tally->giants;
+    if (!sat__is_tame(p, n, giant)) sat__take_giants(t, p, n, left, list, tally);
+    e = sat__extent_of(p, n);
+    tile->spikes = 0;
+    tile->slot = 0;
+    if (e.largest > e.sum / 16) e = sat__take_spikes(t, index, p, n, e);
+    tile->quantum = sat__tile_quantum((double)e.sum, 31);
+    tile->wide_quantum = sat__tile_quantum((double)e.sum, 62);
+    tile->wants = e.sum > 0 && sat__count_below(p, n, e.sum / ((float)n * 1024), 8) >= 8;
+    tally->sum_abs += (double)e.sum;
+    for (i = 0; i < tile->spikes; i++) tally->sum_abs += fabs((double)t->spikes[index * SAT__SPIKES + (size_t)i].value);
+    for (i = first; i < tally->giants; i++) tally->sum_abs += fabs((double)list[i].value);
+}
+
+/* Tile row `band` (row y0 of the image on): 32-bit cells, and in `left` what each tile alone adds. */
+static void sat__settle_band(const sat_table *t, const sat_image *image, int channel, int band, int y0, int worker, int stream)
+{
+    float *p = t->pixels + ((size_t)worker << 2 * t->shift);
+    uint32_t *integers = t->tile_integers + (size_t)worker * 2 * SAT__MAX_TILE_SIDE, *column = integers + SAT__MAX_TILE_SIDE;
+    size_t at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
+    sat__tally *tally = &t->tallies[at];
+    int tx, y, side = t->options.tile, rows = sat__min_int(side, image->height - y0);
+    memset(tally, 0, sizeof *tally);
+    for (tx = 0; tx < t->tiles_x; tx++) {
+        size_t index = sat__tile_index(t, channel, band, tx);
+        int x0 = tx << t->shift, w = sat__min_int(side, t->width - x0), n = sat__gather(t, image, channel, y0, x0, p);
+        const sat__tile *tile = &t->tiles[index];
+        sat__settle_tile(t, p, n, index, x0, t->giants + at * (size_t)t->giant_room, tally);
+        memset(column, 0, (size_t)side * sizeof *column);
+        for (y = 0; y < rows; y++) {
+            int32_t signs = 0;
+            uint32_t sum;
+            sat__tile_integers(integers, p + (y << t->shift), side, tile->quantum);
+            sum = sat__sum_row_u32(sat__cells(t, channel, band, y) + x0, column, integers, w, 0, stream, &signs);
+            sat__left(t, channel, band, y)[tx] = (double)(int32_t)sum * tile->quantum + (tile->spikes ? sat__spike_sum(t, index, 0, 0, side, y + 1) : 0);
+        }
+    }
+    tally->negative = 1;
+}
+
+/* Pool slots go to the tiles that want one, in the order of the tile rows: *used counts within a super tile row. */
+static void sat__assign_wide(const sat_table *t, int channel, int band, int tx, int *used)
+{
+    int super = SAT__SUPER >> t->shift, supers = sat__supers(t);
+    sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
+    tile->slot = 0;
+    if (tile->wants && *used < t->wide_quota) tile->slot = (channel * supers + band / super % supers) * t->wide_quota + ++*used;
+}
+
+/* 64-bit cells of one tile, from pixels that are taken apart once more. */
+static void sat__wide_tile(const sat_table *t, const sat_image *image, int channel, int band, int tx, int y0, int worker)
+{
+    float *p = t->pixels + ((size_t)worker << 2 * t->shift);
+    size_t index = sat__tile_index(t, channel, band, tx), at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
+    sat__tile *tile = &t->tiles[index];
+    uint64_t *cells = sat__wide_cells(t, tile->slot);
+    double inverse = 1 / tile->wide_quantum;
+    int side = t->options.tile, n = sat__gather(t, image, channel, y0, tx << t->shift, p), x, y, i;
+    if (!sat__is_tame(p, n, t->limit < 1e20 ? (float)t->limit : 1e20f)) { /* the giants of this tile stand in the list; others were clamped */
+        sat__tally again = t->tallies[at];
+        const sat__giant *list = t->giants + at * (size_t)t->giant_room;
+        int first = 0;
+        while (first < again.giants && list[first].x >> t->shift != tx) first++;
+        again.giants = first;
+        sat__take_giants(t, p, n, tx << t->shift, t->giants + at * (size_t)t->giant_room, &again);
+    }
+    for (i = 0; i < tile->spikes; i++) p[(t->spikes[index * SAT__SPIKES + (size_t)i].y << t->shift) + t->spikes[index * SAT__SPIKES + (size_t)i].x] = 0;
+    for (y = 0; y < n >> t->shift; y++) {
+        uint64_t run = 0, *out = cells + (size_t)y * t->wide_stride;
+        for (x = 0; x < (int)t->wide_stride; x++) {
+            run += (uint64_t)llrint((double)p[(y << t->shift) + x] * inverse);
+            out[x] = y ? out[x - (int)t->wide_stride] + run : run;
+        }
+        sat__left(t, channel, band, y)[tx] = sat__tile_part(t, channel, band, tx, 0, 0, sat__min_int(side, t->width - (tx << t->shift)), y + 1);
+    }
+}
+
+/* Wide cells where there are to be any; then `left` becomes sums along the tile row. */
+static void sat__finish_band(const sat_table *t, const sat_image *image, int channel, int band, int y0, int worker)
+{
+    sat__tally *tally = &t->tallies[(size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band)];
+    int tx, y, rows = sat__min_int(t->options.tile, image->height - y0), super = SAT__SUPER >> t->shift;
+    tally->tile_largest = tally->tile_squares = 0;
+    for (tx = 0; tx < t->tiles_x; tx++) {
+        const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
+        double quantum = tile->slot ? tile->wide_quantum : tile->quantum;
+        if (tile->slot) sat__wide_tile(t, image, channel, band, tx, y0, worker);
+        if (quantum > tally->tile_largest) tally->tile_largest = quantum;
+        tally->tile_squares += quantum * quantum;
+    }
+    for (y = 0; y < rows; y++) {
+        double *left = sat__left(t, channel, band, y), run = 0;
+        for (tx = 0; tx < t->tiles_x; tx++) {
+            run = tx & (super - 1) ? run + left[tx] : left[tx];
+            left[tx] = run;
+        }
+    }
+}
+
+/* The strips above: this tile row onto the one before. */
+static void sat__build_above(const sat_table *t, int channel, int band, int rows)
+{
+    int tx, x, super = SAT__SUPER >> t->shift, first = (band & (super - 1)) == 0;
+    double *above = sat__above(t, channel, band), *whole = t->whole + sat__tile_index(t, channel, band, 0), run = 0;
+    const double *up = first ? NULL : sat__above(t, channel, band - 1), *whole_up = first ? NULL : t->whole + sat__tile_index(t, channel, band - 1, 0);
+    for (tx = 0; tx < t->tiles_x; tx++) {
+        const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
+        int x0 = tx << t->shift, w = sat__min_int(t->options.tile, t->width - x0);
+        double last;
+        if (tile->slot || tile->spikes)
+            for (x = 0; x < w; x++) above[x0 + x] = sat__tile_part(t, channel, band, tx, 0, 0, x + 1, rows);
+        else {
+            const int32_t *cells = (const int32_t *)(const void *)(sat__cells(t, channel, band, rows - 1) + x0);
+            for (x = 0; x < w; x++) above[x0 + x] = (double)cells[x] * tile->quantum;
+        }
+        last = above[x0 + w - 1];
+        run = tx & (super - 1) ? run + last : last;
+        whole[tx] = whole_up ? whole_up[tx] + run : run;
+        for (x = x0; up && x < x0 + w; x++) above[x] += up[x];
+    }
+}
+
+static void sat__settle_bands(int begin, int end, int worker, void *context)
 {
     const sat__build *b = (const sat__build *)context;
-    const sat_table *t = b->table;
-    float *column = (float *)(void *)(t->columns + (size_t)worker * t->columns_stride);
-    int job, y, care;
-    SAT_ASSERT(t->tallies);
+    int job;
     for (job = begin; job < end; job++) {
-        int channel = job / b->bands, band = b->first_band + job % b->bands;
-        int y0 = band << t->shift, y1 = sat__min_int(t->height - y0, t->options.tile) + y0;
-        sat__tally *tally = t->tallies + channel * t->bands + band;
-        for (care = b->care; care <= SAT__CLAMP_ALL; care++) {
-            memset(tally, 0, sizeof *tally);
-            memset(column, 0, t->columns_stride);
-            for (y = y0; y < y1; y++)
-                sat__tiled_row(t, b->image, channel, y, (float *)(void *)sat__row(t, channel, y + 1), sat__left(t, channel, y + 1),
-                               column, worker, care, tally, b->stream && y + 1 < y1);
-            if (!tally->overflow) break;
-        }
-        sat__tally_band(b, channel, y0, y1, worker, tally);
+        int band = b->first_band + job % b->bands;
+        sat__settle_band(b->table, b->image, job / b->bands, band, band << b->table->shift, worker, b->stream);
     }
 }
 
-/* next[X] = above[X] + the sum of this tile row left of X, for corners [x0, x1) of the tile row's last corner row. */
-static void sat__add_above(const sat_table *t, double *next, const double *above, const float *local, const double *left, int x0, int x1)
+static void sat__finish_bands(int begin, int end, int worker, void *context)
 {
-    int x = x0;
-    while (x < x1) {
-        int tile = sat__tile_of(t, x), stop = sat__min_int(x1, ((tile + 1) << t->shift) + 1);
-        for (; x < stop; x++) next[x] = (left[tile] + (double)local[x]) + above[x];
+    const sat__build *b = (const sat__build *)context;
+    int job;
+    for (job = begin; job < end; job++) {
+        int band = b->first_band + job % b->bands;
+        sat__finish_band(b->table, b->image, job / b->bands, band, band << b->table->shift, worker);
     }
 }
 
-enum { SAT__ABOVE_PIECE = 1024 };
-
-static void sat__build_above(int begin, int end, int worker, void *context)
+static void sat__stack_supers(int begin, int end, int worker, void *context)
 {
     const sat__build *b = (const sat__build *)context;
     const sat_table *t = b->table;
-    int job, band, pieces = t->width / SAT__ABOVE_PIECE + 1;
+    int job, band, super = SAT__SUPER >> t->shift;
     (void)worker;
     for (job = begin; job < end; job++) {
-        int channel = job / pieces, x0 = job % pieces * SAT__ABOVE_PIECE, x1 = sat__min_int(t->width - x0, SAT__ABOVE_PIECE - 1) + x0 + 1;
-        for (band = b->first_band; band + 1 < t->tiles_y; band++) {
-            int y = (band + 1) << t->shift;
-            sat__add_above(t, sat__above(t, channel, band + 1), sat__above(t, channel, band),
-                           (const float *)(const void *)sat__row(t, channel, y), sat__left(t, channel, y), x0, x1);
-        }
+        int first = (b->first_super + job % b->supers) * super, stop = sat__min_int(first + super, t->tiles_y);
+        for (band = sat__max_int(first, b->first_band); band < stop; band++)
+            sat__build_above(t, job / b->supers, band, sat__min_int(t->options.tile, t->height - (band << t->shift)));
     }
+}
+
+/* Pool slots of the super tile rows that hold the rebuilt tile rows; 1 when one outside those changed. */
+static int sat__assign_supers(const sat__build *b)
+{
+    const sat_table *t = b->table;
+    int channel, band, tx, used = 0, moved = 0, super = SAT__SUPER >> t->shift, last = b->first_band + b->bands;
+    int first = b->first_band & ~(super - 1), stop = sat__min_int(((last - 1) | (super - 1)) + 1, t->tiles_y);
+    for (channel = 0; channel < t->channels; channel++)
+        for (band = first; band < stop; band++) {
+            if ((band & (super - 1)) == 0) used = 0;
+            for (tx = 0; tx < t->tiles_x; tx++) {
+                const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
+                int before = tile->slot;
+                sat__assign_wide(t, channel, band, tx, &used);
+                moved |= tile->slot != before && (band < b->first_band || band >= last);
+            }
+        }
+    return moved;
+}
+
+/* Tile rows anew, then the strips below them to the end of their super tile row. Where a 64-bit tile elsewhere has to move,
+   whole super tile rows are built. */
+static void sat__build_tiled(sat__build *b)
+{
+    const sat_table *t = b->table;
+    int super = SAT__SUPER >> t->shift;
+    sat__parallel_for(&t->options.threads, b->bands * t->channels, sat__settle_bands, b);
+    if (sat__assign_supers(b)) {
+        int last = ((b->first_band + b->bands - 1) | (super - 1)) + 1;
+        b->first_band &= ~(super - 1);
+        b->bands = sat__min_int(last, t->tiles_y) - b->first_band;
+        sat__parallel_for(&t->options.threads, b->bands * t->channels, sat__settle_bands, b);
+        sat__assign_supers(b);
+    }
+#ifdef SAT__SSE2
+    _mm_sfence();
+#endif
+    sat__parallel_for(&t->options.threads, b->bands * t->channels, sat__finish_bands, b);
+    b->first_super = b->first_band / super;
+    b->supers = (b->first_band + b->bands - 1) / super + 1 - b->first_super;
+    sat__parallel_for(&t->options.threads, b->supers * t->channels, sat__stack_supers, b);
 }
 
 /* The sum of a row so far, in the table's type. It travels in a variable: reading it back from the table would wait for
@@ -2939,7 +3484,7 @@ static void sat__flat_piece(const sat_table *t, const sat_image *image, int chan
         break;
     case SAT_KIND_FIXED32: carry->u32 = sat__sum_row_u32((uint32_t *)out, (uint32_t *)column, (uint32_t *)(void *)integers, n, carry->u32, stream, &signs); break;
     case SAT_KIND_FIXED64: carry->u64 = sat__sum_row_u64((uint64_t *)out, (uint64_t *)column, integers, n, carry->u64, stream, &signs); break;
-    case SAT_KIND_TILED:
+    case SAT_KIND_TILED: break;
     case SAT_KIND_FLOAT:
         carry->f32 = sat__sum_row_f32((float *)out, (float *)column, in, n, carry->f32, stream, &signs);
         tally->overflow |= !sat__is_finite(carry->f32);
@@ -3047,9 +3592,9 @@ static double sat__fixed_range(const sat_table *t)
 /* Settles the largest value a pixel may have and the quantum. Limits keep every float sum finite. */
 static sat_result sat__resolve(sat_table *t, const sat_image *image)
 {
-    const double float_max = 3.4028234663852886e38, tile = t->options.tile;
+    const double float_max = 3.4028234663852886e38;
     double range, largest;
-    t->limit = t->options.kind == SAT_KIND_TILED ? float_max / (tile * tile) : t->options.kind == SAT_KIND_FLOAT ? float_max / 2147483648.0 : float_max;
+    t->limit = t->options.kind == SAT_KIND_FLOAT ? float_max / 2147483648.0 : float_max;
     if (t->options.subtract_mean) t->limit /= 2;
     if (t->options.max_value > 0 && t->options.max_value < t->limit) t->limit = t->options.max_value;
     if (!sat__is_fixed(t->options.kind)) return SAT_OK;
@@ -3108,6 +3653,7 @@ static int sat__total(sat_table *t)
             total->clamped += tally->clamped;
             total->sum_abs += tally->sum_abs;
             total->negative |= tally->negative;
+            total->giants += tally->giants;
             total->tile_squares += tally->tile_squares;
             overflow |= tally->overflow;
             if (tally->largest > total->largest) total->largest = tally->largest;
@@ -3119,10 +3665,16 @@ static int sat__total(sat_table *t)
 
 static void sat__clear(sat_table *t)
 {
-    size_t border = SAT__LINE / t->element - 1;
-    memset(t->sums, 0, (t->plane * (size_t)t->channels - border) * t->element);
-    if (t->left) memset(t->left, 0, t->left_plane * (size_t)t->channels * sizeof(double));
-    if (t->above) memset(t->above, 0, t->above_plane * (size_t)t->channels * sizeof(double));
+    if (t->options.kind == SAT_KIND_TILED) {
+        size_t bands = (size_t)t->tiles_y * (size_t)t->channels, tiles = bands * (size_t)t->tiles_x;
+        memset(t->sums, 0, t->plane * (size_t)t->channels * t->element);
+        memset(t->left, 0, t->left_plane * (size_t)t->channels * sizeof(double));
+        memset(t->above, 0, bands * (size_t)t->width * sizeof(double));
+        memset(t->whole, 0, tiles * sizeof(double));
+        memset(t->tiles, 0, tiles * sizeof *t->tiles);
+        memset(t->tallies, 0, bands * sizeof *t->tallies);
+        t->has_giants = 0;
+    } else memset(t->sums, 0, (t->plane * (size_t)t->channels - (SAT__LINE / t->element - 1)) * t->element);
     memset(t->mean, 0, sizeof t->mean);
 }
 
@@ -3131,7 +3683,7 @@ static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_b
 {
     sat__build b;
     int channel;
-    SAT_ASSERT(t->sums && t->columns && t->pixels && t->tallies);
+    SAT_ASSERT(t->sums && t->pixels && t->tallies);
     memset(&b, 0, sizeof b);
     b.table = t;
     b.image = image;
@@ -3140,9 +3692,9 @@ static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_b
     b.bands = last_band - first_band;
     b.stream = t->plane * t->element > (size_t)4 << 20;
     if (t->options.kind == SAT_KIND_TILED) {
-        sat__parallel_for(&t->options.threads, b.bands * t->channels, sat__build_bands, &b);
-        sat__parallel_for(&t->options.threads, (t->width / SAT__ABOVE_PIECE + 1) * t->channels, sat__build_above, &b);
+        sat__build_tiled(&b);
         sat__total(t);
+        for (t->has_giants = channel = 0; channel < t->channels; channel++) t->has_giants |= t->total[channel].giants > 0;
     } else {
         for (; b.care <= SAT__CLAMP_ALL; b.care++) {
             sat__build_flat(&b);
@@ -3204,37 +3756,17 @@ SAT_DEF sat_statistics sat_get_statistics(const sat_table *table)
 
 /* ---- tables: lookups */
 
-/* The two corner rows of a box, and the strips that go with them. */
+/* The two corner rows of a box in a flat table. */
 typedef struct sat__rows {
     const void *low, *high; /* at y0 and y1 */
-    const double *left_low, *left_high, *above_low, *above_high; /* above_low == above_high: same tile row */
 } sat__rows;
 
 static sat__rows sat__rows_at(const sat_table *t, int channel, int y0, int y1)
 {
     sat__rows r;
-    memset(&r, 0, sizeof r);
     r.low = sat__row(t, channel, y0);
     r.high = sat__row(t, channel, y1);
-    if (t->options.kind == SAT_KIND_TILED) {
-        r.left_low = sat__left(t, channel, y0);
-        r.left_high = sat__left(t, channel, y1);
-        r.above_low = sat__above(t, channel, sat__tile_of(t, y0));
-        r.above_high = sat__above(t, channel, sat__tile_of(t, y1));
-    }
     return r;
-}
-
-/* The four-corner sum (eq 4.2) of a tiled table. Differences are taken along x first, so that what both corners of a row
-   share cancels exactly; strips that all four corners share are not read at all. */
-static inline double sat__tiled_sum(const sat_table *t, const sat__rows *r, int x0, int x1)
-{
-    const float *low = (const float *)r->low, *high = (const float *)r->high;
-    double sum = ((double)high[x1] - (double)high[x0]) - ((double)low[x1] - (double)low[x0]);
-    int tile0 = sat__tile_of(t, x0), tile1 = sat__tile_of(t, x1);
-    if (r->above_low != r->above_high) sum += (r->above_high[x1] - r->above_high[x0]) - (r->above_low[x1] - r->above_low[x0]);
-    if (tile0 != tile1) sum += (r->left_high[tile1] - r->left_high[tile0]) - (r->left_low[tile1] - r->left_low[tile0]);
-    return sum;
 }
 
 /* Integer differences wrap around, and the true sum is the representative near zero. `kind` is the table's: loops pass it
@@ -3243,7 +3775,7 @@ static inline double sat__rows_sum(const sat_table *t, sat_kind kind, const sat_
 {
     double sum = 0;
     switch (kind) {
-    case SAT_KIND_TILED: return sat__tiled_sum(t, r, x0, x1);
+    case SAT_KIND_TILED: return 0;
     case SAT_KIND_FLOAT: {
         const float *low = (const float *)r->low, *high = (const float *)r->high;
         sum = ((double)high[x1] - (double)high[x0]) - ((double)low[x1] - (double)low[x0]);
@@ -3280,6 +3812,7 @@ SAT_DEF double sat_sum(const sat_table *table, int channel, int x0, int y0, int 
 {
     sat__rows rows;
     if (!table || channel < 0 || channel >= table->channels || !sat__clip_box(table, &x0, &y0, &x1, &y1)) return 0;
+    if (table->options.kind == SAT_KIND_TILED) return sat__tiled_sum(table, channel, x0, y0, x1, y1);
     rows = sat__rows_at(table, channel, y0, y1);
     return sat__rows_sum(table, table->options.kind, &rows, channel, x0, x1, y1 - y0);
 }
@@ -3425,10 +3958,20 @@ static inline void sat__filter_kind(float *out, const sat_table *t, sat_kind kin
     }
 }
 
+/* The same of a tiled table, from its rows [y0, y1). */
+static void sat__filter_tiled(float *out, const sat_table *t, int channel, int radius, int y0, int y1)
+{
+    int x, step = t->channels, width = t->width;
+    for (x = 0; x < width; x++) {
+        int x0 = x > radius ? x - radius : 0, x1 = width - x > radius ? x + radius + 1 : width;
+        out[(size_t)x * (size_t)step] = (float)(sat__tiled_sum(t, channel, x0, y0, x1, y1) / ((double)(x1 - x0) * (double)(y1 - y0)));
+    }
+}
+
 static void sat__filter_row(float *out, const sat_table *t, const sat__rows *rows, int channel, int radius, int height)
 {
     switch (t->options.kind) {
-    case SAT_KIND_TILED: sat__filter_kind(out, t, SAT_KIND_TILED, rows, channel, radius, height); break;
+    case SAT_KIND_TILED: break;
     case SAT_KIND_FLOAT: sat__filter_kind(out, t, SAT_KIND_FLOAT, rows, channel, radius, height); break;
     case SAT_KIND_DOUBLE: sat__filter_kind(out, t, SAT_KIND_DOUBLE, rows, channel, radius, height); break;
     case SAT_KIND_FIXED32: sat__filter_kind(out, t, SAT_KIND_FIXED32, rows, channel, radius, height); break;
@@ -3445,8 +3988,12 @@ static void sat__filter_rows(int begin, int end, int worker, void *context)
     for (y = begin; y < end; y++)
         for (channel = 0; channel < t->channels; channel++) {
             int y0 = y > f->radius ? y - f->radius : 0, y1 = t->height - y > f->radius ? y + f->radius + 1 : t->height;
-            sat__rows rows = sat__rows_at(t, channel, y0, y1);
-            sat__filter_row((float *)(void *)(f->out + (ptrdiff_t)y * f->out_stride) + channel, t, &rows, channel, f->radius, y1 - y0);
+            float *out = (float *)(void *)(f->out + (ptrdiff_t)y * f->out_stride) + channel;
+            if (t->options.kind == SAT_KIND_TILED) sat__filter_tiled(out, t, channel, f->radius, y0, y1);
+            else {
+                sat__rows rows = sat__rows_at(t, channel, y0, y1);
+                sat__filter_row(out, t, &rows, channel, f->radius, y1 - y0);
+            }
         }
 }
 
@@ -3511,9 +4058,6 @@ SAT_DEF sat_result sat_box_filter_variable(float *out, ptrdiff_t out_stride, con
    within eight pixels, and one carry for every eight. */
 static double sat__roundings(double rows, double columns) { return rows + 3 + columns / 8 + 1; }
 
-/* The most tiles an interval of this many pixels can touch. */
-static double sat__tiles_touched(double pixels, double tile) { return floor((pixels + tile - 2) / tile) + 1; }
-
 /* Never below the error of a box sum. Every stored sum of non-negative pixels is off by at most (roundings) u times
    itself, and a box adds up to four of them a tile it touches; signed pixels count with their magnitude. */
 static double sat__sum_bound(const sat_table *t, const sat__tally *total, double box_width, double box_height)
@@ -3521,7 +4065,7 @@ static double sat__sum_bound(const sat_table *t, const sat__tally *total, double
     const double u = 5.9604644775390625e-8, v = 1.1102230246251565e-16; /* 2^-24, 2^-53 */
     double width = t->width, height = t->height, tile = t->options.tile, area = box_width * box_height;
     double all = total->sum_abs * 1.001, lowered = t->options.subtract_mean ? u * area * total->largest : 0;
-    double doubles = 16 * v * (width / tile + height / tile + 4) * all, touched, largest;
+    double doubles = 16 * v * (width / tile + height / tile + 4) * all;
     switch (t->options.kind) {
     case SAT_KIND_FLOAT: return 4 * u * 1.01 * sat__roundings(height, width) * all + lowered + doubles;
     case SAT_KIND_DOUBLE: return 4 * v * sat__roundings(height, width) * all + lowered + doubles;
@@ -3529,10 +4073,7 @@ static double sat__sum_bound(const sat_table *t, const sat__tally *total, double
     case SAT_KIND_FIXED64: return area * (0.5 * t->quantum + v * t->limit);
     case SAT_KIND_TILED: break;
     }
-    touched = sat__tiles_touched(box_width, tile) * sat__tiles_touched(box_height, tile);
-    largest = total->negative ? tile * tile * total->largest : total->tile_largest * 1.001;
-    if (touched * largest > 4 * all) largest = 4 * all / touched; /* a tile counts once for each of its four corners */
-    return 4 * u * 1.01 * sat__roundings(tile, tile) * touched * largest + doubles;
+    return area * 0.5 * total->tile_largest + doubles;
 }
 
 SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_width, int box_height)
@@ -3561,8 +4102,7 @@ SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width,
     if (sat__is_fixed(table->options.kind)) return table->quantum / sqrt(12 * w * h);
     if (table->options.kind == SAT_KIND_TILED) {
         tiles = (double)table->tiles_x * ((height - 1) / tile + 1);
-        stored = sqrt(total->tile_squares / tiles);
-        return 0.32 * u * stored * sqrt((1 + (w - 1) / tile) * (1 + (h - 1) / tile)) / (w * h);
+        return sqrt(total->tile_squares / tiles / (12 * w * h));
     }
     stored = total->sum_abs / (table->options.subtract_mean ? sqrt(width * height) : 1);
     return 0.25 * (table->options.kind == SAT_KIND_FLOAT ? u : v) * stored * sqrt(1 + 0.1 * (w + h)) / (w * h);
@@ -3571,7 +4111,7 @@ SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width,
 /* ---- choosing a kind */
 
 /* Largest |pixel|, sum and largest tile sum of the whole image, all channels together. */
-static void sat__survey(sat_table *t, const sat_image *image, double *tile_sums)
+static void sat__survey(sat_table *t, const sat_image *image, double *tile_sums, double *largest_tile)
 {
     sat__tally *total = &t->total[0];
     int x, y, channel, i, tile = t->options.tile;
@@ -3584,7 +4124,7 @@ static void sat__survey(sat_table *t, const sat_image *image, double *tile_sums)
                 if (y % tile == 0) *sum = 0;
                 sat__measure(p, n, total);
                 for (i = 0; i < n; i++) *sum += fabs((double)p[i]);
-                if (*sum > total->tile_largest) total->tile_largest = *sum;
+                if (*sum > *largest_tile) *largest_tile = *sum;
             }
     total->negative = 0; /* the tile sums are of magnitudes already */
 }
@@ -3595,18 +4135,19 @@ SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_widt
     static const sat_kind cheapest_first[] = {SAT_KIND_FLOAT, SAT_KIND_FIXED32, SAT_KIND_TILED, SAT_KIND_DOUBLE, SAT_KIND_FIXED64};
     sat_options resolved = options ? *options : sat_defaults();
     sat_table *survey, t;
-    double allowed, area, best = -1, *tile_sums;
+    double allowed, area, best = -1, *tile_sums, largest_tile = 0;
     sat_result result;
     int i;
     if (!kind || !sat__image_is_valid(image) || box_width < 1 || box_height < 1 || !(max_relative_error >= 0)) return SAT_ERR_ARGUMENT;
-    resolved.kind = SAT_KIND_TILED;
+    resolved.kind = SAT_KIND_DOUBLE;
     resolved.subtract_mean = 0;
-    /* a one-row table holds all the scratch memory this needs; its strips take the tile sums */
-    result = sat__table_create(&survey, image->width, image->height, 2, 1, image->channels, &resolved);
+    /* a one-row table holds all the scratch memory this needs; its row takes the tile sums */
+    result = sat__table_create(&survey, image->width, image->height, 2, 1, 0, image->channels, &resolved);
     if (result) return result;
-    tile_sums = survey->left;
+    tile_sums = (double *)(void *)sat__row(survey, 0, 0);
     sat__resolve(survey, image);
-    sat__survey(survey, image, tile_sums);
+    sat__survey(survey, image, tile_sums, &largest_tile);
+    survey->total[0].tile_largest = sat__tile_quantum(largest_tile, 31);
     box_width = sat__min_int(box_width, image->width);
     box_height = sat__min_int(box_height, image->height);
     area = (double)box_width * box_height;
@@ -3618,7 +4159,7 @@ SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_widt
         t.options.kind = cheapest_first[i];
         t.options.max_value = survey->total[0].largest;
         if (!(t.options.max_box_area > 0)) t.options.max_box_area = area;
-        t.rows = image->height + 1;
+        t.rows = image->height + (t.options.kind != SAT_KIND_TILED);
         t.tiles_y = (image->height - 1) / resolved.tile + 1;
         t.element = sat__kind_size(t.options.kind);
         if (max_bytes && (sat__lay_out(&t, NULL) == 0 || sat__lay_out(&t, NULL) > max_bytes)) continue;
@@ -3943,9 +4484,13 @@ SAT_DEF sat_result sat_moments_filter(float *out, float *mean, ptrdiff_t out_str
 
    The table is a ring: the last 2 radius + 2 corner rows, and the strips above the tile rows that these lie in. */
 
+enum { SAT__MAX_STREAM_RADIUS = 100000 };
+
 struct sat_stream {
     sat_table *table;
-    int radius, strips;  /* strips: tile rows in the ring */
+    int radius;
+    int used[4];         /* pool slots of this super tile row, a channel */
+    uint64_t built;      /* rows that lookups may ask for */
     uint64_t taken, given;
 };
 
@@ -3955,8 +4500,10 @@ SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, 
     sat_allocator allocator;
     sat_stream *stream;
     sat_result result;
+    int bands;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
+    if (resolved.kind == SAT_KIND_TILED && radius > SAT__MAX_STREAM_RADIUS) return SAT_ERR_SIZE;
     if (radius < 0 || radius > 0x3fffffff - 2 || resolved.subtract_mean || !sat__options_are_valid(&resolved)) return SAT_ERR_ARGUMENT;
     if (sat__is_fixed(resolved.kind)) {
         if (!(resolved.quantum > 0) && !(resolved.max_value > 0)) return SAT_ERR_ARGUMENT; /* the largest pixel is not known yet */
@@ -3968,8 +4515,9 @@ SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, 
     if (!stream) return SAT_ERR_MEMORY;
     memset(stream, 0, sizeof *stream);
     stream->radius = radius;
-    stream->strips = (2 * radius + 1) / resolved.tile + 3;
-    result = sat__table_create(&stream->table, width, 2 * radius + 2, 2 * radius + 2, stream->strips, channels, &resolved);
+    bands = (2 * radius + 1) / resolved.tile + 3;
+    if (resolved.kind == SAT_KIND_TILED) result = sat__table_create(&stream->table, width, 2 * radius + 2, bands * resolved.tile, bands, 1, channels, &resolved);
+    else result = sat__table_create(&stream->table, width, 2 * radius + 2, 2 * radius + 2, 1, 0, channels, &resolved);
     if (result) sat__release(&allocator, stream, sizeof *stream);
     else *out = stream;
     return result;
@@ -3986,10 +4534,26 @@ SAT_DEF void sat_stream_destroy(sat_stream *stream)
 
 static int sat__ring_row(const sat_stream *s, uint64_t corner_row) { return (int)(corner_row % (uint64_t)s->table->rows); }
 
-static int sat__ring_strip(const sat_stream *s, uint64_t corner_row)
+/* Tile rows and pixel rows of a tiled ring are counted modulo this many tile rows, so that an int holds them and all that
+   repeats (slots, super tile rows, their pools) stays in step. */
+static int sat__ring_period(const sat_table *t) { return t->tiles_y * (SAT__SUPER >> t->shift) * sat__supers(t); }
+
+/* The tile row that the rows taken last fill, or the last rows of the image. */
+static void sat__stream_build(sat_stream *s)
 {
-    uint64_t tile_row = (corner_row - (corner_row > 0)) >> s->table->shift;
-    return (int)(tile_row % (uint64_t)s->strips);
+    sat_table *t = s->table;
+    sat_image image = sat_image_f32(t->ring_pixels, t->width, (int)(s->taken - s->built), t->channels);
+    int channel, tx, band = (int)((s->built >> t->shift) % (uint64_t)sat__ring_period(t));
+    for (channel = 0; channel < t->channels; channel++) {
+        const sat__tally *tally = &t->tallies[channel * t->tiles_y + sat__band_slot(t, band)];
+        sat__settle_band(t, &image, channel, band, 0, 0, 0);
+        if ((band & ((SAT__SUPER >> t->shift) - 1)) == 0) s->used[channel] = 0;
+        for (tx = 0; tx < t->tiles_x; tx++) sat__assign_wide(t, channel, band, tx, &s->used[channel]);
+        sat__finish_band(t, &image, channel, band, 0, 0);
+        sat__build_above(t, channel, band, image.height);
+        t->has_giants |= tally->giants > 0;
+    }
+    s->built = s->taken;
 }
 
 /* Adds one image row below those taken so far. */
@@ -3997,24 +4561,27 @@ static void sat__stream_take(sat_stream *s, const sat_image *row)
 {
     sat_table *t = s->table;
     uint64_t corner_row = s->taken + 1;
-    int channel, x, slot = sat__ring_row(s, corner_row), tile = t->options.tile;
+    int channel, x, slot = sat__ring_row(s, corner_row);
     int care = sat__first_care(t) == SAT__TRUST ? SAT__REPLACE_NON_FINITE : SAT__CLAMP_ALL; /* no row can be built again */
+    if (t->options.kind == SAT_KIND_TILED) {
+        float *rows = t->ring_pixels + (size_t)(s->taken - s->built) * (size_t)t->width * (size_t)t->channels;
+        for (channel = 0; channel < t->channels; channel++)
+            for (x = 0; x < t->width; x++) {
+                float *p = &rows[(size_t)x * (size_t)t->channels + (size_t)channel];
+                sat__read_row(p, row, 0, x, x + 1, channel);
+                t->total[channel].nan += (size_t)sat__is_nan(*p);
+                t->total[channel].infinite += (size_t)(!sat__is_nan(*p) && !sat__is_finite(*p));
+            }
+        if (++s->taken - s->built == (uint64_t)t->options.tile) sat__stream_build(s);
+        return;
+    }
     for (channel = 0; channel < t->channels; channel++) {
         unsigned char *sums = sat__row(t, channel, slot);
-        unsigned char *columns = t->columns + (size_t)channel * t->columns_stride;
+        sat__carry carry;
         memset(sums, 0, t->element);
-        if (t->options.kind != SAT_KIND_TILED) {
-            sat__carry carry;
-            memset(&carry, 0, sizeof carry);
-            for (x = 0; x < t->width; x += SAT__STRIP)
-                sat__flat_piece(t, row, channel, 0, x, sat__min_int(SAT__STRIP, t->width - x), sums, &carry, 0, care, &t->total[channel], 0);
-            continue;
-        }
-        if (s->taken % (uint64_t)tile == 0) memset(columns, 0, t->columns_stride);
-        sat__tiled_row(t, row, channel, 0, (float *)(void *)sums, sat__left(t, channel, slot), (float *)(void *)columns, 0, care, &t->total[channel], 0);
-        if (corner_row % (uint64_t)tile == 0)
-            sat__add_above(t, sat__above(t, channel, sat__ring_strip(s, corner_row + 1)), sat__above(t, channel, sat__ring_strip(s, corner_row)),
-                           (float *)(void *)sums, sat__left(t, channel, slot), 0, t->width + 1);
+        memset(&carry, 0, sizeof carry);
+        for (x = 0; x < t->width; x += SAT__STRIP)
+            sat__flat_piece(t, row, channel, 0, x, sat__min_int(SAT__STRIP, t->width - x), sums, &carry, 0, care, &t->total[channel], 0);
     }
     s->taken++;
 }
@@ -4039,20 +4606,19 @@ SAT_DEF sat_result sat_stream_push(sat_stream *stream, float *out_row, int *rows
     }
     reach = (uint64_t)stream->radius + 1;
     high = stream->given + reach;
-    if (row ? high > stream->taken : stream->given >= stream->taken) return SAT_OK;
+    if (t->options.kind != SAT_KIND_TILED) stream->built = stream->taken;
+    else if (!row && stream->built < stream->taken) sat__stream_build(stream);
+    if (row ? high > stream->built : stream->given >= stream->taken) return SAT_OK;
     if (high > stream->taken) high = stream->taken;
     low = stream->given >= reach ? stream->given + 1 - reach : 0;
     for (channel = 0; channel < t->channels; channel++) {
         sat__rows rows;
-        memset(&rows, 0, sizeof rows);
-        rows.low = sat__row(t, channel, sat__ring_row(stream, low));
-        rows.high = sat__row(t, channel, sat__ring_row(stream, high));
         if (t->options.kind == SAT_KIND_TILED) {
-            rows.left_low = sat__left(t, channel, sat__ring_row(stream, low));
-            rows.left_high = sat__left(t, channel, sat__ring_row(stream, high));
-            rows.above_low = sat__above(t, channel, sat__ring_strip(stream, low));
-            rows.above_high = sat__above(t, channel, sat__ring_strip(stream, high));
+            uint64_t period = (uint64_t)sat__ring_period(t) << t->shift;
+            sat__filter_tiled(out_row + channel, t, channel, stream->radius, (int)(low % period), (int)(low % period + (high - low)));
+            continue;
         }
+        rows = sat__rows_at(t, channel, sat__ring_row(stream, low), sat__ring_row(stream, high));
         sat__filter_row(out_row + channel, t, &rows, channel, stream->radius, (int)(high - low));
     }
     stream->given++;

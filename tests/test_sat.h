@@ -749,8 +749,8 @@ TEST(a_bad_pixel_changes_no_box_without_it)
                 if (X >= box[0] && X < box[2] && Y >= box[1] && Y < box[3]) continue;
                 got = sat_sum(t, 0, box[0], box[1], box[2], box[3]);
                 expected = sat_sum(without, 0, box[0], box[1], box[2], box[3]);
-                if (b == 4 || sat__is_fixed(o.kind)) EXPECT_NEAR(got, expected, 0);
-                else EXPECT(fabs(got) < 1e39 && got - got <= 0); /* finite, if not precise beside 1e35 */
+                if (b == 4 || sat__is_fixed(o.kind) || o.kind == SAT_KIND_TILED) EXPECT_NEAR(got, expected, 0);
+                else EXPECT(fabs(got) < 1e39 && got - got <= 0); /* the flat kinds promise no more: finite */
             }
             sat_destroy(t);
             o.non_finite = SAT_NON_FINITE_REFUSE;
@@ -765,6 +765,148 @@ TEST(a_bad_pixel_changes_no_box_without_it)
             sat_destroy(t);
             sat_destroy(without);
         }
+}
+
+/* A table whose error stays where it is made: what users reported of others, and of this one's strips. */
+static int boxes_off(const sat_table *t, const float *p, int w, int h, int r, double tolerance, int with_x, int with_y, int *negative)
+{
+    int x, y, a, b, off = 0;
+    for (y = r; y < h - r; y++)
+        for (x = r; x < w - r; x++) {
+            double exact = 0, got = sat_mean(t, 0, x - r, y - r, x + r + 1, y + r + 1);
+            if (abs(x - with_x) <= r && abs(y - with_y) <= r) continue;
+            for (b = -r; b <= r; b++)
+                for (a = -r; a <= r; a++) exact += (double)p[(y + b) * w + x + a] / ((2 * r + 1) * (2 * r + 1));
+            if (!(fabs(got - exact) <= tolerance * exact)) off++;
+            if (negative && got < 0) ++*negative;
+        }
+    return off;
+}
+
+TEST(bright_pixels_change_no_mean_beside_them)
+{
+    enum { W = 512, H = 512 };
+    static float p[W * H];
+    sat_image view = sat_image_f32(p, W, H, 1);
+    static const float bad[] = {(float)HUGE_VAL, 1e30f, 1e8f, 3e38f};
+    uint64_t state = 1;
+    sat_table *t;
+    int i, negative = 0;
+    for (i = 0; i < W * H; i++) p[i] = (float)(1e-4 + 1e-4 * support_uniform(&state));
+    for (i = 0; i < 20; i++) p[support_below(&state, W * H)] = 6e4f;
+    t = build(&view, NULL);
+    EXPECT_EQ(boxes_off(t, p, W, H, 1, 0.01, -99, -99, &negative), 0);
+    EXPECT_EQ(negative, 0);
+    sat_destroy(t);
+    view = sat_image_f32(p, 300, 200, 1);
+    for (i = 0; i < 4; i++) {
+        int j;
+        for (j = 0; j < 300 * 200; j++) p[j] = 1;
+        p[100 * 300 + 150] = i ? bad[i] : sat__float_from_bits(0x7f800000u);
+        t = build(&view, NULL);
+        EXPECT_EQ(boxes_off(t, p, 300, 200, 4, 1e-9, 150, 100, NULL), 0);
+        sat_destroy(t);
+    }
+}
+
+TEST(skies_of_any_sentinel_leave_the_ground_alone)
+{
+    enum { W = 256, H = 256, R = 4 };
+    static float p[W * H];
+    sat_image view = sat_image_f32(p, W, H, 1);
+    static const float skies[] = {1e6f, 1e10f, 3.4028235e38f, 0};
+    int s, x, y, a, b;
+    for (s = 0; s < 4; s++) {
+        uint64_t state = 2;
+        sat_table *t;
+        double worst = 0;
+        for (y = 0; y < H; y++)
+            for (x = 0; x < W; x++)
+                p[y * W + x] = y < 60 + x / 8 ? (s < 3 ? skies[s] : sat__float_from_bits(0x7f800000u)) : (float)(1 + 0.001 * (H - y) + 0.01 * support_uniform(&state));
+        t = build(&view, NULL);
+        for (y = R; y < H - R; y++)
+            for (x = R; x < W - R; x++) {
+                double exact = 0;
+                if (y - R < 60 + (x + R) / 8) continue;
+                for (b = -R; b <= R; b++)
+                    for (a = -R; a <= R; a++) exact += (double)p[(y + b) * W + x + a] / 81;
+                worst = fmax(worst, fabs(sat_mean(t, 0, x - R, y - R, x + R + 1, y + R + 1) - exact) / exact);
+            }
+        if (!EXPECT(worst <= 1e-5)) printf("sky %g: %g\n", (double)skies[s], worst);
+        sat_destroy(t);
+    }
+}
+
+TEST(fourteen_smooth_decades)
+{
+    enum { N = 1024, BOXES = 20000 };
+    static const int radii[] = {0, 1, 5, 20, 100};
+    float *p = (float *)malloc(sizeof(float) * N * N);
+    double *errors = (double *)malloc(sizeof(double) * BOXES);
+    sat_image view = sat_image_f32(p, N, N, 1);
+    uint64_t state = 3;
+    sat_table *t;
+    int x, y, i, r;
+    for (y = 0; y < N; y++)
+        for (x = 0; x < N; x++) {
+            double e = 7 * sin(x * 0.0031 + 1.3 * sin(y * 0.0017)) * cos(y * 0.0023 + 0.7) + 1 + 0.6 * (support_uniform(&state) - 0.5);
+            p[y * N + x] = (float)fmin(fmax(pow(10, e), 1e-6), 1e8);
+        }
+    t = build(&view, NULL);
+    for (r = 0; r < 5; r++) {
+        int side = 2 * radii[r] + 1, boxes = r < 4 ? BOXES : 200;
+        for (i = 0; i < boxes; i++) {
+            int x0 = support_below(&state, N - side), y0 = support_below(&state, N - side);
+            double exact = exact_sum(&view, 0, x0, y0, x0 + side, y0 + side);
+            errors[i] = fabs(sat_sum(t, 0, x0, y0, x0 + side, y0 + side) - exact) / exact;
+        }
+        qsort(errors, (size_t)boxes, sizeof *errors, support_compare_doubles);
+        printf("side %d: p99 %.2g max %.2g\n", side, errors[boxes * 99 / 100], errors[boxes - 1]);
+        if (r == 1) {
+            EXPECT(errors[boxes * 99 / 100] <= 5e-6);
+            EXPECT(errors[boxes - 1] < 5e-5);
+        } else EXPECT(errors[boxes - 1] < 1e-3);
+    }
+    sat_destroy(t);
+    free(p);
+    free(errors);
+}
+
+TEST(large_boxes_across_super_tiles)
+{
+    enum { W = 2300, H = 1200 };
+    uint16_t *p = (uint16_t *)malloc(sizeof *p * W * H);
+    sat_image view = sat_image_f32(NULL, W, H, 1);
+    uint64_t state = 8, exact[2];
+    int i, x, y, tile;
+    for (i = 0; i < W * H; i++) p[i] = (uint16_t)support_random(&state);
+    view.pixels = p;
+    view.format = SAT_U16;
+    view.stride = W * 2;
+    for (tile = 8; tile <= 128; tile *= 2) {
+        sat_options o = sat_defaults();
+        sat_table *t;
+        o.tile = tile;
+        t = build(&view, &o);
+        for (i = 0; i < 12; i++) {
+            int x0 = support_below(&state, W / 2), y0 = support_below(&state, H / 2), x1 = x0 + 1 + support_below(&state, W / 2), y1 = y0 + 1 + support_below(&state, H / 2);
+            exact[0] = 0;
+            for (y = y0; y < y1; y++)
+                for (x = x0; x < x1; x++) exact[0] += p[y * W + x];
+            EXPECT_NEAR(sat_sum(t, 0, x0, y0, x1, y1), (double)exact[0], 0); /* 16 bits are exact */
+        }
+        sat_destroy(t);
+    }
+    free(p);
+}
+
+TEST(a_column_of_pixels_takes_few_bytes)
+{
+    sat_table *t = NULL;
+    EXPECT_EQ(sat_create(&t, 1, 100000, 1, NULL), SAT_OK);
+    REPORT("bytes a pixel of a 1 x 100000 table", (double)sat_get_statistics(t).bytes / 100000, "bytes");
+    EXPECT(sat_get_statistics(t).bytes < 100000 * 30);
+    sat_destroy(t);
 }
 
 TEST(extreme_floats_keep_finite_sums)
@@ -863,7 +1005,7 @@ TEST(error_bounds_hold_and_the_expected_error_is_near)
                 EXPECT(worst <= sat_error_bound(t, 0, boxes[b], boxes[b]));
                 if (which < 2 && kinds[k] != (which ? SAT_KIND_FIXED32 : SAT_KIND_DOUBLE) && rms > 0) {
                     double ratio = sat_error_rms(t, 0, boxes[b], boxes[b]) / rms;
-                    if (!EXPECT(ratio > 1.0 / 3 && ratio < 3)) printf("image %d kind %d box %d ratio %g\n", which, k, boxes[b], ratio);
+                    if (!EXPECT(ratio > 1.0 / 4 && ratio < 4)) printf("image %d kind %d box %d ratio %g\n", which, k, boxes[b], ratio);
                 }
             }
             sat_destroy(t);
