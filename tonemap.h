@@ -21,6 +21,7 @@
                     itself (eq A.3). Optional: burn-out above a white; key and white estimated (Reinhard 2003)
      mesopic        reds fade in dim light, by the whole picture or by each neighbourhood (eq A.10 to A.14)
      Ashikhmin      threshold against intensity, local and global (Michael 2010, section 4.3)
+     colours        those beyond the display come back along their hue, dimmed and faded (gamut); nothing turns cyan
      leaving out    searches that cannot change what is seen (tolerance_codes), with a proven bound; searches away from
                     edges (selective; Michael 2010, section 4.4), without one
      adaptation     log-average, key, white and range approach those of the picture with a time constant in seconds
@@ -52,9 +53,10 @@
      multiply-add), and for pictures in units that differ by a power of two from 2^-20 to 2^20.
      Against OpenGL at most 1 code differs, in 2 % of codes (on a software renderer). 8-bit codes are at most one from the
      rounded value, and that in 2 % of cases, within 0.1 of a step.
-     Luminances below 2^-100 are black, those above 2^100 count as 2^100. NaN and negative luminances are black, infinity
-     is white; none of them enters the log-average, and none changes a pixel outside the 41 x 41 around it. A negative
-     component of a positive luminance is kept until the display clips it. Output lies in [0, 1] for any input bits.
+     Luminances below 2^-100 are black, those above 2^100 count as 2^100. NaN and negative luminances count as 0, infinity
+     is white; none of them enters the log-average, and none changes a pixel outside the 41 x 41 around it. A pixel of
+     NaN or negative luminance (ringing beside lamps) shows the mean of what the usable ones around it show, up to 3
+     pixels away. A negative component of a positive luminance is kept until the display cuts it. Output lies in [0, 1] for any input bits.
      Black pictures stay black and leave the adaptation alone; constant ones get the key.
      Deviations from the sources: eq A.1 averages positive luminances only and has no delta, which would depend on the unit;
      s in eq A.5 is the length in pixels; eq A.7 takes the centre of the first step that fails; the Lab of eq A.12 has the
@@ -71,7 +73,7 @@
      what they save: the time is between 1.0 and 1.2. On noise it looks at an eighth of the tiles, sees that nothing can be
      skipped, and costs 1.03. selective pays where few pixels are near edges, 0.9 to 1.1, and for Ashikhmin, 0.6, at an SSIM
      of only 0.9.
-     Against flicker: 0.5 % of noise moves single pixels by up to 56 codes with hard scales and by less than 1 with soft = 1. */
+     Against flicker: 0.5 % of noise moves single pixels by up to 56 codes with soft = 0 and by less than 1 with soft = 1. */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(TONEMAP_IMPLEMENTATION)
 #define TONEMAP_IMPLEMENTATION
@@ -130,25 +132,29 @@ typedef enum tonemap_mesopic {
 
 typedef struct tonemap_options {
     tonemap_operator operation; /* TONEMAP_PHOTOGRAPHIC_LOCAL */
-    double key;                 /* 0.18; the display value of the log-average luminance before compression, 0..10;
+    double key;                 /* 0.18; -1e6..10; the display value of the log-average luminance before compression;
                                    <= 0: estimated from the log-average's place between dark and bright (Reinhard 2003) */
-    double white;               /* INFINITY (no burn-out); the smallest luminance shown as white, in units in which the
-                                   log-average is the key; 0: estimated, at least 1 */
+    double white;               /* INFINITY; 0..1e12 or infinity (no burn-out); the smallest luminance shown as white, in
+                                   units in which the log-average is the key; 0: estimated, at least 1 */
     double phi;                 /* 8; -16..16; sharpening of the scale test, eq A.5 */
-    double epsilon;             /* 0.05; > 0; threshold of the scale test, eq A.7 */
-    int scales;                 /* 8; 1..8: how many of the box lengths 1 3 5 7 11 17 27 41 */
-    double soft;                /* 0; 0..1: half width of the band around epsilon in which scales are mixed; against flicker */
+    double epsilon;             /* 0.05; 1e-9..1e9; threshold of the scale test, eq A.7 */
+    int scales;                 /* 8; 1..8; how many of the box lengths 1 3 5 7 11 17 27 41 */
+    double soft;                /* 1; 0..1; half width of the band around epsilon in which scales are mixed, as a share of
+                                   epsilon; 0: the paper's hard choice, which flickers (and the default with TONEMAP_NO_SOFT) */
+    double gamut;               /* 0.5; 0..1 or negative; how colours beyond the display come back: 0 keeps their luminance
+                                   and fades them, 1 dims them and keeps their saturation; negative: each channel is clipped */
     tonemap_mesopic mesopic;    /* TONEMAP_MESOPIC_OFF */
-    double cd_per_unit;         /* 0; cd/m2 of a luminance of 1; 0: unknown, the log-average counts as 10 cd/m2 */
-    double lux_per_cd;          /* 1; illuminance that belongs to a luminance of 1 cd/m2, eq A.10 */
-    double tolerance_codes;     /* 0: every pixel is searched; > 0: pixels whose display value is known to within so many
-                                   8-bit sRGB codes without a search are not searched (local operator) */
-    double selective;           /* 0: off; > 0: only pixels whose Sobel gradient of the scaled luminance exceeds this
-                                   are searched (Michael 2010, section 4.4) */
-    double adapt_seconds;       /* 0: each picture for itself; > 0: time constant of the eye's adaptation */
+    double cd_per_unit;         /* 0; 0..1e30; cd/m2 of a luminance of 1; 0: unknown, the log-average counts as 10 cd/m2 */
+    double lux_per_cd;          /* 1; 0..1e6; illuminance that belongs to a luminance of 1 cd/m2, eq A.10 */
+    double tolerance_codes;     /* 0; 0..255; 0: every pixel is searched; else pixels whose display value is known to
+                                   within so many 8-bit sRGB codes without a search are not searched (local operator) */
+    double selective;           /* 0; 0..1e30; 0: off; else only pixels whose Sobel gradient of the scaled luminance
+                                   exceeds this are searched (Michael 2010, section 4.4) */
+    double adapt_seconds;       /* 0; 0..1e30; time constant of the eye's adaptation; 0: each picture for itself */
     sat_allocator allocator;    /* malloc; used by create and destroy only */
     sat_threads threads;        /* serial; same bits for any worker count */
 } tonemap_options;
+/* NULL options mean these, here and in every call. */
 TONEMAP_DEF tonemap_options tonemap_defaults(void);
 
 /* What the last picture was like and what was done to it. */
@@ -157,7 +163,7 @@ typedef struct tonemap_stats {
     double low, high;              /* 1 % and 99 % quantiles of the positive luminances */
     double adapted, key, white;    /* log-average, key and white that were used, after adaptation */
     size_t positive;               /* pixels with a finite luminance > 0: those that log_average, low and high are of */
-    size_t nan, infinite, negative; /* pixels whose luminance was replaced: by 0, by 2^100, by 0 */
+    size_t nan, infinite, negative; /* pixels that are no measurement: nan and negative show their neighbours */
     size_t clamped;                /* pixels with a display component above 1 */
     size_t scale[10];              /* searched pixels by the box that was taken, smallest first */
     size_t searched, skipped;      /* pixels with and without a search */
@@ -186,7 +192,10 @@ TONEMAP_DEF sat_result tonemap_apply_u8(tonemap *map, unsigned char *out, ptrdif
 /* The same without sRGB encoding: linear display values in [0, 1]. May work in place. */
 TONEMAP_DEF sat_result tonemap_apply_f32(tonemap *map, float *out, ptrdiff_t out_stride, const sat_image *hdr,
                                          double dt_seconds, tonemap_stats *stats);
-/* Other options from the next picture on; the adaptation goes on. Allocator and worker count stay those of create. */
+/* One sentence that names the first argument of tonemap_create or tonemap_gl_create that is refused, and its range; ""
+   when none is. Written into text (cut to size, always ended); returns text. */
+TONEMAP_DEF char *tonemap_explain(char *text, size_t size, int width, int height, const tonemap_options *options);
+/* Other options from the next picture on; the adaptation goes on, and what only the new options need starts with it. Allocator and worker count stay those of create. */
 TONEMAP_DEF sat_result tonemap_set_options(tonemap *map, const tonemap_options *options);
 TONEMAP_DEF void tonemap_destroy(tonemap *map); /* NULL is fine */
 
@@ -307,23 +316,37 @@ enum {
 #define TONEMAP__DARKEST 7.8886090522101181e-31f  /* 2^-100 */
 #define TONEMAP__BRIGHTEST 1.2676506002282294e30f /* 2^100 */
 #define TONEMAP__DARKEST_BITS 0x0d800000u
+#define TONEMAP__UNUSABLE 0x80000000u /* -0: a luminance that counts as 0 and says that the pixel shows its neighbours */
 #define TONEMAP__LOCAL_CAP 256.0f     /* of the scaled luminance in the sums; the display has 0.4 % left beyond it */
 #define TONEMAP__QUANTUM 4096.0f      /* steps a unit: 41 * 41 * 256 * 4096 < 2^31 */
 #define TONEMAP__ASHIKHMIN_QUANTUM 1048576.0f /* the same for luminances up to 1: 35 * 35 * 2^20 < 2^31 */
 
 TONEMAP_DEF int tonemap_version(void) { return TONEMAP_VERSION; }
 
+static const sat__field tonemap__fields[] = {
+    SAT__FIELD(tonemap_options, 'i', operation, 0, 0, TONEMAP_LINEAR, ' '),
+    SAT__FIELD(tonemap_options, 'd', key, 0.18, -1e6, 10, ' '),
+    SAT__FIELD(tonemap_options, 'd', white, (double)INFINITY, 0, 1e12, 'I'),
+    SAT__FIELD(tonemap_options, 'd', phi, 8, -16, 16, ' '),
+    SAT__FIELD(tonemap_options, 'd', epsilon, 0.05, 1e-9, 1e9, ' '),
+    SAT__FIELD(tonemap_options, 'i', scales, 8, 1, 8, ' '),
+    SAT__FIELD(tonemap_options, 'd', soft, 1, 0, 1, ' '),
+    SAT__FIELD(tonemap_options, 'd', gamut, 0.5, 0, 1, '-'),
+    SAT__FIELD(tonemap_options, 'i', mesopic, 0, 0, TONEMAP_MESOPIC_LOCAL, ' '),
+    SAT__FIELD(tonemap_options, 'd', cd_per_unit, 0, 0, 1e30, ' '),
+    SAT__FIELD(tonemap_options, 'd', lux_per_cd, 1, 0, 1e6, ' '),
+    SAT__FIELD(tonemap_options, 'd', tolerance_codes, 0, 0, 255, ' '),
+    SAT__FIELD(tonemap_options, 'd', selective, 0, 0, 1e30, ' '),
+    SAT__FIELD(tonemap_options, 'd', adapt_seconds, 0, 0, 1e30, ' '),
+    SAT__FIELD(tonemap_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(tonemap_options, 't', threads, 0, 0, 0, ' '),
+};
+
 TONEMAP_DEF tonemap_options tonemap_defaults(void)
 {
     tonemap_options o;
-    memset(&o, 0, sizeof o);
-    o.operation = TONEMAP_PHOTOGRAPHIC_LOCAL;
-    o.key = 0.18;
-    o.white = (double)INFINITY;
-    o.phi = 8;
-    o.epsilon = 0.05;
-    o.scales = TONEMAP__LENGTHS;
-    o.lux_per_cd = 1;
+    sat__fields_default(&o, sizeof o, tonemap__fields, SAT__COUNT(tonemap__fields));
+    if (!TONEMAP__HAS_SOFT) o.soft = 0;
     return o;
 }
 
@@ -334,25 +357,40 @@ static inline int tonemap__in_range(double v, double low, double high)
     return sat__is_finite_double(v) && v >= low && v <= high;
 }
 
-/* Nothing is asked for that TONEMAP_NO_... left out. */
-static inline int tonemap__has_what_is_asked(const tonemap_options *o)
+/* What is asked for though TONEMAP_NO_... left it out, as a sentence; or NULL. */
+static inline const char *tonemap__left_out(const tonemap_options *o)
 {
-    if (!TONEMAP__HAS_ASHIKHMIN && (o->operation == TONEMAP_ASHIKHMIN || o->operation == TONEMAP_ASHIKHMIN_GLOBAL)) return 0;
-    if (!TONEMAP__HAS_MESOPIC && o->mesopic != TONEMAP_MESOPIC_OFF) return 0;
-    if (!TONEMAP__HAS_WHITE && !tonemap__is_infinite(o->white)) return 0;
-    return (TONEMAP__HAS_SELECTIVE || !(o->selective > 0)) && (TONEMAP__HAS_SKIPPING || !(o->tolerance_codes > 0)) &&
-           (TONEMAP__HAS_SOFT || !(o->soft > 0));
+    if (!TONEMAP__HAS_ASHIKHMIN && (o->operation == TONEMAP_ASHIKHMIN || o->operation == TONEMAP_ASHIKHMIN_GLOBAL))
+        return "operation is Ashikhmin's; TONEMAP_NO_ASHIKHMIN left it out";
+    if (!TONEMAP__HAS_MESOPIC && o->mesopic != TONEMAP_MESOPIC_OFF) return "mesopic is on; TONEMAP_NO_MESOPIC left it out";
+    if (!TONEMAP__HAS_WHITE && !tonemap__is_infinite(o->white)) return "white is finite; TONEMAP_NO_WHITE left it out";
+    if (!TONEMAP__HAS_SELECTIVE && o->selective > 0) return "selective is above 0; TONEMAP_NO_SELECTIVE left it out";
+    if (!TONEMAP__HAS_SKIPPING && o->tolerance_codes > 0) return "tolerance_codes is above 0; TONEMAP_NO_SKIPPING left it out";
+    if (!TONEMAP__HAS_SOFT && o->soft > 0) return "soft is above 0; TONEMAP_NO_SOFT left it out";
+    return NULL;
+}
+
+static inline int tonemap__explain_options(sat__text *t, const tonemap_options *o)
+{
+    const sat__field *wrong = sat__fields_check(o, tonemap__fields, SAT__COUNT(tonemap__fields));
+    if (wrong) sat__text_field(t, wrong, o);
+    else if (tonemap__left_out(o)) sat__text_add(t, tonemap__left_out(o));
+    return !wrong && !tonemap__left_out(o);
 }
 
 static inline int tonemap__options_are_valid(const tonemap_options *o)
 {
-    if ((unsigned)o->operation > (unsigned)TONEMAP_LINEAR || (unsigned)o->mesopic > (unsigned)TONEMAP_MESOPIC_LOCAL) return 0;
-    if (!tonemap__in_range(o->key, -1e6, 10) || !(tonemap__is_infinite(o->white) || tonemap__in_range(o->white, 0, 1e12))) return 0;
-    if (!tonemap__in_range(o->phi, -16, 16) || !tonemap__in_range(o->epsilon, 1e-9, 1e9)) return 0;
-    if (o->scales < 1 || o->scales > TONEMAP__LENGTHS || !tonemap__in_range(o->soft, 0, 1)) return 0;
-    if (!tonemap__in_range(o->cd_per_unit, 0, 1e30) || !tonemap__in_range(o->lux_per_cd, 0, 1e6)) return 0;
-    if (!tonemap__in_range(o->tolerance_codes, 0, 255) || !tonemap__in_range(o->selective, 0, 1e30)) return 0;
-    return tonemap__in_range(o->adapt_seconds, 0, 1e30) && sat__threads_are_valid(&o->threads) && tonemap__has_what_is_asked(o);
+    sat__text ignored = sat__text_begin(NULL, 0);
+    return tonemap__explain_options(&ignored, o);
+}
+
+TONEMAP_DEF char *tonemap_explain(char *text, size_t size, int width, int height, const tonemap_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (width < 1 || width > 1 << 24) sat__text_range(&t, "width", width, 1, 1 << 24, ' ');
+    else if (height < 1 || height > 1 << 24) sat__text_range(&t, "height", height, 1, 1 << 24, ' ');
+    else if (options) tonemap__explain_options(&t, options);
+    return text;
 }
 
 /* ---- the object */
@@ -381,7 +419,7 @@ typedef struct tonemap__frame {
     float inverse_cap;      /* 0 for the global operators, which have no sums */
     float inverse_white2;   /* 1 / white^2 */
     float epsilon, term[TONEMAP__LENGTHS]; /* the test of eq A.5 and A.7: |c - v| < epsilon c + term[k] */
-    float soft;
+    float soft, gamut;
     float lux;              /* illuminance of a scaled luminance of 1 */
     float rho;              /* eq A.11 of the whole picture; 1 where there is nothing to do */
     float curve_low, curve_factor, cd; /* Ashikhmin: display = (C(L cd) - curve_low) curve_factor */
@@ -395,8 +433,10 @@ struct tonemap {
     void *block;
     size_t block_size;
     int width, height, row, ring_row, workers, tiles_x, tiles_y, started, skipping;
+    unsigned known;         /* bit i: state[i] was measured, not only set */
     float *luminance;       /* the picture, rows `row` floats apart */
     float *row_sum;         /* of each row */
+    unsigned char *row_unusable; /* some pixel of the row shows its neighbours */
     struct tonemap__range *tile_range, *tile_reached; /* of each tile: its own; with its neighbours in the row */
     float *tile_peak;       /* largest component */
     float *tile_local;      /* La where the tile is skipped, else -1 */
@@ -474,10 +514,13 @@ static inline float tonemap__sane_luminance(float y, tonemap_stats *stats)
 {
     if (sat__is_nan(y)) {
         stats->nan++;
-        return 0;
+        return sat__float_from_bits(TONEMAP__UNUSABLE);
     }
-    if (!sat__is_finite(y) && y > 0) stats->infinite++;
-    if (y < 0) stats->negative++;
+    if (y < 0) {
+        stats->negative++;
+        return sat__float_from_bits(TONEMAP__UNUSABLE);
+    }
+    if (!sat__is_finite(y)) stats->infinite++;
     return y < TONEMAP__DARKEST ? 0 : y > TONEMAP__BRIGHTEST ? TONEMAP__BRIGHTEST : y;
 }
 
@@ -638,7 +681,9 @@ static void tonemap__measure_bands(int begin, int end, int worker, void *context
     for (; y < y1; y++) {
         float *luminance = map->luminance + (size_t)y * (size_t)map->row;
         const float *pixels = tonemap__float_row(w->pixels, job->hdr, y);
+        size_t unusable = w->stats.nan + w->stats.negative;
         map->row_sum[y] = tonemap__measure_row(w, luminance, skips ? w->peak : NULL, pixels, job->hdr->channels, map->width);
+        map->row_unusable[y] = (unsigned char)(w->stats.nan + w->stats.negative > unusable);
         for (x = map->width; x < map->row; x++) luminance[x] = luminance[map->width - 1];
         if (skips && (y % TONEMAP__TILE == TONEMAP__TILE - 1 || y + 1 == map->height)) tonemap__store_peaks(map, w, y / TONEMAP__TILE);
     }
@@ -748,12 +793,17 @@ static inline int tonemap__measured_state(tonemap *map, double *state)
 /* Exponential approach with a time constant, exact for any step: two steps of dt / 2 are one of dt. */
 static inline void tonemap__adapt(tonemap *map, const double *measured, double dt_seconds)
 {
-    double tau = map->options.adapt_seconds, weight = tau > 0 && map->started ? -expm1(-dt_seconds / tau) : 1;
+    const tonemap_options *o = &map->options;
+    double tau = o->adapt_seconds, weight = tau > 0 ? -expm1(-dt_seconds / tau) : 1;
+    unsigned used = 1u << TONEMAP__AVERAGE | 1u << TONEMAP__KEY;
     int i;
+    if (!(o->white > 0)) used |= 1u << TONEMAP__WHITE;
+    if (tonemap__is_ashikhmin(o)) used |= 1u << TONEMAP__LOW | 1u << TONEMAP__HIGH;
     for (i = 0; i < TONEMAP__STATES; i++) {
-        if (weight >= 1) map->state[i] = measured[i];
+        if (weight >= 1 || !(map->known & used & 1u << i)) map->state[i] = measured[i]; /* what nobody knew yet is there at once */
         else map->state[i] += weight * (measured[i] - map->state[i]);
     }
+    map->known = used;
     map->started = 1;
 }
 
@@ -824,6 +874,7 @@ static inline void tonemap__prepare_frame(tonemap *map)
     f->inverse_white2 = !TONEMAP__HAS_WHITE || tonemap__is_infinite(white) ? 0 : (float)(1 / (white * white));
     f->epsilon = (float)o->epsilon;
     f->soft = (float)o->soft;
+    f->gamut = o->gamut < 0 ? -1 : (float)o->gamut;
     if (o->operation == TONEMAP_LINEAR && !tonemap__is_infinite(white)) f->curve_factor = (float)(1 / white);
     else f->curve_factor = 1;
     if (tonemap__is_ashikhmin(o)) {
@@ -1405,31 +1456,75 @@ static inline void tonemap__search_soft_plain(float *local, const float *luminan
 }
 
 #ifdef SAT__VECTOR
+/* What a step of soft scales takes and changes. */
+static inline sat__i32x4 tonemap__soft_step4(sat__f32x4 *c, sat__f32x4 *taken, sat__f32x4 *weight, sat__f32x4 v, const tonemap__frame *f, int k)
+{
+    sat__f32x4 limit = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(f->epsilon), *c), sat__f32x4_set1(f->term[k])), difference = sat__f32x4_sub(v, *c);
+    sat__f32x4 pass = sat__f32x4_sub(sat__f32x4_set1(1 + f->soft), sat__f32x4_div(sat__f32x4_abs(difference), limit));
+    pass = sat__f32x4_mul(pass, sat__f32x4_set1(1 / (2 * f->soft)));
+    *weight = sat__f32x4_mul(*weight, sat__f32x4_min(sat__f32x4_max(pass, sat__f32x4_set1(0)), sat__f32x4_set1(1)));
+    *taken = sat__f32x4_add(*taken, sat__f32x4_mul(*weight, difference));
+    *c = v;
+    return sat__f32x4_less(sat__f32x4_set1(0), *weight);
+}
+
+/* Sixteen pixels, spelt out to stay in registers; done when the last of them is. */
+static inline void tonemap__soft_group(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                       sat__i32x4 *passed, int x)
+{
+    sat__f32x4 factor = sat__f32x4_set1(f->scale), cap = sat__f32x4_set1(f->cap), half = sat__f32x4_set1(0.5f);
+    sat__f32x4 c0 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), factor), cap), t0 = c0, w0 = sat__f32x4_set1(1);
+    sat__f32x4 c1 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 4), factor), cap), t1 = c1, w1 = w0;
+    sat__f32x4 c2 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 8), factor), cap), t2 = c2, w2 = w0;
+    sat__f32x4 c3 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 12), factor), cap), t3 = c3, w3 = w0;
+    int k;
+    for (k = 0; k + 1 < f->boxes; k++) {
+        sat__f32x4 inverse = sat__f32x4_set1(window->inverse[k + 1]);
+        sat__i32x4 alive, n;
+        alive = tonemap__soft_step4(&c0, &t0, &w0, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), f, k);
+        alive = sat__i32x4_or(alive, tonemap__soft_step4(&c1, &t1, &w1, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 4), inverse), f, k));
+        alive = sat__i32x4_or(alive, tonemap__soft_step4(&c2, &t2, &w2, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 8), inverse), f, k));
+        alive = sat__i32x4_or(alive, tonemap__soft_step4(&c3, &t3, &w3, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 12), inverse), f, k));
+        if (!sat__i32x4_any(alive)) break;
+        n = sat__i32x4_add(sat__f32x4_less_equal(half, w0), sat__f32x4_less_equal(half, w1));
+        n = sat__i32x4_add(n, sat__i32x4_add(sat__f32x4_less_equal(half, w2), sat__f32x4_less_equal(half, w3)));
+        passed[k] = sat__i32x4_sub(passed[k], n);
+    }
+    sat__f32x4_store(local + x, t0);
+    sat__f32x4_store(local + x + 4, t1);
+    sat__f32x4_store(local + x + 8, t2);
+    sat__f32x4_store(local + x + 12, t3);
+}
+
+/* Four pixels, where boxes are clipped or a run ends. */
+static inline void tonemap__soft_four(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
+                                      sat__i32x4 *passed, int x, int end)
+{
+    sat__f32x4 c = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale)), sat__f32x4_set1(f->cap)), taken = c;
+    sat__f32x4 weight = sat__f32x4_select(tonemap__inside4(x, end), sat__f32x4_set1(1), sat__f32x4_set1(0));
+    int k, border = x < f->reach || x + 4 + f->reach > window->width;
+    for (k = 0; k + 1 < f->boxes; k++) {
+        sat__f32x4 inverse = border ? tonemap__inverse4(window, f, k + 1, x) : sat__f32x4_set1(window->inverse[k + 1]);
+        if (!sat__i32x4_any(tonemap__soft_step4(&c, &taken, &weight, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), f, k))) break;
+        passed[k] = sat__i32x4_sub(passed[k], sat__f32x4_less_equal(sat__f32x4_set1(0.5f), weight));
+    }
+    sat__f32x4_store(local + x, taken);
+}
+
 static inline void tonemap__search_soft_vector(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
                                                size_t *scale, int x, int end)
 {
-    sat__f32x4 one = sat__f32x4_set1(1), zero = sat__f32x4_set1(0), half = sat__f32x4_set1(0.5f), top = sat__f32x4_set1(1 + f->soft);
-    sat__f32x4 slope = sat__f32x4_set1(1 / (2 * f->soft)), cap = sat__f32x4_set1(f->cap);
     sat__i32x4 passed[TONEMAP__LENGTHS];
     int k;
     for (k = 0; k < TONEMAP__LENGTHS; k++) passed[k] = sat__i32x4_set1(0);
-    for (; x < end; x += 4) {
-        int border = x < f->reach || x + 4 + f->reach > window->width;
-        sat__f32x4 c = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale)), cap), taken = c;
-        sat__f32x4 weight = sat__f32x4_select(tonemap__inside4(x, end), one, zero);
-        for (k = 0; k + 1 < f->boxes; k++) {
-            sat__f32x4 inverse = border ? tonemap__inverse4(window, f, k + 1, x) : sat__f32x4_set1(window->inverse[k + 1]);
-            sat__f32x4 v = sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse);
-            sat__f32x4 limit = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(f->epsilon), c), sat__f32x4_set1(f->term[k]));
-            sat__f32x4 pass = sat__f32x4_sub(top, sat__f32x4_div(sat__f32x4_abs(sat__f32x4_sub(c, v)), limit));
-            pass = sat__f32x4_min(sat__f32x4_max(sat__f32x4_mul(pass, slope), zero), one);
-            weight = sat__f32x4_mul(weight, pass);
-            if (!sat__i32x4_any(sat__f32x4_less(zero, weight))) break;
-            taken = sat__f32x4_add(taken, sat__f32x4_mul(weight, sat__f32x4_sub(v, c)));
-            passed[k] = sat__i32x4_sub(passed[k], sat__f32x4_less_equal(half, weight));
-            c = v;
+    while (x < end) {
+        if (x >= f->reach && x + TONEMAP__GROUP <= end && x + TONEMAP__GROUP + f->reach <= window->width) {
+            tonemap__soft_group(local, luminance, window, f, passed, x);
+            x += TONEMAP__GROUP;
+        } else {
+            tonemap__soft_four(local, luminance, window, f, passed, x, end);
+            x += 4;
         }
-        sat__f32x4_store(local + x, taken);
     }
     tonemap__move_on(scale, passed, f->boxes - 1);
 }
@@ -1805,48 +1900,93 @@ static inline void tonemap__gain_row(tonemap *map, tonemap__worker *w, int y)
 
 typedef float tonemap__planes[3][TONEMAP__CHUNK];
 
+/* Colours beyond the display: the largest component is top > 1. Both ways keep the hue: dimming by top^-gamut, then going
+   towards the grey of the same luminance until the largest component is 1. Clipping each channel turns skies cyan. */
+#define TONEMAP__GAMUT_TOP 5.7646075e17f /* 2^59 */
+
+static inline void tonemap__gamut_plain(float *v, float top, float grey, float gamut, float floor)
+{
+    float dim, share;
+    int c;
+    top = top < TONEMAP__GAMUT_TOP ? top : TONEMAP__GAMUT_TOP;
+    dim = tonemap__exp2(-gamut * tonemap__log2(top));
+    grey = (grey < 1 ? grey : 1) * dim;
+    share = top * dim - grey;
+    share = (1 - grey) / (share > 1e-20f ? share : 1e-20f);
+    share = share < 1 ? share : 1;
+    for (c = 0; c < 3; c++) {
+        float d = (v[c] < TONEMAP__GAMUT_TOP ? v[c] : TONEMAP__GAMUT_TOP) * dim;
+        d = grey + (d - grey) * share;
+        v[c] = d > floor ? d : floor;
+    }
+}
+
+#ifdef SAT__VECTOR
+static inline void tonemap__gamut4(sat__f32x4 *v, sat__f32x4 top, sat__f32x4 grey, float gamut, sat__f32x4 least)
+{
+    sat__f32x4 one = sat__f32x4_set1(1), highest = sat__f32x4_set1(TONEMAP__GAMUT_TOP), tiny = sat__f32x4_set1(1e-20f), dim, share;
+    sat__i32x4 over = sat__f32x4_less(one, top);
+    int c;
+    top = sat__f32x4_max(sat__f32x4_min(top, highest), one);
+    dim = tonemap__exp2_4(sat__f32x4_mul(sat__f32x4_set1(-gamut), tonemap__log2_4(top)));
+    grey = sat__f32x4_mul(sat__f32x4_min(grey, one), dim);
+    share = sat__f32x4_max(sat__f32x4_sub(sat__f32x4_mul(top, dim), grey), tiny);
+    share = sat__f32x4_min(sat__f32x4_div(sat__f32x4_sub(one, grey), share), one);
+    for (c = 0; c < 3; c++) {
+        sat__f32x4 d = sat__f32x4_mul(sat__f32x4_min(v[c], highest), dim);
+        d = sat__f32x4_max(sat__f32x4_add(grey, sat__f32x4_mul(sat__f32x4_sub(d, grey), share)), least);
+        v[c] = sat__f32x4_select(over, d, v[c]);
+    }
+}
+#endif
+
 /* Pixels [x, x + n) times their gain, clipped to [floor, 1]. rho is NULL where nothing is mesopic. Comparisons are
    written so that NaN becomes the floor: it comes from pixels that are black. */
 static inline void tonemap__shade_plain(tonemap__planes out, const float *pixels, int channels, const float *luminance, const float *gain,
-                                        const float *rho, float floor, int x, int i, int n, size_t *clamped)
+                                        const float *rho, float floor, float gamut, int x, int i, int n, size_t *clamped)
 {
     for (; i < n; i++) {
         const float *p = pixels + (size_t)(x + i) * (size_t)channels;
         float v[3];
-        int c, over = 0;
+        float top = 1;
+        int c;
         v[0] = p[0];
         v[1] = p[channels > 1 ? 1 : 0];
         v[2] = p[channels > 1 ? 2 : 0];
         if (TONEMAP__HAS_MESOPIC && rho) tonemap__shift_red_plain(v, v + 1, v + 2, luminance[x + i], rho[x + i]);
         for (c = 0; c < 3; c++) {
             float d = v[c] * gain[x + i];
-            over |= d > 1;
-            d = d > floor ? d : floor;
-            out[c][i] = d < 1 ? d : 1;
+            v[c] = d > floor ? d : floor;
+            top = v[c] > top ? v[c] : top;
         }
-        *clamped += (size_t)over;
+        *clamped += (size_t)(top > 1);
+        if (top > 1 && gamut >= 0) tonemap__gamut_plain(v, top, luminance[x + i] * gain[x + i], gamut, floor);
+        for (c = 0; c < 3; c++) out[c][i] = v[c] < 1 ? v[c] : 1;
     }
 }
 
 #ifdef SAT__VECTOR
 static inline int tonemap__shade_vector(tonemap__planes out, const float *pixels, int channels, const float *luminance, const float *gain,
-                                        const float *rho, float floor, int x, int n, size_t *clamped)
+                                        const float *rho, float floor, float gamut, int x, int n, size_t *clamped)
 {
     sat__f32x4 one = sat__f32x4_set1(1), least = sat__f32x4_set1(floor);
     sat__i32x4 over = sat__i32x4_set1(0);
     int32_t count[4];
     int i;
     for (i = 0; i + 4 <= n; i += 4) {
-        sat__f32x4 r, g, b, factor = sat__f32x4_load(gain + x + i);
+        sat__f32x4 r, g, b, v[3], top, factor = sat__f32x4_load(gain + x + i);
+        sat__i32x4 beyond;
+        int c;
         tonemap__load_pixels(pixels + (size_t)(x + i) * (size_t)channels, channels, &r, &g, &b);
         if (TONEMAP__HAS_MESOPIC && rho) tonemap__shift_red4(&r, &g, &b, sat__f32x4_load(luminance + x + i), sat__f32x4_load(rho + x + i));
-        r = sat__f32x4_max(sat__f32x4_mul(r, factor), least);
-        g = sat__f32x4_max(sat__f32x4_mul(g, factor), least);
-        b = sat__f32x4_max(sat__f32x4_mul(b, factor), least);
-        over = sat__i32x4_sub(over, sat__f32x4_less(one, sat__f32x4_max(sat__f32x4_max(r, g), b)));
-        sat__f32x4_store(out[0] + i, sat__f32x4_min(r, one));
-        sat__f32x4_store(out[1] + i, sat__f32x4_min(g, one));
-        sat__f32x4_store(out[2] + i, sat__f32x4_min(b, one));
+        v[0] = sat__f32x4_max(sat__f32x4_mul(r, factor), least);
+        v[1] = sat__f32x4_max(sat__f32x4_mul(g, factor), least);
+        v[2] = sat__f32x4_max(sat__f32x4_mul(b, factor), least);
+        top = sat__f32x4_max(sat__f32x4_max(v[0], v[1]), v[2]);
+        beyond = sat__f32x4_less(one, top);
+        over = sat__i32x4_sub(over, beyond);
+        if (gamut >= 0 && sat__i32x4_any(beyond)) tonemap__gamut4(v, top, sat__f32x4_mul(sat__f32x4_load(luminance + x + i), factor), gamut, least);
+        for (c = 0; c < 3; c++) sat__f32x4_store(out[c] + i, sat__f32x4_min(v[c], one));
     }
     sat__i32x4_store(count, over);
     *clamped += (size_t)(count[0] + count[1] + count[2] + count[3]);
@@ -1903,18 +2043,18 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
     const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
     unsigned char *row = job->out + (ptrdiff_t)y * job->out_stride;
     int x, i, n, channels = job->hdr->channels;
-    float floor = job->as_float ? 0 : TONEMAP__CODE_FLOOR;
+    float floor = job->as_float ? 0 : TONEMAP__CODE_FLOOR, gamut = channels > 1 ? map->frame.gamut : -1;
     tonemap__planes v;
     for (x = 0; x < map->width; x += n) {
         size_t at = (size_t)x * (size_t)channels;
         float *as_float = (float *)(void *)row + at;
         n = sat__min_int(TONEMAP__CHUNK, map->width - x);
 #ifdef SAT__VECTOR
-        i = tonemap__shade_vector(v, pixels, channels, luminance, w->local, rho, floor, x, n, &w->stats.clamped);
+        i = tonemap__shade_vector(v, pixels, channels, luminance, w->local, rho, floor, gamut, x, n, &w->stats.clamped);
 #else
         i = 0;
 #endif
-        tonemap__shade_plain(v, pixels, channels, luminance, w->local, rho, floor, x, i, n, &w->stats.clamped);
+        tonemap__shade_plain(v, pixels, channels, luminance, w->local, rho, floor, gamut, x, i, n, &w->stats.clamped);
         if (channels == 4) /* alpha: before the colours, which may overwrite the input */
             for (i = 0; i < n; i++) {
                 float alpha = tonemap__unit(pixels[at + 4 * (size_t)i + 3]);
@@ -1950,6 +2090,48 @@ static void tonemap__map_bands(int begin, int end, int worker, void *context)
     }
 }
 
+/* ---- unusable pixels: NaN and negative luminances, which resampling leaves beside lamps, show the mean of what the
+   usable ones around them show, out of the nearest square that has some. After the picture: in place the input is gone. */
+
+static inline int tonemap__is_unusable(const tonemap *map, int x, int y)
+{
+    return sat__float_bits(map->luminance[(size_t)y * (size_t)map->row + (size_t)x]) == TONEMAP__UNUSABLE;
+}
+
+static inline void tonemap__fill_pixel(const tonemap__job *job, int x, int y)
+{
+    const tonemap *map = job->map;
+    int channels = job->hdr->channels, colours = channels == 1 ? 1 : 3, radius, u, v, c, n = 0;
+    size_t element = job->as_float ? sizeof(float) : 1;
+    float sum[3] = {0, 0, 0};
+    unsigned char *at;
+    for (radius = 1; radius <= 3 && !n; radius++)
+        for (v = sat__max_int(y - radius, 0); v <= sat__min_int(y + radius, map->height - 1); v++)
+            for (u = sat__max_int(x - radius, 0); u <= sat__min_int(x + radius, map->width - 1); u++) {
+                if (tonemap__is_unusable(map, u, v)) continue;
+                at = job->out + (ptrdiff_t)v * job->out_stride + (size_t)u * (size_t)channels * element;
+                for (c = 0; c < colours; c++) sum[c] += job->as_float ? ((const float *)(const void *)at)[c] : at[c];
+                n++;
+            }
+    at = job->out + (ptrdiff_t)y * job->out_stride + (size_t)x * (size_t)channels * element;
+    for (c = 0; c < colours && n; c++) {
+        if (job->as_float) ((float *)(void *)at)[c] = sum[c] / (float)n;
+        else at[c] = (unsigned char)(sum[c] / (float)n + 0.5f);
+    }
+}
+
+static void tonemap__fill_bands(int begin, int end, int worker, void *context)
+{
+    const tonemap__job *job = (const tonemap__job *)context;
+    int x, y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, job->map->height);
+    (void)worker;
+    for (; y < y1; y++) {
+        if (!job->map->row_unusable[y]) continue;
+        for (x = 0; x < job->map->width; x++)
+            if (tonemap__is_unusable(job->map, x, y)) tonemap__fill_pixel(job, x, y);
+    }
+}
+
 /* ---- calls */
 
 static inline void tonemap__carve(tonemap *map, sat__arena *arena)
@@ -1959,6 +2141,7 @@ static inline void tonemap__carve(tonemap *map, sat__arena *arena)
     map->worker = (tonemap__worker *)sat__carve(arena, (size_t)map->workers, sizeof *map->worker);
     map->luminance = (float *)sat__carve(arena, height, row * sizeof(float));
     map->row_sum = (float *)sat__carve(arena, height, sizeof(float));
+    map->row_unusable = (unsigned char *)sat__carve(arena, height, 1);
     map->tile_range = (tonemap__range *)sat__carve(arena, tiles, sizeof *map->tile_range);
     map->tile_reached = (tonemap__range *)sat__carve(arena, tiles, sizeof *map->tile_reached);
     map->tile_peak = (float *)sat__carve(arena, tiles, sizeof(float));
@@ -2063,6 +2246,7 @@ static inline sat_result tonemap__apply(tonemap__job *job, double dt_seconds, to
     tonemap__prepare_frame(map);
     map->skipping = tonemap__skips(&map->options) && tonemap__plan_skipping(map, job);
     sat__parallel_for(threads, bands, tonemap__map_bands, job);
+    if (map->stats.nan + map->stats.negative) sat__parallel_for(threads, bands, tonemap__fill_bands, job);
     tonemap__finish_stats(map);
     if (stats) *stats = map->stats;
     return SAT_OK;
@@ -2190,7 +2374,11 @@ TONEMAP_DEF const char *tonemap_gl_glsl(void) { return tonemap__glsl_library; }
 static const char tonemap__glsl_luminance[] =
     "uniform sampler2D hdr;\n"
     "out float value;\n"
-    "void main() { value = tonemap_luminance(texelFetch(hdr, ivec2(gl_FragCoord.xy), 0).rgb); }\n";
+    "void main() {\n"
+    "    vec3 rgb = texelFetch(hdr, ivec2(gl_FragCoord.xy), 0).rgb;\n"
+    "    uint bits = floatBitsToUint(0.2126729 * rgb.r + 0.7151522 * rgb.g + 0.0721750 * rgb.b);\n"
+    "    value = bits > 0x7f800000u && bits != 0x80000000u ? -1.0 : tonemap_luminance(rgb);\n" /* -1: unusable */
+    "}\n";
 
 /* Sums over 4 x 4 texels. Texel: whole and 2^-16 parts of the sum of log2, carried over; pixels; the float sum of the
    luminances. Integers, so that the log-average is the CPU's. The polynomial is the CPU's, too. */
@@ -2297,7 +2485,7 @@ static const char tonemap__glsl_frame[] =
 static const char tonemap__glsl_quantize[] =
     "out uint value;\n"
     "void main() {\n"
-    "    float v = min(texelFetch(luminance, ivec2(gl_FragCoord.xy), 0).x * tonemap_scale(), TONEMAP_CAP);\n"
+    "    float v = clamp(texelFetch(luminance, ivec2(gl_FragCoord.xy), 0).x * tonemap_scale(), 0.0, TONEMAP_CAP);\n"
     "    value = uint(v * TONEMAP_STEPS + 0.5);\n"
     "}\n";
 
@@ -2332,7 +2520,7 @@ static const char tonemap__glsl_search[] =
     "#else\n"
     "float tonemap_find(ivec2 p, float own, float key) { return tonemap_local(table, 1.0 / TONEMAP_STEPS, p, own, key); }\n"
     "#endif\n"
-    "float tonemap_at(ivec2 p) { return texelFetch(luminance, clamp(p, ivec2(0), textureSize(luminance, 0) - 1), 0).x; }\n"
+    "float tonemap_at(ivec2 p) { return max(texelFetch(luminance, clamp(p, ivec2(0), textureSize(luminance, 0) - 1), 0).x, 0.0); }\n"
     "bool tonemap_is_edge(ivec2 p, float scale) {\n"
     "    float a = tonemap_at(p + ivec2(-1, -1)), b = tonemap_at(p + ivec2(0, -1)), c = tonemap_at(p + ivec2(1, -1));\n"
     "    float d = tonemap_at(p + ivec2(-1, 0)), e = tonemap_at(p + ivec2(1, 0));\n"
@@ -2352,16 +2540,21 @@ static const char tonemap__glsl_map[] =
     "    if (cd < 1.0) return 16.5431894 + ln / 0.4027;\n"
     "    return cd < 7.2444 ? 16.5431894 + (cd - 1.0) / 0.4027 : ln / 0.0556 - 3.56579561;\n"
     "}\n"
-    "void main() {\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+    "vec3 tonemap_gamut(vec3 v, float grey) {\n"
+    "    v = min(max(v, 0.0), 5.7646075e17);\n"
+    "    float top = max(max(v.r, v.g), v.b);\n"
+    "    if (TONEMAP_GAMUT < 0.0 || !(top > 1.0)) return v;\n"
+    "    float dim = exp2(-TONEMAP_GAMUT * log2(top));\n"
+    "    grey = min(grey, 1.0) * dim;\n"
+    "    return grey + (v * dim - grey) * min((1.0 - grey) / max(top * dim - grey, 1e-20), 1.0);\n"
+    "}\n"
+    "vec3 tonemap_display(ivec2 p) {\n"
     "    vec3 rgb = texelFetch(hdr, p, 0).rgb;\n"
     "    vec4 first = texelFetch(state, ivec2(0), 0), second = texelFetch(state, ivec2(1, 0), 0);\n"
     "    float y = texelFetch(luminance, p, 0).x, scale = tonemap_scale(), key = tonemap_key(), own = y * scale, la = own, beyond = 1.0;\n"
     "    float cd = cd_per_unit > 0.0 ? cd_per_unit : 10.0 * exp2(-first.x);\n"
-    "    if (!(y > 0.0)) {\n"
-    "        value = vec4(0.0, 0.0, 0.0, 1.0);\n"
-    "        return;\n"
-    "    }\n"
+    "    float gain;\n"
+    "    if (!(y > 0.0)) return vec3(0.0);\n"
     "#if TONEMAP_OPERATOR == 0 || TONEMAP_OPERATOR == 2\n"
     "    if (TONEMAP_SELECTIVE <= 0.0 || tonemap_is_edge(p, scale)) {\n"
     "        la = tonemap_find(p, own, key);\n"
@@ -2376,14 +2569,24 @@ static const char tonemap__glsl_map[] =
     "#if TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 3\n"
     "    float low = tonemap_capacity(cd * exp2(second.x)), high = tonemap_capacity(cd * exp2(second.y)), display = key;\n"
     "    if (second.y - second.x > 0.125) display = (tonemap_capacity(la * cd / scale) - low) / (high - low);\n"
-    "    rgb *= max(display, 0.0) * scale / max(la, 7.8886e-31);\n"
+    "    gain = max(display, 0.0) * scale / max(la, 7.8886e-31);\n"
     "#elif TONEMAP_OPERATOR == 4\n"
-    "    rgb *= scale * (TONEMAP_BURN == 1 ? exp2(-first.z) : 1.0);\n"
+    "    gain = scale * (TONEMAP_BURN == 1 ? exp2(-first.z) : 1.0);\n"
     "#else\n"
     "    float burn = TONEMAP_BURN == 1 ? exp2(-2.0 * first.z) : 0.0;\n"
-    "    rgb *= scale * (1.0 + min(own, 1.1529215e18) * burn) / (1.0 + la * beyond);\n"
+    "    gain = scale * (1.0 + min(own, 1.1529215e18) * burn) / (1.0 + la * beyond);\n"
     "#endif\n"
-    "    value = vec4(tonemap_srgb(rgb), 1.0);\n"
+    "    return tonemap_srgb(tonemap_gamut(rgb * gain, y * gain));\n"
+    "}\n"
+    "void main() {\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy), high = textureSize(luminance, 0) - 1;\n"
+    "    vec4 sum = vec4(0.0);\n"
+    "    int radius = texelFetch(luminance, p, 0).x < 0.0 ? 1 : 0;\n" /* an unusable pixel shows those around it */
+    "    for (int last = radius * 3; radius <= last && sum.a == 0.0; radius++)\n"
+    "        for (int y = max(p.y - radius, 0); y <= min(p.y + radius, high.y); y++)\n"
+    "            for (int x = max(p.x - radius, 0); x <= min(p.x + radius, high.x); x++)\n"
+    "                if (texelFetch(luminance, ivec2(x, y), 0).x >= 0.0) sum += vec4(tonemap_display(ivec2(x, y)), 1.0);\n"
+    "    value = vec4(sum.rgb / max(sum.a, 1.0), 1.0);\n"
     "}\n";
 
 enum { TONEMAP__LEVELS = 14, TONEMAP__BIN_ROWS = (TONEMAP__BINS + 63) / 64, TONEMAP__GL_UNITS = 4 };
@@ -2412,7 +2615,7 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     const tonemap_options *o = &g->options;
     int ashikhmin = tonemap__is_ashikhmin(o);
     sat__gl *gl = &g->gl;
-    sat__gl_define(gl, "TONEMAP_OPERATOR", (int)o->operation);
+    sat__gl_define(gl, "TONEMAP_OPERATOR", (int)(o->operation == TONEMAP_PHOTOGRAPHIC_LOCAL && o->scales == 1 ? TONEMAP_PHOTOGRAPHIC_GLOBAL : o->operation));
     sat__gl_define(gl, "TONEMAP_MESOPIC", (int)o->mesopic);
     sat__gl_define(gl, "TONEMAP_SCALES", o->scales);
     sat__gl_define(gl, "TONEMAP_SOFT", o->soft > 0);
@@ -2421,6 +2624,7 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define(gl, "TONEMAP_BURN", !tonemap__is_infinite(o->white));
     sat__gl_define_float(gl, "TONEMAP_EPSILON", (float)o->epsilon);
     sat__gl_define_float(gl, "TONEMAP_PHI_TERM", (float)(o->epsilon * exp2(o->phi)));
+    sat__gl_define_float(gl, "TONEMAP_GAMUT", o->gamut < 0 ? -1.0f : (float)o->gamut);
     sat__gl_define_float(gl, "TONEMAP_SOFTNESS", (float)o->soft);
     sat__gl_define_float(gl, "TONEMAP_SELECTIVE", (float)o->selective);
     sat__gl_define_float(gl, "TONEMAP_CAP", ashikhmin ? 1.0f : TONEMAP__LOCAL_CAP);

@@ -140,6 +140,45 @@ TEST(gl_gives_the_cpus_picture)
     screen_close(&s);
 }
 
+/* First, last and default of every option, in pairs: OpenGL takes what the CPU takes, and shows the same. */
+TEST(gl_takes_every_corner_of_the_options)
+{
+    screen s;
+    int n = SAT__COUNT(tonemap__fields), i, j, a, b, turn = 0;
+    if (!screen_open(&s)) return;
+    for (i = 0; i < n; ++i)
+        for (j = 0; j < i; ++j)
+            for (a = 0; a < 2; ++a)
+                for (b = 0; b < 2; ++b) {
+                    const sat__field *f = &tonemap__fields[i], *g = &tonemap__fields[j];
+                    tonemap_options o = tonemap_defaults();
+                    tonemap_gl *gl = NULL;
+                    tonemap *map = NULL;
+                    if (strchr("at", f->type) || strchr("at", g->type)) continue;
+                    sat__field_set(f, &o, a ? f->high : f->low);
+                    sat__field_set(g, &o, b ? g->high : g->low);
+                    EXPECT_EQ(tonemap_create(&map, 16, 16, &o), SAT_OK);
+                    tonemap_destroy(map);
+                    if (++turn % 9 && o.scales > 1) continue; /* each costs eight programs: a ninth of them, and all with one scale */
+                    if (!EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, 16, 16, &o), SAT_OK)) puts(tonemap_gl_message(gl));
+                    tonemap_gl_destroy(gl);
+                }
+    {
+        tonemap_options o = tonemap_defaults();
+        o.scales = 1;
+        compare(&s, &o, 40, 30, 1, 0.001, "one scale");
+        o.selective = 0.1;
+        compare(&s, &o, 16, 16, 0, 0.001, NULL);
+        o = tonemap_defaults(), o.gamut = 0;
+        compare(&s, &o, 100, 90, 1, 0.001, "gamut by fading");
+        o.gamut = 1;
+        compare(&s, &o, 100, 90, 1, 0.001, "gamut by dimming");
+        o.gamut = -1, o.soft = 0;
+        compare(&s, &o, 100, 90, 1, 0.001, "hard scales, clipped channels");
+    }
+    screen_close(&s);
+}
+
 /* The same in GLSL ES 3.00, on the same driver. */
 TEST(gl_shaders_are_es)
 {
