@@ -183,29 +183,30 @@ typedef struct ssao_sat_input {
     int left_handed;           /* 0; 1: the camera looks along +z (Direct3D): of the matrix, the normals and the bent normals */
 } ssao_sat_input;
 
+/* default; range */
 typedef struct ssao_sat_options {
-    ssao_sat_method method;  /* SSAO_SAT_SLABS */
-    double radius;           /* 0.5 world units; >= 0: occluders farther away than this do not count; 0: all is open */
-    double gain;             /* 1; >= 0: times the strength fitted for the method; 0: all is open */
-    double power;            /* 1; > 0: exponent on the accessibility, on top of the fitted one */
-    int half_resolution;     /* 1; tables and estimates from every second pixel of every second row, then a
-                                plane-aware upsample (5.5) */
+    ssao_sat_method method;  /* SSAO_SAT_SLABS; 0..4 */
+    double radius;           /* 0.5; 0..1e15; world units: occluders farther away than this do not count; 0: all is open */
+    double gain;             /* 1; 0..1e6; times the strength fitted for the method; 0: all is open */
+    double power;            /* 1; 0.001..1000; exponent on the accessibility, on top of the fitted one */
+    int half_resolution;     /* 1; 0..1; tables and estimates for every second pixel of every second row, then a plane-aware
+                                upsample (5.5); SLABS: the tables hold all pixels, the others every fourth */
     int slabs;               /* 8; 1..16; 4 halve the memory */
-    int scales;              /* 3; 1..4: rings of cells, each a third of the one before */
-    int plane_boxes;         /* 2; 1 or 2: PLANE uses n x n boxes */
-    double normal_offset;    /* 1.5; >= 0: NORMAL_GUIDED, REFINED: shift of the region, in its half sizes; 0: no shift */
+    int scales;              /* 3; 1..4; rings of cells, each a third of the one before */
+    int plane_boxes;         /* 2; 1..2; PLANE uses n x n boxes */
+    double normal_offset;    /* 1.5; 0..1000; NORMAL_GUIDED, REFINED: shift of the region, in its half sizes */
     int refine_levels;       /* 2; 0..2 */
-    double refine_threshold; /* 0.15; >= 0: regions are split while |mean - depth| < this part of the depth */
-    int as_printed;          /* 0; 1: the text of 5.4.2 and 5.4.3 to the letter: shift along n.xy, keep the children of higher value */
-    double region_pixels;    /* 0: the region follows the projected radius; > 0: half its side in pixels, for all pixels */
-    double depth_gain;       /* 0; gain grows by this factor from the nearest to the farthest pixel (published methods) */
-    int inverted_depth;      /* 0; 1: published methods average 1 / depth (5.5) */
-    int float_table;         /* 0: integers modulo 2^32; 1: floats, 2: floats less the mean (4.6): for comparison only */
-    double min_pixels;       /* 1.5; >= 1: regions with a smaller half side fade out, measured in pixels of the tables */
-    double max_pixels;       /* 256; min_pixels..512: regions are cut to this half side */
-    int band_rows;           /* 0: tables of the whole picture; >= 16: of this many rows and a radius above and below */
-    int bottom_up;           /* 0; 1: row 0 is the bottom of the picture, in all buffers */
-    int skip_flat;           /* 1; regions that are one plane are not looked at */
+    double refine_threshold; /* 0.15; 0..1e6; regions are split while |mean - depth| < this part of the depth */
+    int as_printed;          /* 0; 0..1; the text of 5.4.2 and 5.4.3 to the letter: shift along n.xy, keep the children of higher value */
+    double region_pixels;    /* 0; 0..512; 0: the region follows the projected radius; else half its side in pixels, for all pixels */
+    double depth_gain;       /* 0; -1..1e6; gain grows by this factor from the nearest to the farthest pixel (published methods) */
+    int inverted_depth;      /* 0; 0..1; published methods average 1 / depth (5.5) */
+    int float_table;         /* 0; 0..2; integers modulo 2^32; 1: floats, 2: floats less the mean (4.6): for comparison only */
+    double min_pixels;       /* 1.5; 1..512; regions with a smaller half side fade out, measured in pixels of the tables */
+    double max_pixels;       /* 256; 1..512; at least min_pixels: regions are cut to this half side */
+    int band_rows;           /* 0; 16..32768 or 0; tables of this many rows and a radius above and below; 0: of the whole picture */
+    int bottom_up;           /* 0; 0..1; row 0 is the bottom of the picture, in all buffers */
+    int skip_flat;           /* 1; 0..1; regions that are one plane are not looked at */
     sat_allocator allocator; /* malloc; used by create and destroy only */
     sat_threads threads;     /* serial; same bits for any worker count */
 } ssao_sat_options;
@@ -240,8 +241,15 @@ SSAO_SAT_DEF ssao_sat_options ssao_sat_defaults(void);
 /* Linear depth and a symmetric perspective of this vertical field of view: fill in buffers and strides. */
 SSAO_SAT_DEF ssao_sat_input ssao_sat_input_linear(const float *depth, int width, int height, double vertical_fov);
 
-/* Scratch memory for pictures of this size; exactly one allocation. 1 <= width, height <= 32768. */
+/* Scratch memory for pictures of this size; exactly one allocation. 1 <= width, height <= 32768. NULL options: the defaults. */
 SSAO_SAT_DEF sat_result ssao_sat_create(ssao_sat **out, int width, int height, const ssao_sat_options *options);
+/* Another size or other options in the memory that create took: SAT_ERR_SIZE when it does not hold them, and nothing changes. The
+   allocator stays; NULL options: as they are. Costs nothing but where the layout changes (one pass over the memory). */
+SSAO_SAT_DEF sat_result ssao_sat_resize(ssao_sat *ao, int width, int height, const ssao_sat_options *options);
+/* What create or apply says SAT_ERR_ARGUMENT to, in a sentence ("scales is 99; 1..4") written into `text` and returned; "" for
+   nothing. */
+SSAO_SAT_DEF const char *ssao_sat_explain(char *text, size_t size, int width, int height, const ssao_sat_options *options);
+SSAO_SAT_DEF const char *ssao_sat_explain_input(char *text, size_t size, const ssao_sat_input *input);
 /* Accessibility of every pixel, 0 blocked .. 1 open; sky is 1. Allocates nothing. The output must not overlap the
    input. stats may be NULL. On an error nothing is written. */
 SSAO_SAT_DEF sat_result ssao_sat_apply(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride, const ssao_sat_input *input,
@@ -256,6 +264,11 @@ SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, 
    -1..1: negative in creases and beside nearer objects, positive on ridges and rims. Sky is 0. From the same table. */
 SSAO_SAT_DEF sat_result ssao_sat_apply_signed(ssao_sat *ao, float *out, ptrdiff_t out_stride, const ssao_sat_input *input,
                                               ssao_sat_stats *stats);
+/* Light that bounces more than once (Jimenez 2016, eq 10): accessibility of a surface with this albedo, 0..1, one colour at a time. */
+SSAO_SAT_DEF float ssao_sat_multi_bounce(float accessibility, float albedo);
+/* How much of a highlight is open (Jimenez 2016, section 6): the overlap of two cones, that of the accessibility around the bent
+   normal and that of the reflection. cosine: between bent normal and reflected view direction; roughness 0..1. */
+SSAO_SAT_DEF float ssao_sat_specular(float accessibility, float cosine, float roughness);
 SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao); /* NULL is fine */
 
 #ifdef __cplusplus
@@ -284,6 +297,9 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *g
    view-space normal, signed; 0: from depth. out: a colour-renderable texture of the caller whose red gets the accessibility, or 0 for
    the object's own R32F, ssao_sat_gl_texture(). Of `input` only width, height, depth_kind, projection, clip_zero_to_one and sky count. */
 SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigned depth, unsigned normals, const ssao_sat_input *input);
+/* Other options from the next frame on. Those that shaders and textures are made for stay: method, half_resolution, slabs, scales,
+   plane_boxes, refine_levels, as_printed, inverted_depth: SAT_ERR_MISMATCH when one differs. The rest are uniforms and free. */
+SSAO_SAT_DEF sat_result ssao_sat_gl_set_options(ssao_sat_gl *gl, const ssao_sat_options *options);
 SSAO_SAT_DEF unsigned ssao_sat_gl_texture(const ssao_sat_gl *gl);
 /* What the last SAT_ERR_GL_... was about; never NULL. */
 SSAO_SAT_DEF const char *ssao_sat_gl_message(const ssao_sat_gl *gl);
@@ -497,28 +513,47 @@ struct ssao_sat {
 
 SSAO_SAT_DEF int ssao_sat_version(void) { return SSAO_SAT_VERSION; }
 
+/* Defaults, ranges and names of the options: the comments of the struct say the same. */
+#ifdef SSAO_SAT_NO_SLABS
+enum { SSAO_SAT__FIRST_METHOD = SSAO_SAT_PLANE };
+#else
+enum { SSAO_SAT__FIRST_METHOD = SSAO_SAT_SLABS };
+#endif
+#ifdef SSAO_SAT_NO_REFINED
+enum { SSAO_SAT__LAST_METHOD = SSAO_SAT_NORMAL_GUIDED };
+#else
+enum { SSAO_SAT__LAST_METHOD = SSAO_SAT_REFINED };
+#endif
+static const sat__field ssao_sat__fields[] = {
+    SAT__FIELD(ssao_sat_options, 'i', method, SSAO_SAT__FIRST_METHOD, SSAO_SAT__FIRST_METHOD, SSAO_SAT__LAST_METHOD, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', radius, 0.5, 0, 1e15, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', gain, 1, 0, 1e6, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', power, 1, 0.001, 1000, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', half_resolution, 1, 0, 1, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', slabs, 8, 1, 16, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', scales, 3, 1, 4, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', plane_boxes, 2, 1, 2, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', normal_offset, 1.5, 0, 1000, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', refine_levels, 2, 0, 2, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', refine_threshold, 0.15, 0, 1e6, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', as_printed, 0, 0, 1, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', region_pixels, 0, 0, 512, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', depth_gain, 0, -1, 1e6, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', inverted_depth, 0, 0, 1, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', float_table, 0, 0, 2, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', min_pixels, 1.5, 1, 512, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', max_pixels, 256, 1, 512, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', band_rows, 0, 16, 32768, '0'),
+    SAT__FIELD(ssao_sat_options, 'i', bottom_up, 0, 0, 1, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', skip_flat, 1, 0, 1, ' '),
+    SAT__FIELD(ssao_sat_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(ssao_sat_options, 't', threads, 0, 0, 0, ' ')};
+enum { SSAO_SAT__FIELDS = sizeof ssao_sat__fields / sizeof ssao_sat__fields[0] };
+
 SSAO_SAT_DEF ssao_sat_options ssao_sat_defaults(void)
 {
     ssao_sat_options o;
-    memset(&o, 0, sizeof o);
-#ifdef SSAO_SAT_NO_SLABS
-    o.method = SSAO_SAT_PLANE;
-#else
-    o.method = SSAO_SAT_SLABS;
-#endif
-    o.radius = 0.5;
-    o.gain = 1;
-    o.power = 1;
-    o.half_resolution = 1;
-    o.slabs = 8;
-    o.scales = 3;
-    o.plane_boxes = 2;
-    o.normal_offset = 1.5;
-    o.refine_levels = 2;
-    o.refine_threshold = 0.15;
-    o.min_pixels = 1.5;
-    o.max_pixels = 256;
-    o.skip_flat = 1;
+    sat__fields_default(&o, sizeof o, ssao_sat__fields, SSAO_SAT__FIELDS);
     return o;
 }
 
@@ -2008,16 +2043,14 @@ static int ssao_sat__overlap(const void *a, ptrdiff_t a_stride, size_t a_bytes, 
     return a0 < b1 + b_bytes && b0 < a1 + a_bytes;
 }
 
+static const char *ssao_sat__bad_buffer(ssao_sat_input *in);
+
 static sat_result ssao_sat__check_input(ssao_sat *s, const ssao_sat_input *input)
 {
     ssao_sat_input *in = &s->input;
     *in = *input;
     if (in->width != s->width || in->height != s->height) return SAT_ERR_MISMATCH;
-    if ((unsigned)in->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED || !in->depth == !in->half_depth) return SAT_ERR_ARGUMENT;
-    if (!(in->sky >= 0)) return SAT_ERR_ARGUMENT;
-    if (in->depth && !ssao_sat__rows_are_valid(in->depth, &in->depth_stride, in->height, (size_t)in->width * 4, 4)) return SAT_ERR_ARGUMENT;
-    if (in->half_depth && !ssao_sat__rows_are_valid(in->half_depth, &in->depth_stride, in->height, (size_t)in->width * 2, 2)) return SAT_ERR_ARGUMENT;
-    if (in->normals && !ssao_sat__rows_are_valid(in->normals, &in->normal_stride, in->height, (size_t)in->width * 12, 4)) return SAT_ERR_ARGUMENT;
+    if ((unsigned)in->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED || !(in->sky >= 0) || ssao_sat__bad_buffer(in)) return SAT_ERR_ARGUMENT;
     return ssao_sat__read_camera(&s->camera, in, s->step, s->options.bottom_up) ? SAT_OK : SAT_ERR_ARGUMENT;
 }
 
@@ -2084,24 +2117,63 @@ SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, 
 }
 #endif
 
-static int ssao_sat__in_range(double v, double low, double high) { return v >= low && v <= high; } /* NaN is not */
-
 static int ssao_sat__options_are_valid(const ssao_sat_options *o)
 {
-#ifdef SSAO_SAT_NO_SLABS
-    if (o->method == SSAO_SAT_SLABS) return 0;
-#endif
-#ifdef SSAO_SAT_NO_REFINED
-    if (o->method == SSAO_SAT_REFINED) return 0;
-#endif
-    return (unsigned)o->method <= (unsigned)SSAO_SAT_REFINED && ssao_sat__in_range(o->radius, 0, 1e15) && ssao_sat__in_range(o->gain, 0, 1e6) &&
-           o->power > 0 && ssao_sat__in_range(o->power, 0, 1e3) && (o->half_resolution == 0 || o->half_resolution == 1) &&
-           ssao_sat__in_range(o->slabs, 1, SSAO_SAT__MAX_SLABS) && ssao_sat__in_range(o->scales, 1, SSAO_SAT__MAX_SCALES) &&
-           ssao_sat__in_range(o->plane_boxes, 1, 2) && ssao_sat__in_range(o->normal_offset, 0, 1e3) && ssao_sat__in_range(o->refine_levels, 0, 2) &&
-           ssao_sat__in_range(o->refine_threshold, 0, 1e6) && ssao_sat__in_range(o->region_pixels, 0, 512) &&
-           ssao_sat__in_range(o->depth_gain, -1, 1e6) && ssao_sat__in_range(o->float_table, 0, 2) && ssao_sat__in_range(o->min_pixels, 1, 512) &&
-           ssao_sat__in_range(o->max_pixels, o->min_pixels, 512) && (o->band_rows == 0 || o->band_rows >= 16) && ssao_sat__in_range(o->skip_flat, 0, 1) &&
-           sat__threads_are_valid(&o->threads);
+    return !sat__fields_check(o, ssao_sat__fields, SSAO_SAT__FIELDS) && o->max_pixels >= o->min_pixels;
+}
+
+SSAO_SAT_DEF const char *ssao_sat_explain(char *text, size_t size, int width, int height, const ssao_sat_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    ssao_sat_options o = options ? *options : ssao_sat_defaults();
+    const sat__field *field = sat__fields_check(&o, ssao_sat__fields, SSAO_SAT__FIELDS);
+    if (width < 1 || width > 32768) sat__text_range(&t, "width", width, 1, 32768, ' ');
+    else if (height < 1 || height > 32768) sat__text_range(&t, "height", height, 1, 32768, ' ');
+    else if (field) sat__text_field(&t, field, &o);
+    else if (o.max_pixels < o.min_pixels) sat__text_range(&t, "max_pixels (from min_pixels on)", o.max_pixels, o.min_pixels, 512, ' ');
+    return t.size ? text : "";
+}
+
+/* NULL: depth, strides and normals are as they must be. Resolves strides of 0. */
+static const char *ssao_sat__bad_buffer(ssao_sat_input *in)
+{
+    if (!in->depth == !in->half_depth) return "depth or half_depth, one of them, is needed";
+    if (in->depth && !ssao_sat__rows_are_valid(in->depth, &in->depth_stride, in->height, (size_t)in->width * 4, 4))
+        return "depth: not aligned, or depth_stride is less than a row or no multiple of 4";
+    if (in->half_depth && !ssao_sat__rows_are_valid(in->half_depth, &in->depth_stride, in->height, (size_t)in->width * 2, 2))
+        return "half_depth: not aligned, or depth_stride is less than a row or odd";
+    if (in->normals && !ssao_sat__rows_are_valid(in->normals, &in->normal_stride, in->height, (size_t)in->width * 12, 4))
+        return "normals: not aligned, or normal_stride is less than a row or no multiple of 4";
+    return NULL;
+}
+
+/* NULL: the view is one. */
+static const char *ssao_sat__bad_view(const ssao_sat_input *in)
+{
+    ssao_sat__camera camera;
+    ssao_sat_input linear = *in;
+    linear.depth_kind = SSAO_SAT_DEPTH_LINEAR;
+    if ((unsigned)in->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED) return "depth_kind is none of the three";
+    if (!(in->sky >= 0)) return "sky is negative or NaN";
+    if (!ssao_sat__read_camera(&camera, &linear, 1, 0))
+        return "projection: neither a perspective ([11] < 0, left-handed > 0) nor an orthographic matrix ([15] > 0), or it has other entries that are not 0";
+    if (!ssao_sat__read_camera(&camera, in, 1, 0)) return "projection maps depth the other way than depth_kind says, or not at all";
+    return NULL;
+}
+
+SSAO_SAT_DEF const char *ssao_sat_explain_input(char *text, size_t size, const ssao_sat_input *input)
+{
+    sat__text t = sat__text_begin(text, size);
+    const char *wrong = NULL;
+    ssao_sat_input in;
+    if (!input) wrong = "input is NULL";
+    else {
+        in = *input;
+        if (in.width < 1 || in.height < 1) wrong = "width and height must be those of ssao_sat_create";
+        else if ((wrong = ssao_sat__bad_buffer(&in)) == NULL) wrong = ssao_sat__bad_view(&in);
+    }
+    if (wrong) sat__text_add(&t, wrong);
+    return t.size ? text : "";
 }
 
 /* The same calls measure (base NULL) and lay out the one block. */
@@ -2132,12 +2204,45 @@ static int ssao_sat__lay_out(ssao_sat *s, sat__arena *arena)
     return !arena->overflow;
 }
 
+/* The sizes of everything for s->options; 0 when they overflow. `used` gets the bytes. */
+static int ssao_sat__measure(ssao_sat *s, int width, int height, size_t *used)
+{
+    sat__arena arena;
+    s->width = width;
+    s->height = height;
+    s->step = s->options.half_resolution ? 2 : 1;
+    s->columns = (width + s->step - 1) / s->step;
+    s->rows = (height + s->step - 1) / s->step;
+    s->reserve = (int)s->options.max_pixels + 4;
+    s->capacity = s->options.band_rows ? sat__min_int(s->rows, s->options.band_rows + 2 * s->reserve) : s->rows;
+    s->stride = ((size_t)s->columns + 15) / 16 * 16 + 3 * SSAO_SAT__PAD;
+    s->table_stride = ((size_t)s->columns + 1 + 15) / 16 * 16;
+    s->tables = s->options.method == SSAO_SAT_SLABS ? 4 * s->options.slabs : 1;
+    memset(&arena, 0, sizeof arena);
+    sat__carve(&arena, 1, sizeof *s);
+    if (!ssao_sat__lay_out(s, &arena)) return 0;
+    *used = arena.used;
+    return 1;
+}
+
+/* Lays the block out anew for `s`, the object itself at its start. */
+static ssao_sat *ssao_sat__place(const ssao_sat *s)
+{
+    ssao_sat copy = *s, *made;
+    sat__arena arena;
+    memset(&arena, 0, sizeof arena);
+    arena.base = sat__align64(s->block);
+    made = (ssao_sat *)sat__carve(&arena, 1, sizeof copy);
+    ssao_sat__lay_out(&copy, &arena);
+    memset(arena.base, 0, s->bytes - 64); /* the padding must be sky; the rest costs one touch */
+    *made = copy;
+    return made;
+}
+
 SSAO_SAT_DEF sat_result ssao_sat_create(ssao_sat **out, int width, int height, const ssao_sat_options *options)
 {
-    ssao_sat s, *made;
-    sat__arena arena;
+    ssao_sat s;
     sat_allocator allocator;
-    void *block;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
@@ -2146,31 +2251,49 @@ SSAO_SAT_DEF sat_result ssao_sat_create(ssao_sat **out, int width, int height, c
     if (width < 1 || height < 1 || width > 32768 || height > 32768 || !ssao_sat__options_are_valid(&s.options)) return SAT_ERR_ARGUMENT;
     if (!sat__resolve_allocator(&allocator, &s.options.allocator)) return SAT_ERR_ARGUMENT;
     s.options.allocator = allocator;
-    s.width = width;
-    s.height = height;
-    s.step = s.options.half_resolution ? 2 : 1;
-    s.columns = (width + s.step - 1) / s.step;
-    s.rows = (height + s.step - 1) / s.step;
-    s.reserve = (int)s.options.max_pixels + 4;
-    s.capacity = s.options.band_rows ? sat__min_int(s.rows, s.options.band_rows + 2 * s.reserve) : s.rows;
-    s.stride = ((size_t)s.columns + 15) / 16 * 16 + 3 * SSAO_SAT__PAD;
-    s.table_stride = ((size_t)s.columns + 1 + 15) / 16 * 16;
-    s.tables = s.options.method == SSAO_SAT_SLABS ? 4 * s.options.slabs : 1;
-    memset(&arena, 0, sizeof arena);
-    sat__carve(&arena, 1, sizeof s);
-    if (!ssao_sat__lay_out(&s, &arena)) return SAT_ERR_SIZE;
-    s.bytes = arena.used + 64;
-    block = sat__alloc(&allocator, s.bytes);
-    if (!block) return SAT_ERR_MEMORY;
-    memset(&arena, 0, sizeof arena);
-    arena.base = sat__align64(block);
-    made = (ssao_sat *)sat__carve(&arena, 1, sizeof s);
-    s.block = block;
-    ssao_sat__lay_out(&s, &arena);
-    memset(arena.base, 0, s.bytes - 64); /* the padding must be sky; the rest costs one touch at creation */
-    *made = s;
-    *out = made;
+    if (!ssao_sat__measure(&s, width, height, &s.bytes)) return SAT_ERR_SIZE;
+    s.bytes += 64;
+    s.block = sat__alloc(&allocator, s.bytes);
+    if (!s.block) return SAT_ERR_MEMORY;
+    *out = ssao_sat__place(&s);
     return SAT_OK;
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_resize(ssao_sat *ao, int width, int height, const ssao_sat_options *options)
+{
+    ssao_sat s;
+    size_t used;
+    if (!ao || width < 1 || height < 1 || width > 32768 || height > 32768) return SAT_ERR_ARGUMENT;
+    if (options && !ssao_sat__options_are_valid(options)) return SAT_ERR_ARGUMENT;
+    s = *ao;
+    if (options) s.options = *options;
+    s.options.allocator = ao->options.allocator;
+    if (!ssao_sat__measure(&s, width, height, &used) || used + 64 > ao->bytes) return SAT_ERR_SIZE;
+    if (width == ao->width && height == ao->height && s.step == ao->step && s.capacity == ao->capacity && s.tables == ao->tables &&
+        sat__worker_count(&s.options.threads) == sat__worker_count(&ao->options.threads)) {
+        ao->options = s.options; /* the same layout */
+        ao->reserve = s.reserve;
+    } else ssao_sat__place(&s);
+    return SAT_OK;
+}
+
+SSAO_SAT_DEF float ssao_sat_multi_bounce(float accessibility, float albedo)
+{
+    float v = accessibility, a = 2.0404f * albedo - 0.3324f, b = -4.7951f * albedo + 0.6417f, c = 2.7552f * albedo + 0.6903f, fit;
+    fit = ((v * a + b) * v + c) * v;
+    return fit > v ? fit < 1 ? fit : 1 : v;
+}
+
+SSAO_SAT_DEF float ssao_sat_specular(float accessibility, float cosine, float roughness)
+{
+    float open = acosf(sqrtf(accessibility > 0 ? accessibility < 1 ? 1 - accessibility : 0.0f : 1.0f)); /* half angles of the cones */
+    float shine = acosf(exp2f(-3.32193f * roughness * roughness));
+    float apart = acosf(cosine > -1 ? cosine < 1 ? cosine : 1.0f : -1.0f), inside = fabsf(open - shine), share;
+    float lesser = open < shine ? open : shine, full = 1 - cosf(lesser), all = 1 - cosf(shine);
+    if (!(all > 1e-7f)) return apart < open ? 1.0f : 0.0f; /* a mirror */
+    if (apart >= open + shine) return 0;
+    share = apart <= inside ? 1 : 1 - (apart - inside) / (open + shine - inside);
+    return full / all * share * share * (3 - 2 * share);
 }
 
 SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao)
@@ -2747,6 +2870,18 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *g
     if (result == SAT_OK) result = ssao_sat__gl_build_programs(g);
     sat__gl_end(&g->gl, &state);
     return result;
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_gl_set_options(ssao_sat_gl *gl, const ssao_sat_options *options)
+{
+    ssao_sat_options o = options ? *options : ssao_sat_defaults();
+    if (!gl || !gl->is_built || !ssao_sat__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    if (o.method != gl->options.method || o.half_resolution != gl->options.half_resolution || o.slabs != gl->options.slabs ||
+        o.scales != gl->options.scales || o.plane_boxes != gl->options.plane_boxes || o.refine_levels != gl->options.refine_levels ||
+        o.as_printed != gl->options.as_printed || o.inverted_depth != gl->options.inverted_depth) return SAT_ERR_MISMATCH;
+    o.allocator = gl->options.allocator;
+    gl->options = o;
+    return SAT_OK;
 }
 
 SSAO_SAT_DEF const char *ssao_sat_gl_message(const ssao_sat_gl *gl) { return gl ? gl->gl.message : ""; }

@@ -94,7 +94,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
     if (ssao_sat_create(&ao, w, h, &o) != SAT_OK) return 0;
     if (ssao_sat_apply(ao, out, 0, &picture, &stats) == SAT_OK) {
         check(out, w * h, 0);
-        if (stats.sky + stats.small + stats.flat + stats.estimated != stats.pixels && stats.farthest > 0 && stats.estimated) abort();
+        if (stats.sky + stats.tiny + stats.flat + stats.estimated != stats.pixels && stats.farthest > 0 && stats.estimated) abort();
         ssao_sat_apply_bent(ao, out, 0, bent, 0, &picture, NULL);
         if (ssao_sat_apply_signed(ao, out, 0, &picture, NULL) == SAT_OK) check(out, w * h, -1);
     }

@@ -1313,7 +1313,7 @@ TEST(bad_arguments_are_refused_and_write_nothing)
     REFUSED(slabs, 17);
     REFUSED(slabs, 0);
     REFUSED(scales, 5);
-    REFUSED(max_pixels, 1);
+    REFUSED(max_pixels, 1); /* less than min_pixels */
     REFUSED(min_pixels, no_number);
     REFUSED(band_rows, 3);
     REFUSED(threads.workers, 3);
@@ -1350,4 +1350,158 @@ TEST(bad_arguments_are_refused_and_write_nothing)
     EXPECT(out[0] >= 0);
     ssao_sat_destroy(ao);
     EXPECT_EQ(ssao_sat_version(), SSAO_SAT_VERSION);
+}
+
+/* ---- options: names, ranges, corners ---- */
+
+static void refused(ssao_sat_options o, const char *name)
+{
+    char text[160];
+    ssao_sat *ao;
+    EXPECT_EQ(ssao_sat_create(&ao, 16, 16, &o), SAT_ERR_ARGUMENT);
+    if (!EXPECT(strstr(ssao_sat_explain(text, sizeof text, 16, 16, &o), name) == text)) printf("    %s: \"%s\"\n", name, text);
+}
+
+TEST(every_option_is_checked_and_named)
+{
+    double no_number = (double)sat__float_from_bits(0x7fc00001u);
+    char text[160];
+    ssao_sat_options o = ssao_sat_defaults();
+    int i;
+    EXPECT(strcmp(ssao_sat_explain(text, sizeof text, 16, 16, NULL), "") == 0);
+    EXPECT(strcmp(ssao_sat_explain(NULL, 0, 16, 16, NULL), "") == 0);
+    for (i = 0; i < SSAO_SAT__FIELDS; i++) {
+        const sat__field *f = &ssao_sat__fields[i];
+        int at;
+        if (f->type == 'a' || f->type == 't') continue;
+        for (at = 0; at < 3; at++) {
+            double v = at == 0 ? f->initial : at == 1 ? f->low : f->high;
+            o = ssao_sat_defaults();
+            sat__field_set(f, &o, v);
+            if (o.max_pixels < o.min_pixels) o.max_pixels = o.min_pixels = v;
+            if (!EXPECT(strcmp(ssao_sat_explain(text, sizeof text, 16, 16, &o), "") == 0)) puts(text);
+        }
+        o = ssao_sat_defaults();
+        sat__field_set(f, &o, f->high * 1.01 + 1);
+        refused(o, f->name);
+        sat__field_set(f, &o, f->low > 1 ? f->low - 1 : f->low - 1e-3 * (f->type == 'i' ? 1000 : 0.5));
+        if (!(f->also == '0' && f->low <= 1)) refused(o, f->name);
+        if (f->type == 'd') {
+            sat__field_set(f, &o, no_number);
+            refused(o, f->name);
+        }
+    }
+    o = ssao_sat_defaults();
+    o.scales = 99;
+    EXPECT(strcmp(ssao_sat_explain(text, sizeof text, 16, 16, &o), "scales is 99; 1..4") == 0);
+    o = ssao_sat_defaults();
+    o.min_pixels = 300;
+    refused(o, "max_pixels");
+    o = ssao_sat_defaults();
+    o.threads.workers = 3;
+    refused(o, "threads");
+    EXPECT(strstr(ssao_sat_explain(text, sizeof text, 0, 16, NULL), "width") == text);
+    EXPECT(strstr(ssao_sat_explain(text, sizeof text, 16, 40000, NULL), "height") == text);
+}
+
+TEST(a_refused_input_is_explained)
+{
+    static float z[16 * 16], out[16 * 16];
+    char text[200];
+    ssao_sat_input in = ssao_sat_input_linear(z, 16, 16, 1), bad;
+    support_fill(z, 256, 1, 2, 1);
+    EXPECT(strcmp(ssao_sat_explain_input(text, sizeof text, &in), "") == 0);
+#define EXPLAINED(change, word) \
+    bad = in; change; EXPECT_EQ(run(out, &bad, NULL, NULL), SAT_ERR_ARGUMENT); \
+    if (!EXPECT(strstr(ssao_sat_explain_input(text, sizeof text, &bad), word) != NULL)) puts(text)
+    EXPLAINED(bad.depth = NULL, "depth");
+    EXPLAINED(bad.depth_stride = 6, "depth_stride");
+    EXPLAINED(bad.normals = z; bad.normal_stride = 8, "normal_stride");
+    EXPLAINED(bad.sky = -1, "sky");
+    EXPLAINED(bad.depth_kind = (ssao_sat_depth)7, "depth_kind");
+    EXPLAINED(bad.projection[11] = 1, "projection");
+    EXPLAINED(bad.depth_kind = SSAO_SAT_DEPTH_REVERSED; bad.clip_zero_to_one = 0, "depth_kind");
+    EXPECT(strstr(ssao_sat_explain_input(text, sizeof text, NULL), "NULL") != NULL);
+}
+
+/* Pairs of lowest, highest and default values: made, applied, within 0..1. */
+TEST(corners_of_the_options)
+{
+    static float z[16 * 16], out[16 * 16];
+    ssao_sat_input in = ssao_sat_input_linear(z, 16, 16, 1);
+    int i, j, a, b, failed = 0;
+    support_fill(z, 256, 1, 2, 1);
+    z[40] = 0;
+    for (i = 0; i < SSAO_SAT__FIELDS; i++)
+        for (j = 0; j < i; j++)
+            for (a = 0; a < 2; a++)
+                for (b = 0; b < 2; b++) {
+                    const sat__field *f = &ssao_sat__fields[i], *g = &ssao_sat__fields[j];
+                    ssao_sat_options o = ssao_sat_defaults();
+                    if (f->type == 'a' || f->type == 't' || g->type == 'a' || g->type == 't') continue;
+                    sat__field_set(f, &o, a ? f->high : f->low);
+                    sat__field_set(g, &o, b ? g->high : g->low);
+                    if (o.max_pixels < o.min_pixels) {
+                        EXPECT_EQ(run(out, &in, &o, NULL), SAT_ERR_ARGUMENT);
+                        continue;
+                    }
+                    if (run(out, &in, &o, NULL) != SAT_OK || !all_within(out, 256, 0, 1)) {
+                        failed++;
+                        printf("    %s and %s, %d %d\n", f->name, g->name, a, b);
+                    }
+                }
+    EXPECT_EQ(failed, 0);
+}
+
+/* Options and sizes change within the memory of create, without an allocation, to the same bits as a new object. */
+TEST(resized_is_made_anew)
+{
+    static float base[SIDE * SIDE], out[SIDE * SIDE];
+    const ref_picture *p = picture(1, 0);
+    ssao_sat_options o = options_of(SSAO_SAT_SLABS, 0.25), other;
+    ssao_sat_input in = linear_input(p), part = ssao_sat_input_linear(p->z, 97, 71, 0.8);
+    support_memory memory;
+    ssao_sat *ao;
+    int m;
+    part.depth_stride = SIDE * 4;
+    o.allocator = support_allocator(&memory);
+    if (!EXPECT_EQ(ssao_sat_create(&ao, SIDE, SIDE, &o), SAT_OK)) return;
+    for (m = 0; m < 5; m++) {
+        other = options_of((ssao_sat_method)m, 0.1);
+        other.slabs = 4;
+        EXPECT_EQ(ssao_sat_resize(ao, 97, 71, &other), SAT_OK);
+        EXPECT_EQ(ssao_sat_apply(ao, out, 0, &part, NULL), SAT_OK);
+        EXPECT_EQ(run(base, &part, &other, NULL), SAT_OK);
+        EXPECT(memcmp(out, base, 97 * 71 * 4) == 0);
+    }
+    EXPECT_EQ(ssao_sat_resize(ao, SIDE, SIDE, &o), SAT_OK);
+    EXPECT_EQ(ssao_sat_apply(ao, out, 0, &in, NULL), SAT_OK);
+    EXPECT_EQ(run(base, &in, &o, NULL), SAT_OK);
+    EXPECT(memcmp(out, base, sizeof out) == 0);
+    EXPECT_EQ(ssao_sat_resize(ao, 4 * SIDE, SIDE, NULL), SAT_ERR_SIZE);
+    EXPECT_EQ(ssao_sat_resize(ao, 0, SIDE, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(ssao_sat_resize(NULL, SIDE, SIDE, NULL), SAT_ERR_ARGUMENT);
+    o.radius = -1;
+    EXPECT_EQ(ssao_sat_resize(ao, SIDE, SIDE, &o), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(ssao_sat_apply(ao, out, 0, &in, NULL), SAT_OK);
+    EXPECT(memcmp(out, base, sizeof out) == 0);
+    ssao_sat_destroy(ao);
+    EXPECT(support_memory_clean(&memory));
+}
+
+TEST(shading_helpers)
+{
+    float v, last = 0;
+    EXPECT_NEAR(ssao_sat_multi_bounce(1, 0.8f), 1, 0.01);
+    EXPECT_NEAR(ssao_sat_multi_bounce(0, 0.8f), 0, 0);
+    for (v = 0; v <= 1; v += 0.05f) { /* never darker, lighter with albedo */
+        EXPECT(ssao_sat_multi_bounce(v, 0) >= v && ssao_sat_multi_bounce(v, 0.9f) >= ssao_sat_multi_bounce(v, 0.3f) - 0.02f);
+        EXPECT(ssao_sat_specular(v, 0.9f, 0.5f) >= last - 1e-5f);
+        last = ssao_sat_specular(v, 0.9f, 0.5f);
+        EXPECT(last >= 0 && last <= 1);
+    }
+    EXPECT_NEAR(ssao_sat_specular(1, 1, 0.3f), 1, 1e-6);
+    EXPECT_NEAR(ssao_sat_specular(0, 0.5f, 0.1f), 0, 1e-6);
+    EXPECT_NEAR(ssao_sat_specular(0.5f, 1, 0), 1, 0);
+    EXPECT_NEAR(ssao_sat_specular(0.5f, -1, 0), 0, 0);
 }

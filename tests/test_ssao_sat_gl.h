@@ -256,3 +256,57 @@ TEST(gpu_functions_for_other_shaders)
     if (!EXPECT_EQ(sat__gl_build(&test_f, &program, &shaders), SAT_OK)) puts(test_f.message);
     test_f.DeleteProgram(program);
 }
+
+TEST(gpu_corners_of_the_options)
+{
+    ref_picture p;
+    int i, a;
+    if (!open_gl()) SKIP(test_gl.message);
+    p = small_picture(1, 0);
+    for (i = 0; i < SSAO_SAT__FIELDS; i++)
+        for (a = 0; a < 2; a++) {
+            const sat__field *f = &ssao_sat__fields[i];
+            ssao_sat_options o = ssao_sat_defaults();
+            if (f->type == 'a' || f->type == 't') continue;
+            o.radius = 0.3;
+            sat__field_set(f, &o, a ? f->high : f->low);
+            if (strcmp(f->name, "min_pixels") == 0) o.max_pixels = 512;
+            if (strcmp(f->name, "float_table") == 0 || strcmp(f->name, "bottom_up") == 0) continue;
+            if (strcmp(f->name, "max_pixels") == 0 && !a) o.min_pixels = 1;
+            compare(&p, o, REF_LINEAR, 1, 0.01);
+        }
+    ref_free(&p);
+}
+
+TEST(gpu_options_change_in_the_frame)
+{
+    static float z[GL_WIDTH * GL_HEIGHT], a[GL_WIDTH * GL_HEIGHT], b[GL_WIDTH * GL_HEIGHT];
+    ssao_sat_options o = ssao_sat_defaults(), other;
+    ssao_sat_input in;
+    ssao_sat_gl *gl = NULL;
+    ref_picture p;
+    unsigned depth;
+    if (!open_gl()) SKIP(test_gl.message);
+    p = small_picture(0, 0);
+    in = ref_input(&p, REF_LINEAR, z);
+    in.normals = NULL;
+    depth = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, p.z);
+    if (!EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, &o), SAT_OK)) return;
+    other = o;
+    other.radius = 0.2;
+    other.gain = 1.5;
+    other.max_pixels = 30;
+    EXPECT_EQ(ssao_sat_gl_set_options(gl, &other), SAT_OK);
+    EXPECT_EQ(ssao_sat_gl_apply(gl, 0, depth, 0, &in), SAT_OK);
+    download(a, ssao_sat_gl_texture(gl), GL_WIDTH, GL_HEIGHT);
+    EXPECT_EQ(run_c(b, &in, &other), SAT_OK);
+    EXPECT_NEAR(ref_rmse(&p, a, b), 0, 2e-3);
+    other.slabs = 4;
+    EXPECT_EQ(ssao_sat_gl_set_options(gl, &other), SAT_ERR_MISMATCH);
+    other.slabs = 99;
+    EXPECT_EQ(ssao_sat_gl_set_options(gl, &other), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(ssao_sat_gl_set_options(NULL, &o), SAT_ERR_ARGUMENT);
+    ssao_sat_gl_destroy(gl);
+    test_f.DeleteTextures(1, &depth);
+    ref_free(&p);
+}
