@@ -46,7 +46,9 @@
    NUMERICS
      Costs are floats, prices and path lengths doubles, sums compensated. A pair has one cost, always rounded the same way.
      lower_bound is below every assignment's cost, rounding included; after EXACT the gap is that rounding, about 1e-15.
-     Path lengths are differences of costs, so one forced cost of 1e30 leaves the others exact. Softassign stays finite
+     The optimum is proven by complementary slackness with differences of twice the width; where doubles do not hold what
+     the costs span (1e-45 to 1e30 in one problem), the last paths are searched in fixed point of 320 bits, so that no
+     cost that is not used spoils the proof (report.exact_repair). Softassign stays finite
      down to temperatures of 1e-12. Ties: free columns first, then the smaller index.
      Same bits for any number of workers. A compiler that contracts a*b+c may change the last bit of distances.
 
@@ -116,7 +118,7 @@ extern "C" {
 typedef enum softassign_method {
     SOFTASSIGN_AUTO,        /* the optimum: dense up to 100 000 cells, SOFTASSIGN_EXACT above */
     SOFTASSIGN_EXACT,       /* the optimum: softassign prices on lists, shortest augmenting paths, finish */
-    SOFTASSIGN_FAST,        /* auction on lists; certified to options.gap */
+    SOFTASSIGN_FAST,        /* auction on lists; certified to options.gap. Capacities other than 1: SOFTASSIGN_EXACT, and report.method says so */
     SOFTASSIGN_ENTROPIC,    /* softassign with inequality columns over the whole matrix, rounded by paths */
     SOFTASSIGN_PUBLISHED,   /* Slomp 2012, section 3.6, as printed */
     SOFTASSIGN_GREEDY,      /* Slomp 2012, section 3.4.2 */
@@ -150,7 +152,7 @@ typedef struct softassign_problem {
 typedef struct softassign_report {
     double cost;               /* of column_of_row, without the switching bonus */
     double lower_bound;
-    double gap;                /* 0 when the cost is 0; infinite when no bound is known yet */
+    double gap;                /* 0 when both are 0; infinite when the cost alone is 0, or no bound is known yet */
     softassign_method method;  /* what was run */
     int complete;              /* 1: the method came to its end; 0: the budget or `progress` stopped it */
     int row_error;             /* the row that an error is about, or -1 */
@@ -167,6 +169,7 @@ typedef struct softassign_report {
     int switched;              /* rows that differ from problem.previous */
     double soft_cost;          /* PUBLISHED: the lowest sum of Q */
     double column_sum_max;     /* PUBLISHED, ENTROPIC: largest column sum of the soft matrix */
+    int exact_repair;          /* 1: doubles could not prove the optimum, and the last paths were searched in exact arithmetic */
     int duplicate_rows;        /* PUBLISHED: rows whose largest element was another row's column already */
 } softassign_report;
 
@@ -272,7 +275,8 @@ extern "C" {
 typedef struct softassign_gl softassign_gl;
 
 /* On an OpenGL error *out only answers softassign_gl_message, and is to be destroyed; on the others it is NULL.
-   Options read: alpha, temperature, cooling, iterations, outlier, outlier_evolves, gather, seed, allocator. */
+   Options read: alpha, temperature, cooling, iterations, outlier, outlier_evolves, gather, seed, allocator; NULL means
+   softassign_defaults(), the published schedule is softassign_method_defaults(SOFTASSIGN_PUBLISHED). */
 SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc, const softassign_options *options);
 SOFTASSIGN_DEF void softassign_gl_destroy(softassign_gl *gl); /* NULL is fine */
 /* What the last SAT_ERR_GL_... was about; never NULL. */
@@ -347,12 +351,14 @@ static inline double softassign__total_below(const softassign__sum *s)
     return s->sum + s->correction - s->magnitude * 4.5e-16;
 }
 
-static inline double softassign__gap(double cost, double bound)
+/* magnitude: the sum of |costs|, for a cost of 0 that is a sum of others. */
+static inline double softassign__gap(double cost, double bound, double magnitude)
 {
     double off = cost - bound, size = fabs(cost);
     if (!(off > 0)) return 0;
     if (!sat__is_finite_double(bound)) return (double)SOFTASSIGN__INFINITY;
-    return size > 0 ? off / size : (double)SOFTASSIGN__INFINITY;
+    if (size > 0) return off / size;
+    return off <= 1e-13 * magnitude ? 0 : (double)SOFTASSIGN__INFINITY;
 }
 
 /* splitmix64 */
@@ -384,10 +390,13 @@ typedef struct softassign__scratch {
     size_t distances;
 } softassign__scratch;
 
-enum { SOFTASSIGN__START, SOFTASSIGN__LISTS, SOFTASSIGN__PRICES, SOFTASSIGN__RELIST, SOFTASSIGN__PATHS, SOFTASSIGN__FINISH, SOFTASSIGN__DONE };
+enum { SOFTASSIGN__START, SOFTASSIGN__LISTS, SOFTASSIGN__PRICES, SOFTASSIGN__RELIST, SOFTASSIGN__PATHS, SOFTASSIGN__FINISH, SOFTASSIGN__REPAIR, SOFTASSIGN__DONE };
+
+typedef struct softassign__fixed softassign__fixed;
 
 /* Slots are the columns, followed by one mandatory slot for each column with a minimum use: same costs, but its
-   price starts at `top`, so high that every assignment that leaves it free is dearer. */
+   price starts at `top`, so high that rows go there; a full one may have any price. One that stays free all the same is
+   filled by the exact repair. */
 struct softassign {
     softassign_options options;
     sat_allocator allocator;
@@ -397,6 +406,7 @@ struct softassign {
     int dense;             /* costs stand in `matrix` */
     int dense_paths;       /* and paths are searched on it, without lists */
     int unit_capacities;   /* every slot holds one row */
+    int all_open;          /* no slot has a capacity of 0 */
 
     softassign_problem problem;
     int slots, dims;
@@ -433,6 +443,9 @@ struct softassign {
     int *kept, *leader, *shown, *shown_column; /* slots of rows: best so far, best ant, for the caller; columns of those */
     int phase, next, left, prices_known;
     double temperature, bound;
+    double excess;         /* of the proof, see softassign__prove */
+    int proving, stopped;  /* costs of the bound include the bonus; the progress callback said stop */
+    softassign__fixed *exact_price, *exact_distance;
     int schedule[2];
     softassign_report report;
 };
@@ -550,7 +563,7 @@ static void softassign__dense_keys(const softassign *s, int row, softassign__scr
     int j, l;
     for (j = 0; j < s->slots; j++) {
         float cost = softassign__cost(s, row, j), price = s->price_f[j];
-        w->keys[j] = cost < SOFTASSIGN__INFINITY ? (cost - price) - (fabsf(cost) + fabsf(price)) * 3e-7f : SOFTASSIGN__INFINITY;
+        w->keys[j] = cost < SOFTASSIGN__INFINITY && s->capacity[j] > 0 ? (cost - price) - (fabsf(cost) + fabsf(price)) * 3e-7f : SOFTASSIGN__INFINITY;
     }
     w->distances += (size_t)s->slots;
     for (; j < s->padded; j++) w->keys[j] = SOFTASSIGN__INFINITY;
@@ -558,6 +571,20 @@ static void softassign__dense_keys(const softassign *s, int row, softassign__scr
         float least = SOFTASSIGN__INFINITY;
         for (l = 0; l < SOFTASSIGN__BLOCK; l++) least = w->keys[j + l] < least ? w->keys[j + l] : least;
         w->block_min[j / SOFTASSIGN__BLOCK] = least;
+    }
+}
+
+/* Slots without capacity, and what pads the last block, are in nobody's sight: no block minimum stands for them. */
+static void softassign__hide_closed(const softassign *s, softassign__scratch *w)
+{
+    int b, j;
+    for (b = s->all_open ? s->slots / SOFTASSIGN__BLOCK * SOFTASSIGN__BLOCK : 0; b < s->padded; b += SOFTASSIGN__BLOCK) {
+        float least = SOFTASSIGN__INFINITY;
+        for (j = b; j < b + SOFTASSIGN__BLOCK; j++) {
+            if (j >= s->slots || s->capacity[j] == 0) w->keys[j] = SOFTASSIGN__INFINITY;
+            least = w->keys[j] < least ? w->keys[j] : least;
+        }
+        w->block_min[b / SOFTASSIGN__BLOCK] = least;
     }
 }
 
@@ -569,10 +596,10 @@ static void softassign__keys(const softassign *s, int row, softassign__scratch *
         return;
     }
     softassign__project_keys(s, row, w);
-    for (j = s->slots; j < s->padded; j++) w->keys[j] = SOFTASSIGN__INFINITY;
+    softassign__hide_closed(s, w);
     if (!s->problem.previous || (stay = s->problem.previous[row]) < 0) return;
     for (j = stay; j < s->slots; j = j < s->columns ? s->columns : j + 1)
-        if (softassign__column(s, j) == stay) {
+        if (softassign__column(s, j) == stay && s->capacity[j] > 0) {
             w->keys[j] -= s->bonus * 1.000001f;
             if (w->keys[j] < w->block_min[j / SOFTASSIGN__BLOCK]) w->block_min[j / SOFTASSIGN__BLOCK] = w->keys[j];
         }
@@ -1064,6 +1091,16 @@ typedef struct softassign__search {
 
 enum { SOFTASSIGN__OPEN = 1, SOFTASSIGN__CLOSED = 2 };
 
+/* Stamps are 4 * epoch + state: before that overflows they are wiped. */
+#define SOFTASSIGN__LAST_EPOCH 0x1ffffffe
+static void softassign__new_epoch(softassign *s)
+{
+    if (s->epoch++ < SOFTASSIGN__LAST_EPOCH) return;
+    memset(s->stamp, 0, (size_t)s->max_slots * sizeof(int));
+    memset(s->row_stamp, 0, (size_t)s->rows * sizeof(int));
+    s->epoch = 1;
+}
+
 static void softassign__relax(softassign *s, softassign__search *q, int row, int slot, float cost, double base,
                               double own_cost, double own_price)
 {
@@ -1155,7 +1192,7 @@ static int softassign__augment(softassign *s, int root)
     double least = (double)SOFTASSIGN__INFINITY;
     q.root = root;
     q.nearest = (double)SOFTASSIGN__INFINITY;
-    s->epoch++;
+    softassign__new_epoch(s);
     s->heap_size = 0;
     s->report.paths++;
     if (softassign__list_least(s, root) > s->list_limit[root]) softassign__relist(s, root);
@@ -1238,7 +1275,7 @@ static void softassign__finish(softassign *s, int slot)
 {
     double nearest = s->top[slot] - s->price[slot]; /* raising the slot alone */
     int end = slot, closed = 0, i, j;
-    s->epoch++;
+    softassign__new_epoch(s);
     s->heap_size = 0;
     s->report.columns_finished++;
     s->stamp[slot] = 4 * s->epoch + SOFTASSIGN__CLOSED;
@@ -1332,7 +1369,7 @@ static double softassign__row_bound(softassign *s, int row)
     for (end = at + (size_t)s->list_length[row]; at < end; at++) {
         int slot = s->list_slot[at];
         double cost = (double)s->list_cost[at], value;
-        if (softassign__column(s, slot) == stay) cost = (double)softassign__pair(&s->problem, row, stay);
+        if (!s->proving && softassign__column(s, slot) == stay) cost = (double)softassign__pair(&s->problem, row, stay);
         value = cost - s->price[slot];
         if (value < least) least = value;
     }
@@ -1350,7 +1387,7 @@ static void softassign__certify(softassign *s)
         if (!s->raised[j] || s->capacity[j] == 0 || s->dense_paths) continue;
         s->scratch[0].distances += (size_t)s->rows;
         for (i = 0; i < s->rows; i++) {
-            double value = (double)softassign__pair(&s->problem, i, softassign__column(s, j)) - s->price[j];
+            double value = (double)(s->proving ? softassign__cost(s, i, j) : softassign__pair(&s->problem, i, softassign__column(s, j))) - s->price[j];
             if (value < least[i]) least[i] = value;
         }
     }
@@ -1565,6 +1602,286 @@ static void softassign__dense_publish(softassign *s)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   Exact repair
+
+   Prices are sums of costs: with costs from 1e-45 to 1e30 in one problem no double holds them. Where the proof in
+   doubles is not tight (softassign__prove), the rest of the work is done in fixed point of 320 bits, in which every
+   cost, path length and price is exact; a mandatory slot then costs 2^136, above every sum of costs, and drowns nothing.
+   ------------------------------------------------------------------------------------------------ */
+
+/* Two's complement, least word first, in units of 2^-149: what floats are multiples of. */
+struct softassign__fixed {
+    uint64_t word[5];
+};
+
+static softassign__fixed softassign__fixed_sum(const softassign__fixed *a, const softassign__fixed *b)
+{
+    softassign__fixed r;
+    uint64_t carry = 0;
+    int k;
+    for (k = 0; k < 5; k++) {
+        uint64_t t = a->word[k] + carry;
+        carry = t < carry;
+        r.word[k] = t + b->word[k];
+        carry += r.word[k] < t;
+    }
+    return r;
+}
+
+static softassign__fixed softassign__fixed_difference(const softassign__fixed *a, const softassign__fixed *b)
+{
+    softassign__fixed r;
+    uint64_t borrow = 0;
+    int k;
+    for (k = 0; k < 5; k++) {
+        uint64_t t = a->word[k] - borrow;
+        borrow = a->word[k] < borrow;
+        r.word[k] = t - b->word[k];
+        borrow += t < b->word[k];
+    }
+    return r;
+}
+
+static int softassign__fixed_less(const softassign__fixed *a, const softassign__fixed *b)
+{
+    int k = 4;
+    if ((a->word[4] ^ b->word[4]) >> 63) return (int)(a->word[4] >> 63);
+    while (k > 0 && a->word[k] == b->word[k]) k--;
+    return a->word[k] < b->word[k];
+}
+
+/* Exact for floats; a double loses what is below 2^-149, and is cut at +-2^130. */
+static softassign__fixed softassign__fixed_from(double x)
+{
+    softassign__fixed r = {{0, 0, 0, 0, 0}}, zero = {{0, 0, 0, 0, 0}};
+    uint64_t mantissa;
+    int exponent, shift, negative = x < 0;
+    if (!(x < 1e39)) x = 1e39;
+    if (x < -1e39) x = -1e39;
+    mantissa = (uint64_t)ldexp(frexp(fabs(x), &exponent), 53);
+    shift = exponent - 53 + 149;
+    if (shift < 0) {
+        r.word[0] = shift > -64 ? mantissa >> -shift : 0;
+    } else {
+        r.word[shift / 64] = mantissa << shift % 64;
+        if (shift % 64) r.word[shift / 64 + 1] = mantissa >> (64 - shift % 64);
+    }
+    return negative ? softassign__fixed_difference(&zero, &r) : r;
+}
+
+static double softassign__fixed_to(const softassign__fixed *a)
+{
+    softassign__fixed zero = {{0, 0, 0, 0, 0}}, b = *a;
+    int k, negative = (int)(a->word[4] >> 63);
+    double r = 0;
+    if (negative) b = softassign__fixed_difference(&zero, a);
+    for (k = 4; k >= 0; k--) r += ldexp((double)b.word[k], 64 * k - 149);
+    return negative ? -r : r;
+}
+
+static softassign__fixed softassign__fixed_top(const softassign *s, int slot)
+{
+    softassign__fixed top = {{0, 0, 0, 0, 0}};
+    if (slot >= s->columns) top.word[4] = (uint64_t)1 << 29; /* 2^285 units; a million times less than the word holds */
+    return top;
+}
+
+/* cost - price, exactly. */
+static softassign__fixed softassign__fixed_value(const softassign *s, double cost, int slot)
+{
+    softassign__fixed c = softassign__fixed_from(cost);
+    return softassign__fixed_difference(&c, &s->exact_price[slot]);
+}
+
+/* The row's own slot is not its best one. */
+static int softassign__is_dissatisfied(const softassign *s, int row)
+{
+    softassign__fixed own = softassign__fixed_value(s, (double)s->cost_of_row[row], s->slot_of_row[row]), other;
+    int j;
+    for (j = 0; j < s->slots; j++) {
+        float cost;
+        if (s->capacity[j] == 0 || !((cost = softassign__cost(s, row, j)) < SOFTASSIGN__INFINITY)) continue;
+        other = softassign__fixed_value(s, (double)cost, j);
+        if (softassign__fixed_less(&other, &own)) return 1;
+    }
+    return 0;
+}
+
+/* Takes over the prices; slots with room go to their top price, and rows that are then better off elsewhere leave,
+   until nothing changes. What is left is optimal for the rows that stayed. */
+static void softassign__start_repair(softassign *s)
+{
+    int i, j, changed = 1;
+    for (i = 0; i < s->rows; i++) { /* their memory is used, and prices may rise */
+        s->stale[i] = 1;
+        s->list_length[i] = 0;
+        s->list_limit[i] = -(double)SOFTASSIGN__INFINITY;
+    }
+    for (j = 0; j < s->slots; j++) {
+        softassign__fixed top = softassign__fixed_top(s, j);
+        s->exact_price[j] = softassign__fixed_from(s->price[j]);
+        if (softassign__fixed_less(&top, &s->exact_price[j])) s->exact_price[j] = top;
+    }
+    while (changed) {
+        for (j = 0; j < s->slots; j++)
+            if (softassign__is_free(s, j)) s->exact_price[j] = softassign__fixed_top(s, j);
+        for (changed = i = 0; i < s->rows; i++)
+            if (s->slot_of_row[i] >= 0 && softassign__is_dissatisfied(s, i)) {
+                softassign__unassign(s, i);
+                changed = 1;
+            }
+        s->report.work += (size_t)s->rows;
+    }
+    s->report.exact_repair = 1;
+}
+
+/* Relaxes all open slots from `row`, whose own value is `own` (of the root: 0) at distance `base`. */
+static void softassign__relax_exact(softassign *s, int row, const softassign__fixed *base)
+{
+    int j, slot = s->slot_of_row[row];
+    softassign__fixed shift = *base;
+    if (slot >= 0) {
+        softassign__fixed own = softassign__fixed_value(s, (double)s->cost_of_row[row], slot);
+        shift = softassign__fixed_difference(base, &own);
+    }
+    for (j = 0; j < s->slots; j++) {
+        int known = s->stamp[j] - 4 * s->epoch;
+        softassign__fixed w;
+        float cost;
+        if (s->capacity[j] == 0 || known == SOFTASSIGN__CLOSED || !((cost = softassign__cost(s, row, j)) < SOFTASSIGN__INFINITY)) continue;
+        w = softassign__fixed_value(s, (double)cost, j);
+        w = softassign__fixed_sum(&w, &shift);
+        if (known == SOFTASSIGN__OPEN && !softassign__fixed_less(&w, &s->exact_distance[j])) continue;
+        s->exact_distance[j] = w;
+        s->parent[j] = row;
+        s->parent_cost[j] = cost;
+        s->stamp[j] = 4 * s->epoch + SOFTASSIGN__OPEN;
+    }
+}
+
+/* The nearest open slot, free ones first; -1: none. */
+static int softassign__nearest_exact(const softassign *s)
+{
+    int j, best = -1;
+    for (j = 0; j < s->slots; j++) {
+        if (s->stamp[j] != 4 * s->epoch + SOFTASSIGN__OPEN) continue;
+        if (best >= 0 && softassign__fixed_less(&s->exact_distance[best], &s->exact_distance[j])) continue;
+        if (best >= 0 && !softassign__fixed_less(&s->exact_distance[j], &s->exact_distance[best]) &&
+            (softassign__is_free(s, best) || !softassign__is_free(s, j))) continue;
+        best = j;
+    }
+    return best;
+}
+
+static int softassign__augment_exact(softassign *s, int root)
+{
+    softassign__fixed zero = {{0, 0, 0, 0, 0}};
+    int closed = 0, j, k, i;
+    softassign__new_epoch(s);
+    s->report.paths++;
+    softassign__relax_exact(s, root, &zero);
+    for (;;) {
+        j = softassign__nearest_exact(s);
+        s->report.work++;
+        if (j < 0) return 0;
+        if (softassign__is_free(s, j)) break;
+        s->stamp[j] = 4 * s->epoch + SOFTASSIGN__CLOSED;
+        s->closed[closed++] = j;
+        for (i = s->first_row[j]; i >= 0; i = s->next_row[i]) softassign__relax_exact(s, i, &s->exact_distance[j]);
+    }
+    for (k = 0; k < closed; k++) {
+        softassign__fixed change = softassign__fixed_difference(&s->exact_distance[s->closed[k]], &s->exact_distance[j]);
+        s->exact_price[s->closed[k]] = softassign__fixed_sum(&s->exact_price[s->closed[k]], &change);
+    }
+    for (;;) {
+        int row = s->parent[j], old = s->slot_of_row[row];
+        softassign__assign(s, row, j, s->parent_cost[j]);
+        if (row == root) return 1;
+        j = old;
+    }
+}
+
+/* One path a call. The prices that are left are those of the next frame. */
+static sat_result softassign__repair_phase(softassign *s)
+{
+    int j;
+    while (s->next < s->rows && s->slot_of_row[s->next] >= 0) s->next++;
+    if (s->next < s->rows) {
+        if (softassign__augment_exact(s, s->next)) return SAT_OK;
+        s->report.row_error = s->next;
+        return SAT_ERR_LIMIT;
+    }
+    for (j = 0; j < s->slots; j++) {
+        double price = softassign__fixed_to(&s->exact_price[j]);
+        if (j >= s->columns && softassign__is_free(s, j)) { /* forbidden pairs keep a column below its minimum use */
+            s->report.column_error = softassign__column(s, j);
+            return SAT_ERR_LIMIT;
+        }
+        softassign__set_price(s, j, price < s->top[j] ? price : s->top[j]);
+    }
+    s->excess = 0;
+    s->phase = SOFTASSIGN__DONE;
+    s->prices_known = 1;
+    return SAT_OK;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   The proof: with every slot full or at its top price, no assignment is cheaper than this one less the excess, the sum
+   over the rows of what their own slot's cost - price lies above the least one (complementary slackness).
+   ------------------------------------------------------------------------------------------------ */
+
+/* (a - b) - (c - d) and a bound of its error, 0 where the differences are exact. */
+static double softassign__difference(double a, double b, double c, double d, double *error)
+{
+    double x = a - b, t = x - a, x_low = (a - (x - t)) - (b + t);
+    double y = c - d, y_low, z, z_low;
+    t = y - c;
+    y_low = (c - (y - t)) - (d + t);
+    z = x - y;
+    t = z - x;
+    z_low = (x - (z - t)) - (y + t);
+    *error = x_low != 0 || y_low != 0 || z_low != 0 ? (fabs(a) + fabs(b) + fabs(c) + fabs(d)) * 1e-31 : 0;
+    return z + (z_low + (x_low - y_low));
+}
+
+/* How far the row's own slot is from its best, from all costs. */
+static double softassign__row_excess(const softassign *s, int row)
+{
+    double own_cost = (double)s->cost_of_row[row], own_price = s->price[s->slot_of_row[row]], least = 0;
+    int j;
+    for (j = 0; j < s->slots; j++) {
+        float cost;
+        double w, error;
+        if (s->capacity[j] == 0 || !((cost = softassign__cost(s, row, j)) < SOFTASSIGN__INFINITY)) continue;
+        w = softassign__difference((double)cost, own_cost, s->price[j], own_price, &error);
+        if (j != s->slot_of_row[row] && w - error < least) least = w - error;
+    }
+    return -least;
+}
+
+/* Sets s->excess; 1 when it is small beside the costs that are used. The rounding of row minima is enough nearly always. */
+static int softassign__prove(softassign *s)
+{
+    double *least = s->row_distance, used = 0, quick = 0;
+    int i;
+    s->proving = 1;
+    softassign__certify(s);
+    s->proving = 0;
+    for (i = 0; i < s->rows; i++) {
+        double own = (double)s->cost_of_row[i] - s->price[s->slot_of_row[i]], over = own - least[i];
+        used += fabs((double)s->cost_of_row[i]);
+        least[i] = (over > 0 ? over : 0) + 4.5e-16 * (fabs(own) + fabs(least[i]));
+        quick += least[i];
+    }
+    s->excess = quick;
+    if (quick <= 1e-13 * used) return 1;
+    s->excess = 0;
+    for (i = 0; i < s->rows; i++)
+        if (least[i] > 0) s->excess += softassign__row_excess(s, i);
+    return s->excess <= 1e-13 * used;
+}
+
+/* ------------------------------------------------------------------------------------------------
    The solver: phases that can be left at any time
    ------------------------------------------------------------------------------------------------ */
 
@@ -1686,13 +2003,16 @@ static sat_result softassign__finish_phase(softassign *s)
             softassign__finish(s, j);
             return SAT_OK;
         }
-        if (j >= s->columns && softassign__is_free(s, j)) { /* forbidden pairs keep a column below its minimum use */
-            s->report.column_error = softassign__column(s, j);
-            return SAT_ERR_LIMIT;
-        }
+        if (j >= s->columns && softassign__is_free(s, j)) break;
         s->next++;
     }
-    s->phase = SOFTASSIGN__DONE;
+    if (s->next < s->slots || !(s->phase = SOFTASSIGN__DONE, softassign__prove(s))) {
+        s->excess = -1;
+        softassign__start_repair(s);
+        s->phase = SOFTASSIGN__REPAIR;
+        s->next = 0;
+        return SAT_OK;
+    }
     s->prices_known = 1;
     return SAT_OK;
 }
@@ -1705,7 +2025,8 @@ static sat_result softassign__advance(softassign *s, size_t budget)
         if (s->phase == SOFTASSIGN__LISTS || s->phase == SOFTASSIGN__RELIST) result = softassign__list_phase(s, stop - s->report.work);
         else if (s->phase == SOFTASSIGN__PRICES) result = softassign__price_phase(s);
         else if (s->phase == SOFTASSIGN__PATHS) result = softassign__path_phase(s);
-        else result = softassign__finish_phase(s);
+        else if (s->phase == SOFTASSIGN__FINISH) result = softassign__finish_phase(s);
+        else result = softassign__repair_phase(s);
     }
     return result;
 }
@@ -1717,6 +2038,7 @@ static sat_result softassign__advance(softassign *s, size_t budget)
 static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
 {
     size_t rows = (size_t)s->rows, cells = 0, slots = (size_t)s->max_slots, padded = (size_t)s->padded, list = rows * (size_t)s->list;
+    size_t shared = slots * (sizeof(softassign__fixed) / sizeof(float));
     int workers = sat__worker_count(&s->options.threads), w;
     if (s->dense && !sat__multiply_size(&cells, rows, (size_t)s->columns)) a->overflow = 1;
     s->matrix = (float *)sat__carve(a, cells, sizeof(float));
@@ -1732,8 +2054,10 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->coarse = (float *)sat__carve(a, padded * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
     s->row_coarse = (float *)sat__carve(a, rows * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
     s->cost_of_row = (float *)sat__carve(a, rows, sizeof(float));
-    s->list_cost = (float *)sat__carve(a, list, sizeof(float));
-    s->list_value = (float *)sat__carve(a, list, sizeof(float));
+    s->exact_price = (softassign__fixed *)sat__carve(a, list > shared ? list : shared, sizeof(float)); /* the repair needs no lists */
+    s->exact_distance = (softassign__fixed *)sat__carve(a, list > shared ? list : shared, sizeof(float));
+    s->list_cost = (float *)(void *)s->exact_price;
+    s->list_value = (float *)(void *)s->exact_distance;
     s->parent_cost = (float *)sat__carve(a, slots, sizeof(float));
     s->column_sum = (float *)sat__carve(a, slots, sizeof(float));
     s->soft_row = (float *)sat__carve(a, padded, sizeof(float));
@@ -1772,6 +2096,8 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
         s->scratch[w].distances = 0;
     }
 }
+
+static int softassign__progress(softassign *s, const int *slots);
 
 /* ------------------------------------------------------------------------------------------------
    Greedy search (Slomp 2012, section 3.4.2), and moves and swaps while they help
@@ -1918,8 +2244,10 @@ static void softassign__two_opt(softassign *s, int passes)
 {
     int pass, i, changed = 1, j;
     for (j = 0; j < s->slots; j++) softassign__set_price(s, j, 0);
-    for (pass = 0; pass < passes && changed; pass++)
+    for (pass = 0; pass < passes && changed; pass++) {
         for (changed = i = 0; i < s->rows; i++) changed += softassign__improve_row(s, i);
+        if (changed && softassign__progress(s, s->slot_of_row)) break;
+    }
 }
 
 #endif /* SOFTASSIGN_NO_HEURISTICS */
@@ -1937,8 +2265,6 @@ static void softassign__take_back(softassign *s, const int *best)
     for (i = 0; i < s->rows; i++) softassign__unassign(s, i);
     for (i = 0; i < s->rows; i++) softassign__assign(s, i, best[i], softassign__cost(s, i, best[i]));
 }
-
-static int softassign__progress(softassign *s, const int *slots);
 
 /* ------------------------------------------------------------------------------------------------
    Simulated annealing (Slomp 2012, eq 3.7 and 3.8). alpha cancels, as every state has one element a row. A slot is
@@ -2461,7 +2787,11 @@ static void softassign__report_slots(softassign *s, const int *slots)
     }
     s->report.cost = softassign__total(&cost);
     s->report.lower_bound = s->bound;
-    s->report.gap = softassign__gap(s->report.cost, s->bound);
+    if (s->phase == SOFTASSIGN__DONE && s->excess >= 0 && s->bonus <= 0) { /* proven by softassign__prove */
+        double proven = s->report.cost - s->excess - fabs(s->report.cost) * 4.5e-16 - cost.magnitude * 1e-28;
+        if (proven > s->bound) s->report.lower_bound = s->bound = proven;
+    }
+    s->report.gap = softassign__gap(s->report.cost, s->bound, cost.magnitude);
     s->report.bytes = s->bytes;
     for (i = 0; i < workers; i++) {
         s->report.distances_computed += s->scratch[i].distances;
@@ -2474,10 +2804,10 @@ static int softassign__progress(softassign *s, const int *slots)
 {
     int i;
     if (!s->options.progress) return 0;
-    if (!slots) return s->options.progress(&s->report, NULL, s->options.progress_user) != 0;
+    if (!slots) return s->stopped = s->options.progress(&s->report, NULL, s->options.progress_user) != 0;
     softassign__report_slots(s, slots);
     for (i = 0; i < s->rows; i++) s->shown_column[i] = softassign__column(s, slots[i]);
-    return s->options.progress(&s->report, s->shown_column, s->options.progress_user) != 0;
+    return s->stopped = s->options.progress(&s->report, s->shown_column, s->options.progress_user) != 0;
 }
 
 /* Completes the solver's assignment for the eye: rows without a slot get the nearest listed free one, else the first
@@ -2615,18 +2945,30 @@ static sat_result softassign__check_costs(softassign *s)
    Starting a problem
    ------------------------------------------------------------------------------------------------ */
 
-/* A mandatory slot's price starts so high that leaving it free costs more than any assignment saves. */
+/* What a mandatory slot starts at: four times the widest difference of costs. A chain of moves may save more than that and
+   leave the slot free; the exact repair knows no such limit. */
 static double softassign__mandatory_price(const softassign *s)
 {
-    double largest = 0;
+    const softassign_problem *p = &s->problem;
+    double low = 0, high = 0;
     int i, j;
-    if (!s->dense && !s->problem.cost && !s->problem.cost_fn) return 1e6 * (s->rows + 1.0) * (double)s->slack + 1e-30;
+    if (!s->dense && !p->cost && !p->cost_fn) { /* no distance is above the sum of the norms */
+        for (i = 0; i < s->rows + s->columns; i++) {
+            const float *f = i < s->rows ? p->row_features + (size_t)i * (size_t)p->feature_count
+                                         : p->column_features + (size_t)(i - s->rows) * (size_t)p->feature_count;
+            double norm = 0, *largest = i < s->rows ? &low : &high;
+            for (j = 0; j < p->feature_count; j++) norm += ((double)f[j] - (double)p->column_features[j]) * ((double)f[j] - (double)p->column_features[j]);
+            if (norm > *largest) *largest = norm;
+        }
+        return 4 * (sqrt(low) + sqrt(high)) + 1e-30;
+    }
     for (i = 0; i < s->rows; i++)
         for (j = 0; j < s->columns; j++) {
-            double cost = fabs((double)softassign__cost(s, i, j));
-            if (cost < (double)SOFTASSIGN__INFINITY && cost > largest) largest = cost;
+            double cost = (double)softassign__cost(s, i, j);
+            if (cost < low) low = cost;
+            if (cost < (double)SOFTASSIGN__INFINITY && cost > high) high = cost;
         }
-    return 4 * largest * (s->rows + 1.0) + 1e-30;
+    return 4 * (high - low) + 1e-30;
 }
 
 static sat_result softassign__make_slots(softassign *s)
@@ -2635,6 +2977,7 @@ static sat_result softassign__make_slots(softassign *s)
     int64_t room = 0, needed = 0;
     int j, units = 1;
     s->slots = s->columns;
+    s->all_open = 1;
     for (j = 0; j < s->columns; j++) {
         int capacity = p->capacity ? p->capacity[j] : s->options.capacity_default, least = p->minimum_use ? p->minimum_use[j] : 0;
         if (least > capacity) {
@@ -2646,6 +2989,7 @@ static sat_result softassign__make_slots(softassign *s)
         units &= capacity == 1 && least == 0;
         s->slot_column[j] = j;
         s->capacity[j] = sat__min_int(capacity - least, s->rows);
+        s->all_open &= s->capacity[j] > 0;
         if (least == 0) continue;
         if (s->slots == s->max_slots) return needed > s->rows ? SAT_ERR_LIMIT : SAT_ERR_ARGUMENT;
         s->slot_column[s->slots] = j;
@@ -2682,6 +3026,7 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     memset(&s->report, 0, sizeof s->report);
     s->report.row_error = s->report.column_error = -1;
     s->bound = -(double)SOFTASSIGN__INFINITY;
+    s->excess = -1;
     result = softassign__make_slots(s);
     if (result != SAT_OK) return result;
     s->bonus = softassign__switching_bonus(s);
@@ -2811,7 +3156,8 @@ SOFTASSIGN_DEF void softassign_next_frame(softassign *solver)
 static void softassign__update_bound(softassign *s)
 {
     double before = s->bound;
-    if (s->phase == SOFTASSIGN__PRICES || s->phase == SOFTASSIGN__RELIST) return;
+    if (s->phase == SOFTASSIGN__PRICES || s->phase == SOFTASSIGN__RELIST || s->phase == SOFTASSIGN__REPAIR) return;
+    if (s->phase == SOFTASSIGN__DONE && s->bonus <= 0) return; /* the proof is the bound */
     softassign__certify(s);
     if (before > s->bound) s->bound = before;
 }
@@ -2888,11 +3234,22 @@ static sat_result softassign__solve_from_prices(softassign *s)
 static sat_result softassign__solve_fast(softassign *s)
 {
     double scale, eps;
+    int turn, done = 0;
     if (!s->unit_capacities) return softassign__solve_exact(s);
     softassign__list_all(s);
     scale = softassign__mean_least(s);
     eps = 1.6 * s->options.gap * scale; /* measured: the certified gap is 0.37 to 0.6 eps */
-    if (eps > 0 && softassign__auction(s, eps, 2000 * (size_t)s->rows)) {
+    for (turn = 0; eps > 0 && turn < 2000; turn++) {
+        if ((done = softassign__auction(s, eps, (size_t)s->rows)) != 0 || !s->options.progress) {
+            if (done) break;
+            continue;
+        }
+        softassign__certify(s);
+        if (!softassign__fill(s, s->shown) || !softassign__progress(s, s->shown)) continue;
+        s->report.method = SOFTASSIGN_FAST; /* stopped: complete stays 0 */
+        return SAT_OK;
+    }
+    if (done) {
         s->phase = SOFTASSIGN__DONE;
         softassign__keep_best(s, s->shown);
         softassign__certify(s);
@@ -2981,7 +3338,11 @@ static sat_result softassign__solve_heuristic(softassign *s)
     softassign__list_all(s);
     softassign__certify(s);
     result = softassign__place_rest(s, softassign__greedy(s));
-    if (result != SAT_OK || o->method == SOFTASSIGN_GREEDY) return result;
+    if (result != SAT_OK) return result;
+    if (o->method == SOFTASSIGN_GREEDY) {
+        (void)softassign__progress(s, s->slot_of_row);
+        return result;
+    }
     if (o->method == SOFTASSIGN_GREEDY_2OPT) softassign__two_opt(s, o->iterations[0]);
     else {
         softassign__list_all(s);
@@ -3016,6 +3377,7 @@ static sat_result softassign__buy_bound(softassign *s)
     }
     s->options.progress = progress;
     if (before > s->bound) s->bound = before;
+    s->excess = -1; /* the proof was about the optimum */
     kept.distances_computed = s->report.distances_computed;
     s->report = kept;
     softassign__reset_assignment(s);
@@ -3133,9 +3495,10 @@ static sat_result softassign__run(softassign *s, softassign__matrix_work *w)
 #endif
     if (method > SOFTASSIGN_FAST) {
         s->report.method = s->options.method;
-        s->report.complete = 1;
+        s->report.complete = !s->stopped;
     }
     if (s->options.min_distance > 0) {
+        s->excess = -1; /* what follows is another assignment */
         if (s->dense_paths) softassign__dense_publish(s);
         if (has_prices) softassign__take_back(s, s->shown);
         softassign__separate(s);
@@ -3520,7 +3883,7 @@ static sat_result softassign__gl_make_programs(softassign_gl *g)
 
 SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc, const softassign_options *options)
 {
-    softassign_options o = options ? *options : softassign_method_defaults(SOFTASSIGN_PUBLISHED);
+    softassign_options o = options ? *options : softassign_defaults();
     sat_allocator allocator;
     sat__gl_state state;
     softassign_gl *g;

@@ -1245,3 +1245,275 @@ TEST(softassign_short_lists_stay_exact)
         free_problem(&q);
     }
 }
+
+/* ---- small problems of all kinds against enumeration ---- */
+
+enum { BRUTE_ROWS = 5, BRUTE_COLUMNS = 6 };
+
+typedef struct brute {
+    float cost[BRUTE_ROWS * BRUTE_COLUMNS];
+    int rows, columns, left[BRUTE_COLUMNS], used[BRUTE_COLUMNS], least[BRUTE_COLUMNS], found;
+    long double best, magnitude;
+} brute;
+
+static int brute_is_forbidden(float c) { return c > 3e38f; }
+
+static void brute_walk(brute *b, int row, long double sum, long double magnitude)
+{
+    int j;
+    if (row == b->rows) {
+        for (j = 0; j < b->columns; j++)
+            if (b->used[j] < b->least[j]) return;
+        if (b->found && sum >= b->best) return;
+        b->found = 1;
+        b->best = sum;
+        b->magnitude = magnitude;
+        return;
+    }
+    for (j = 0; j < b->columns; j++) {
+        float c = b->cost[row * BRUTE_COLUMNS + j];
+        if (b->used[j] >= b->left[j] || brute_is_forbidden(c)) continue;
+        b->used[j]++;
+        brute_walk(b, row + 1, sum + (long double)c, magnitude + (long double)fabsf(c));
+        b->used[j]--;
+    }
+}
+
+static float brute_cost(int kind, uint64_t *seed)
+{
+    double u = support_uniform(seed);
+    switch (kind) {
+    case 0: return (float)u;
+    case 1: return (float)support_below(seed, 4);
+    case 2: return (float)pow(10, -30 + 60 * u);
+    case 3: return u < 0.3 ? 1e30f : (float)support_uniform(seed);
+    case 4: return u < 0.3 ? SOFTASSIGN__INFINITY : (float)support_below(seed, 9);
+    case 5: return (float)(u - 0.5) * (support_below(seed, 3) ? 1.0f : 1e12f);
+    case 6: return (float)support_below(seed, 2);
+    case 7: return u < 0.5 ? 1e20f : u < 0.6 ? SOFTASSIGN__INFINITY : (float)pow(2, -120 + 20 * support_uniform(seed));
+    default: return (float)(support_below(seed, 1000) * support_below(seed, 1000));
+    }
+}
+
+static void brute_check(brute *b, const softassign_problem *p, sat_result result, const int *x, const softassign_report *r, const char *what)
+{
+    long double sum = 0, allowed;
+    int used[BRUTE_COLUMNS] = {0}, i, ok = 1;
+    if (!b->found || result != SAT_OK) {
+        if (!EXPECT_EQ(result, b->found ? SAT_OK : SAT_ERR_LIMIT)) printf("%s: %d x %d\n", what, b->rows, b->columns);
+        return;
+    }
+    for (i = 0; i < p->rows; i++) {
+        ok &= x[i] >= 0 && x[i] < p->columns && ++used[x[i]] <= b->left[x[i]];
+        if (ok) sum += (long double)b->cost[i * BRUTE_COLUMNS + x[i]];
+    }
+    for (i = 0; i < p->columns; i++) ok &= used[i] >= b->least[i];
+    allowed = 1e-12L * b->magnitude;
+    ok &= sum <= b->best + allowed && r->complete == 1;
+    ok &= (long double)r->lower_bound <= b->best + 1e-17L * b->magnitude && (long double)r->lower_bound >= b->best - allowed;
+    if (!ok) {
+        printf("%s: %d x %d, cost %.17g optimum %.17Lg bound %.17g complete %d\n", what, b->rows, b->columns, (double)sum, b->best, r->lower_bound, r->complete);
+        EXPECT(ok);
+    }
+}
+
+/* SOFTASSIGN_BRUTE=1000000 in the environment for the long run. */
+TEST(softassign_all_kinds_by_brute_force)
+{
+    const char *asked = getenv("SOFTASSIGN_BRUTE");
+    long runs = asked ? atol(asked) : 20000, n;
+    uint64_t seed = 20260;
+    softassign *warm[BRUTE_ROWS][BRUTE_COLUMNS][2];
+    memset(warm, 0, sizeof warm);
+    for (n = 0; n < runs && expect_state.failures < 10; n++) {
+        brute b;
+        softassign_problem p;
+        int kind = (int)support_below(&seed, 9), i, j, m, x[BRUTE_ROWS], capacities = support_below(&seed, 3) == 0, least = support_below(&seed, 4) == 0;
+        memset(&b, 0, sizeof b);
+        memset(&p, 0, sizeof p);
+        p.rows = b.rows = 1 + (int)support_below(&seed, BRUTE_ROWS);
+        p.columns = b.columns = 1 + (int)support_below(&seed, BRUTE_COLUMNS);
+        for (i = 0; i < BRUTE_ROWS * BRUTE_COLUMNS; i++) b.cost[i] = brute_cost(kind, &seed);
+        for (i = 1; i < b.rows && support_below(&seed, 8) == 0; i++) /* duplicate rows */
+            for (j = 0; j < b.columns; j++) b.cost[i * BRUTE_COLUMNS + j] = b.cost[j];
+        for (j = 0; j < b.columns; j++) {
+            b.left[j] = capacities ? (int)support_below(&seed, 4) : 1;
+            if (least && b.left[j]) b.least[j] = support_below(&seed, 2) ? 0 : (int)support_below(&seed, b.left[j] + 1);
+        }
+        p.cost = b.cost;
+        p.stride = BRUTE_COLUMNS;
+        if (capacities) p.capacity = b.left;
+        if (least) p.minimum_use = b.least;
+        brute_walk(&b, 0, 0, 0);
+        for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_FAST; m++) {
+            static const char *const names[3] = {"auto", "exact", "fast"};
+            softassign_options o = softassign_method_defaults((softassign_method)m);
+            softassign_report r;
+            o.gap = 1e-14;
+            brute_check(&b, &p, softassign_solve(x, &p, &o, &r), x, &r, names[m]);
+            if (m == SOFTASSIGN_FAST || least) continue;
+            if (!warm[b.rows - 1][b.columns - 1][m]) EXPECT_EQ(softassign_create(&warm[b.rows - 1][b.columns - 1][m], b.rows, b.columns, &o), SAT_OK);
+            softassign_next_frame(warm[b.rows - 1][b.columns - 1][m]);
+            brute_check(&b, &p, softassign_step(warm[b.rows - 1][b.columns - 1][m], x, &p, 1000000, &r), x, &r, m ? "warm exact" : "warm auto");
+        }
+    }
+    for (n = 0; n < BRUTE_ROWS * BRUTE_COLUMNS * 2; n++) softassign_destroy((&warm[0][0][0])[n]);
+}
+
+/* ---- what once went wrong ---- */
+
+TEST(softassign_minimum_use_on_features_has_a_choice)
+{
+    enum { N = 1100 };
+    static float rows[2 * N], columns[3 * N];
+    const float one[1] = {0}, two[2] = {0, 1};
+    const int least[2] = {0, 1}, last[3] = {0, 0, 1};
+    softassign_problem p;
+    softassign_report r;
+    int m, k, x[2];
+    for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_FAST; m++) {
+        softassign_options o = softassign_method_defaults((softassign_method)m);
+        memset(&p, 0, sizeof p);
+        p.rows = 1, p.columns = 2, p.feature_count = 1;
+        p.row_features = one, p.column_features = two, p.minimum_use = least;
+        EXPECT_EQ(softassign_solve(x, &p, &o, &r), SAT_OK);
+        EXPECT(x[0] == 1 && r.cost >= 1 && r.cost <= 1);
+        for (k = 1024; k < N; k++) columns[2 * N + k] = 1000;
+        columns[0] = 1;
+        p.rows = 2, p.columns = 3, p.feature_count = N;
+        p.row_features = rows, p.column_features = columns, p.minimum_use = last;
+        EXPECT_EQ(softassign_solve(x, &p, &o, &r), SAT_OK);
+        EXPECT(x[0] == 2 || x[1] == 2);
+        EXPECT(x[0] == 1 || x[1] == 1);
+    }
+}
+
+/* A tracker's frames: gated pairs carry a big number, prices are kept from frame to frame. */
+TEST(softassign_warm_frames_with_big_gates_are_optimal)
+{
+    static const float gates[3] = {1e12f, 1e20f, 1e30f};
+    enum { N = 40 };
+    int g, frame, i, x[N];
+    for (g = 0; g < 3; g++) {
+        uint64_t seed = 5;
+        softassign *s = NULL;
+        EXPECT_EQ(softassign_create(&s, N, N, NULL), SAT_OK);
+        for (frame = 0; frame < 60; frame++) {
+            float cost[N * N];
+            softassign_problem p;
+            softassign_report r;
+            double best;
+            for (i = 0; i < N * N; i++) cost[i] = support_uniform(&seed) < 0.85 ? gates[g] : (float)support_uniform(&seed);
+            for (i = 0; i < N; i++) cost[i * N + (i * 7 + frame) % N] = (float)support_uniform(&seed);
+            memset(&p, 0, sizeof p);
+            p.rows = p.columns = N, p.cost = cost, p.stride = N;
+            best = (double)reference_optimum(cost, N, N, NULL, NULL);
+            if (frame) softassign_next_frame(s);
+            EXPECT_EQ(softassign_step(s, x, &p, (size_t)-1 / 4, &r), SAT_OK);
+            EXPECT_EQ(r.complete, 1);
+            EXPECT_NEAR(r.cost, best, 1e-12 * best);
+            EXPECT(r.lower_bound <= r.cost && r.cost - r.lower_bound <= 1e-12 * best);
+        }
+        softassign_destroy(s);
+    }
+}
+
+TEST(softassign_costs_that_are_not_used_do_not_spoil_the_proof)
+{
+    static const float cost[6] = {0.25f, 1e30f, 1e30f, 0.5f, 0.125f, 1e30f}, zero[6] = {0, 1, 2, 1, 0, 2};
+    softassign_problem p;
+    softassign_report r;
+    int m, x[2];
+    memset(&p, 0, sizeof p);
+    p.rows = 2, p.columns = 3, p.stride = 3;
+    for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_FAST; m++) {
+        softassign_options o = softassign_method_defaults((softassign_method)m);
+        p.cost = cost;
+        EXPECT_EQ(softassign_solve(x, &p, &o, &r), SAT_OK);
+        EXPECT(r.cost >= 0.375 && r.cost <= 0.375 && r.complete == 1);
+        EXPECT(r.lower_bound >= 0.375 * (1 - (m == SOFTASSIGN_FAST ? 1e-3 : 1e-12)));
+        p.cost = zero;
+        EXPECT_EQ(softassign_solve(x, &p, &o, &r), SAT_OK);
+        EXPECT(r.cost >= 0 && r.cost <= 0 && r.gap >= 0 && r.gap <= 0 && r.complete == 1);
+    }
+}
+
+static int stop_at_once(const softassign_report *report, const int *x, void *user)
+{
+    (void)report, (void)x;
+    ++*(int *)user;
+    return 1;
+}
+
+TEST(softassign_a_stopped_method_is_not_complete)
+{
+    problem q = make_features(80, 1500, 12, 61);
+    int m, x[80];
+    for (m = 0; m < 9; m++) {
+        softassign_options o = quick_options(all_methods[m]);
+        softassign_report r;
+        int calls = 0;
+        o.progress = stop_at_once;
+        o.progress_user = &calls;
+        o.gap = 1e-7;
+        EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
+        check_solution(&q, x, &r, 1e9);
+        EXPECT_EQ(calls, 1);
+        EXPECT_EQ(r.complete, 0);
+    }
+    free_problem(&q);
+}
+
+TEST(softassign_stamps_start_again_before_they_overflow)
+{
+    problem q = make_dense(12, 20, cost_uniform, 3);
+    softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
+    softassign_report r;
+    softassign *s = NULL;
+    int x[12], frame;
+    EXPECT_EQ(softassign_create(&s, 12, 20, &o), SAT_OK);
+    s->epoch = SOFTASSIGN__LAST_EPOCH - 40;
+    for (frame = 0; frame < 20; frame++) {
+        softassign_next_frame(s);
+        EXPECT_EQ(softassign_step(s, x, &q.p, 1000000, &r), SAT_OK);
+        check_solution(&q, x, &r, 0);
+    }
+    EXPECT(s->epoch < 1000);
+    softassign_destroy(s);
+    free_problem(&q);
+}
+
+/* Closed columns among more than 16 times `neighbours`: every list must still be whole. */
+TEST(softassign_closed_columns_leave_lists_whole)
+{
+    enum { M = 60, NN = 4100, F = 12 };
+    float *rows = (float *)malloc(M * F * sizeof(float)), *columns = (float *)malloc(NN * F * sizeof(float)), *cost = (float *)malloc((size_t)M * NN * sizeof(float));
+    int capacity[NN], x[M], t, i, j, k;
+    uint64_t seed = 88;
+    for (t = 0; t < 12; t++) {
+        int n = 2600 + (int)support_below(&seed, 1500), steps = t % 3;
+        double closed = 0.02 + 0.95 * support_uniform(&seed), off = 0.6 * support_uniform(&seed), best;
+        softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
+        softassign_report r;
+        softassign_problem p;
+        memset(&p, 0, sizeof p);
+        if (t >= 8) o.neighbours = 4 + t % 4;
+        for (i = 0; i < M * F; i++) rows[i] = steps ? (float)support_below(&seed, 3) : (float)support_uniform(&seed);
+        for (j = 0; j < n; j++) {
+            capacity[j] = t >= 8 || support_uniform(&seed) > closed;
+            for (k = 0; k < F; k++) columns[j * F + k] = steps ? (float)support_below(&seed, 3) : (float)(support_uniform(&seed) + (capacity[j] ? off : 0));
+        }
+        for (i = 0; i < M; i++)
+            for (j = 0; j < n; j++)
+                cost[i * n + j] = capacity[j] ? softassign__distance(rows + i * F, columns + j * F, F) : SOFTASSIGN__INFINITY;
+        best = (double)reference_optimum(cost, M, n, NULL, NULL);
+        p.rows = M, p.columns = n, p.feature_count = F, p.row_features = rows, p.column_features = columns;
+        if (t < 8) p.capacity = capacity;
+        EXPECT_EQ(softassign_solve(x, &p, &o, &r), SAT_OK);
+        EXPECT_NEAR(r.cost, best, 1e-12 * best);
+        EXPECT(r.complete == 1 && r.lower_bound <= best && best - r.lower_bound <= 1e-12 * best);
+    }
+    free(rows);
+    free(columns);
+    free(cost);
+}
