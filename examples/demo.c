@@ -2,10 +2,12 @@
 
        demo                                           dusk, out/demo.png
        demo --hour night --rate 20mm --out night.png
-       demo --env forest.exr --mesh bunny.ply         other light, another sculpture
+       demo forest.exr bunny.ply                      other light, another sculpture
        demo --no-shadows --no-occlusion               each stage can be left out
-       demo --mosaic                                  the picture again, from tiles cut out of it, each used once
-       demo --frames 60 --out rain.png                rain_0000.png and so on, 30 a second */
+       demo --mosaic                                  the picture again, from tiles cut out of it, each used once: out/demo_mosaic.png
+       demo --frames 60 --out rain.png                rain_0000.png and so on, 30 a second
+
+   A .png is tone-mapped; .exr, .hdr and .pfm hold what comes before that. */
 
 #define _POSIX_C_SOURCE 200809L
 #define LIGHTSCAN_IMPLEMENTATION
@@ -81,137 +83,89 @@ static void print_table(const pipeline *p, const gl_context *context)
     print_row("tone", p->seconds[PIPELINE_TONE], "0 (exact search)", rest);
 }
 
-static int save_mosaic(pipeline *p, const char *path)
+static int save_mosaic(pipeline *p, const common_settings *common, const char *path)
 {
     const softassign_report *r = &p->mosaic_report;
     char error[80], rest[200];
-    if (!pipeline_mosaic(p)) {
-        fprintf(stderr, "demo: %s\n", p->message);
-        return 0;
-    }
+    if (!pipeline_mosaic(p)) return common_say(common, p->message);
     snprintf(rest, sizeof rest, "%d tiles of %d, none twice; of the distances %.0f %% never computed", p->mosaic_patches, p->mosaic_tiles,
              fmax(0, 100 - 100 * (double)r->distances_computed / ((double)p->mosaic_patches * p->mosaic_tiles)));
     print_row("mosaic", p->mosaic_seconds, percent(error, sizeof error, r->gap, "of the cost, at most"), rest);
-    if (image_save_u8(path, p->mosaic, p->mosaic_width, p->mosaic_height, 3)) return 1;
-    fprintf(stderr, "demo: %s cannot be written\n", path);
-    return 0;
+    return common_save_u8(common, path, p->mosaic, p->mosaic_width, p->mosaic_height, 3);
 }
 
 /* ---- command line ---- */
 
-static int choose(const char *option, const char *word, const char *const *words)
+static int save(pipeline *p, const common_settings *common, const char *path)
 {
-    int i;
-    for (i = 0; words[i]; ++i)
-        if (strcmp(words[i], word) == 0) return i;
-    fprintf(stderr, "demo: --%s %s: must be one of", option, word);
-    for (i = 0; words[i]; ++i) fprintf(stderr, " %s", words[i]);
-    fputc('\n', stderr);
-    exit(2);
+    if (image_ends_with(path, ".png")) return common_save_u8(common, path, p->pixels, p->options.width, p->options.height, 3);
+    return common_save(common, path, &p->hdr);
 }
 
-/* "out/demo.png" with "_mosaic" or "_0003" before the ending, which may be another one. */
-static void path_with(char *out, size_t size, const char *path, const char *more, const char *ending)
-{
-    const char *dot = strrchr(path, '.'), *slash = strrchr(path, '/');
-    int stem = dot && (!slash || dot > slash) ? (int)(dot - path) : (int)strlen(path);
-    snprintf(out, size, "%.*s%s%s", stem, path, more, ending ? ending : path + stem);
-}
-
-static int save(pipeline *p, const char *path)
-{
-    char exr[1024];
-    path_with(exr, sizeof exr, path, "", ".exr");
-#ifdef HAVE_OPENEXR
-    if (!image_save(&p->hdr, exr)) fprintf(stderr, "demo: %s\n", p->hdr.message);
-#endif
-    if (image_save_u8(path, p->pixels, p->options.width, p->options.height, 3)) return 1;
-    fprintf(stderr, "demo: %s cannot be written\n", path);
-    return 0;
-}
-
-static int run(pipeline *p, const gl_context *context, int frames, const char *out, int stats, int mosaic)
+static int run(pipeline *p, const gl_context *context, int frames, const common_settings *common, int mosaic)
 {
     double sum[PIPELINE_STAGES] = {0};
     common_progress progress = {0, 0};
-    char path[1024], number[16];
+    char path[FILE_PATH], number[16];
     int i, k;
     for (i = 0; i < frames; ++i) {
-        if (!pipeline_frame(p, i ? 1 / 30.0 : 0)) {
-            fprintf(stderr, "demo: %s\n", p->message);
-            return 0;
-        }
+        if (!pipeline_frame(p, i ? 1 / 30.0 : 0)) return common_say(common, p->message);
         for (k = PIPELINE_SCENE; k < PIPELINE_STAGES; ++k) sum[k] += p->seconds[k];
         snprintf(number, sizeof number, "_%04d", i);
-        path_with(path, sizeof path, out, frames > 1 ? number : "", NULL);
-        if (!save(p, path)) return 0;
+        if (!common_path(common, path, common->out, frames > 1 ? number : "") || !save(p, common, path)) return 0;
         common_show_progress(&progress, "frames", i + 1, frames);
     }
     for (k = PIPELINE_SCENE; k < PIPELINE_STAGES; ++k) p->seconds[k] = sum[k] / frames;
-    if (stats) print_table(p, context);
-    path_with(path, sizeof path, out, "_mosaic", NULL);
-    return !mosaic || save_mosaic(p, path);
+    if (common->stats) print_table(p, context);
+    if (!mosaic || !common_path(common, path, common->out, "_mosaic")) return !mosaic;
+    if (!image_ends_with(path, ".png")) strcpy(strrchr(path, '.'), ".png"); /* all endings have four characters */
+    return save_mosaic(p, common, path);
 }
 
 int main(int argc, char **argv)
 {
-    static const char *const hours[] = {"dusk", "night", "noon", NULL};
-    static const char *const operators[] = {"local", "global", "ashikhmin", "ashikhmin-global", "linear", NULL};
-    static const char *const mesopics[] = {"off", "uniform", "local", NULL};
-    const char *hour = "dusk", *operation = "local", *mesopic = "local", *rate = "150mm", *env = NULL, *shape = NULL, *out;
-    int size[2] = {1280, 720}, frames = 1, gl = 0, mosaic = 0, no_shadows = 0, no_occlusion = 0, no_rain = 0, no_tone = 0, first, ok;
+    const char *env = NULL, *shape = NULL;
+    int hour = 0, operation = 0, mesopic, size[2] = {1280, 720}, frames = 1, gl = 0, mosaic = 0, no_shadows = 0, no_occlusion = 0, no_rain = 0, no_tone = 0, ok;
     pipeline_options o = pipeline_defaults();
     const common_option options[] = {
-        {"env", 's', &env, "equirectangular picture of the light; without it a sky of our own"},
-        {"mesh", 's', &shape, "PLY or OBJ instead of the knot"},
-        {"size", 'z', size, "of the picture, 1280x720"},
-        {"rate", 's', &rate, "rain an hour, 150mm"},
-        {"hour", 's', &hour, "dusk, night or noon"},
-        {"turn", 'f', &o.turn, "degrees by which the light is turned"},
-        {"ao-radius", 'f', &o.ao_radius, "reach of ambient occlusion, 0.12 m"},
-        {"shutter", 'f', &o.shutter, "seconds for which the drops move, 0.0002"},
-        {"operator", 's', &operation, "local, global, ashikhmin, ashikhmin-global or linear"},
-        {"key", 'f', &o.key, "display value of the log-average; 0: one for the hour"},
-        {"exposure", 'f', &o.exposure, "stops more light"},
-        {"mesopic", 's', &mesopic, "off, uniform or local: reds fade in dim light"},
-        {"samples", 'i', &o.samples, "points a pixel each way, 1 to 4; 2"},
-        {"frames", 'i', &frames, "pictures, 1/30 s apart"},
-        {"gl", 'b', &gl, "on OpenGL (OSMesa; LIGHTSCAN_GL=egl: the GPU)"},
-        {"mosaic", 'b', &mosaic, "the picture again, from tiles"},
-        {"no-shadows", 'b', &no_shadows, "leave fiv.h out"},
-        {"no-occlusion", 'b', &no_occlusion, "leave ssao_sat.h out"},
-        {"no-rain", 'b', &no_rain, "leave raindrop.h out"},
-        {"no-tone", 'b', &no_tone, "leave tonemap.h out but for the exposure"},
+        {"env", 'P', (void *)&env, 0, 0, "equirectangular picture of the light; without it a sky of our own"},
+        {"mesh", 'M', (void *)&shape, 0, 0, "instead of the knot"},
+        {"size", 'z', size, 16, 8192, "of the picture"},
+        {"rate", 'm', &o.rate, 0, 500, "rain in mm an hour"},
+        {"hour", 'w', &hour, 0, 0, "dusk|night|noon"},
+        {"turn", 'f', &o.turn, -36000, 36000, "degrees by which the light is turned"},
+        {"ao-radius", 'f', &o.ao_radius, 0, 100, "reach of ambient occlusion in metres"},
+        {"shutter", 'f', &o.shutter, 0, 10, "seconds for which the drops move"},
+        {"operator", 'w', &operation, 0, 0, "local|global|ashikhmin|ashikhmin-global|linear"},
+        {"key", 'f', &o.key, 0, 10, "display value of the log-average; 0: one for the hour"},
+        {"exposure", 'f', &o.exposure, -100, 100, "stops more light"},
+        {"mesopic", 'w', &mesopic, 0, 0, "off|uniform|local reds fade in dim light"},
+        {"samples", 'i', &o.samples, 1, 4, "points a pixel each way"},
+        {"frames", 'i', &frames, 1, 9999, "pictures, 1/30 s apart"},
+        {"gl", 'b', &gl, 0, 0, "on OpenGL (OSMesa; LIGHTSCAN_GL=egl: the GPU)"},
+        {"mosaic", 'b', &mosaic, 0, 0, "the picture again, from tiles"},
+        {"no-shadows", 'b', &no_shadows, 0, 0, "leave fiv.h out"},
+        {"no-occlusion", 'b', &no_occlusion, 0, 0, "leave ssao_sat.h out"},
+        {"no-rain", 'b', &no_rain, 0, 0, "leave raindrop.h out"},
+        {"no-tone", 'b', &no_tone, 0, 0, "leave tonemap.h out but for the exposure"},
     };
     common_settings common;
     image light;
     mesh sculpture;
     gl_context context;
     pipeline p;
-    char *end;
-    first = common_parse(&common, argc, argv, "demo [options] [out.png]", options, (int)(sizeof options / sizeof options[0]));
-    out = common.out ? common.out : first < argc ? argv[first] : "demo.png";
-    o.hour = (scene_hour)choose("hour", hour, hours);
-    o.operation = (tonemap_operator)choose("operator", operation, operators);
-    o.mesopic = (tonemap_mesopic)choose("mesopic", mesopic, mesopics);
-    o.rate = (float)strtod(rate, &end);
-    if (end == rate || (*end && strcmp(end, "mm") != 0) || !(o.rate >= 0 && o.rate <= 500) || frames < 1 || frames > 9999) {
-        fprintf(stderr, "demo: --rate goes from 0mm to 500mm, --frames from 1 to 9999\n");
-        return 2;
-    }
-    if (!common_can_write(out)) {
-        fprintf(stderr, "demo: %s cannot be written\n", out);
-        return 1;
-    }
+    mesopic = o.mesopic;
+    common_parse(&common, argc, argv, "demo", ".png .exr .hdr .pfm", options, (int)(sizeof options / sizeof options[0]));
+    o.hour = (scene_hour)hour;
+    o.operation = (tonemap_operator)operation;
+    o.mesopic = (tonemap_mesopic)mesopic;
     o.width = size[0], o.height = size[1];
     o.shadows = !no_shadows, o.occlusion = !no_occlusion, o.rain = !no_rain && o.rate > 0, o.tone = !no_tone;
     o.threads = common.threads;
     memset(&light, 0, sizeof light);
     memset(&sculpture, 0, sizeof sculpture);
-    if ((env && !image_load(&light, env)) || (shape && !mesh_load(&sculpture, shape))) {
-        fprintf(stderr, "demo: %s\n", env && !light.pixels ? light.message : sculpture.message);
-        return 1;
-    }
+    if (env && !image_load(&light, env)) return common_say(&common, light.message), 1;
+    if (shape && !mesh_load(&sculpture, shape)) return common_say(&common, sculpture.message), 1;
     o.environment = env ? &light : NULL;
     o.shape = shape ? &sculpture : NULL;
     if (gl && !gl_context_open(&context, 3, 3)) {
@@ -219,12 +173,12 @@ int main(int argc, char **argv)
         return 1;
     }
     if (gl) o.get_proc = context.get_proc;
-    ok = pipeline_create(&p, &o);
-    if (!ok) fprintf(stderr, "demo: %s\n", p.message);
-    ok = ok && run(&p, &context, frames, out, common.stats, mosaic);
+    ok = pipeline_create(&p, &o) || common_say(&common, p.message);
+    ok = ok && run(&p, &context, frames, &common, mosaic);
     pipeline_destroy(&p);
     if (gl) gl_context_close(&context);
     image_free(&light);
     mesh_free(&sculpture);
+    common_close(&common);
     return !ok;
 }

@@ -49,6 +49,7 @@ typedef struct view {
     pipeline p;
     pipeline_options wanted;
     int help, paused, quit;
+    const common_settings *common;
 } view;
 
 static int view_load(view *v)
@@ -84,11 +85,11 @@ static int view_shot(view *v, const char *path)
     glfwGetFramebufferSize(v->window, &width, &height);
     row = (size_t)width * 3;
     pixels = (unsigned char *)malloc(2 * row * (size_t)height);
-    if (!pixels) return 0;
+    if (!pixels) return common_say(v->common, "no memory");
     flipped = pixels + row * (size_t)height;
     v->ReadPixels(0, 0, width, height, VIEW_RGB, VIEW_UNSIGNED_BYTE, pixels);
     for (y = 0; y < height; ++y) memcpy(flipped + row * (size_t)y, pixels + row * (size_t)(height - 1 - y), row);
-    ok = image_save_u8(path, flipped, width, height, 3);
+    ok = common_save_u8(v->common, path, flipped, width, height, 3);
     free(pixels);
     return ok;
 }
@@ -161,7 +162,7 @@ static int view_loop(view *v, int frames, const char *out)
         now = common_clock();
         seconds = now - last, last = now;
     }
-    if (!ok) fprintf(stderr, "demo_view: %s\n", v->p.message[0] ? v->p.message : "the picture cannot be written");
+    if (v->p.message[0]) common_say(v->common, v->p.message);
     return ok;
 }
 
@@ -182,36 +183,42 @@ static int view_open(view *v)
 int main(int argc, char **argv)
 {
     int size[2] = {640, 360}, frames = 0, gl = 0, hour = 0, ok = 0;
-    const char *word = "dusk";
+    const char *env = NULL, *shape = NULL;
     static view v;
     const common_option options[] = {
-        {"size", 'z', size, "of the picture, 640x360"},
-        {"hour", 's', &word, "dusk, night or noon"},
-        {"gl", 'b', &gl, "on OpenGL; key G"},
-        {"frames", 'i', &frames, "end after so many; 0: go on"},
+        {"env", 'P', (void *)&env, 0, 0, "equirectangular picture of the light; without it a sky of our own"},
+        {"mesh", 'M', (void *)&shape, 0, 0, "instead of the knot"},
+        {"size", 'z', size, 16, 8192, "of the picture"},
+        {"hour", 'w', &hour, 0, 0, "dusk|night|noon"},
+        {"gl", 'b', &gl, 0, 0, "on OpenGL; key G"},
+        {"frames", 'i', &frames, 0, 1000000000, "end after so many; 0: go on"},
     };
     common_settings common;
+    image light;
+    mesh sculpture;
     v.wanted = pipeline_defaults();
-    common_parse(&common, argc, argv, "demo_view [options]", options, 4);
-    hour = strcmp(word, "night") == 0 ? 1 : strcmp(word, "noon") == 0 ? 2 : strcmp(word, "dusk") == 0 ? 0 : -1;
-    if (hour < 0 || frames < 0) {
-        fprintf(stderr, "demo_view: --hour is dusk, night or noon; --frames at least 0\n");
-        return 2;
-    }
+    common_parse(&common, argc, argv, "demo_view", "?.png", options, (int)(sizeof options / sizeof options[0]));
+    v.common = &common;
+    memset(&light, 0, sizeof light);
+    memset(&sculpture, 0, sizeof sculpture);
+    if (env && !image_load(&light, env)) return common_say(&common, light.message), 1;
+    if (shape && !mesh_load(&sculpture, shape)) return common_say(&common, sculpture.message), 1;
+    v.wanted.environment = env ? &light : NULL;
+    v.wanted.shape = shape ? &sculpture : NULL;
     v.wanted.hour = (scene_hour)hour;
     v.wanted.width = size[0], v.wanted.height = size[1], v.wanted.samples = 1;
     v.wanted.threads = common.threads;
-    if (!glfwInit()) {
-        fprintf(stderr, "demo_view: there is no display to open a window on\n");
-        return 1;
-    }
-    if (!pipeline_create(&v.p, &v.wanted)) fprintf(stderr, "demo_view: %s\n", v.p.message);
-    else if (!view_open(&v)) fprintf(stderr, "demo_view: no window with OpenGL 3.3\n");
+    if (!glfwInit()) return common_say(&common, "there is no display to open a window on"), 1;
+    if (!pipeline_create(&v.p, &v.wanted)) common_say(&common, v.p.message);
+    else if (!view_open(&v)) common_say(&common, "no window with OpenGL 3.3");
     else {
         if (gl) v.wanted.get_proc = glfwGetProcAddress;
         ok = view_loop(&v, frames, common.out);
     }
     pipeline_destroy(&v.p);
     glfwTerminate();
+    image_free(&light);
+    mesh_free(&sculpture);
+    common_close(&common);
     return !ok;
 }

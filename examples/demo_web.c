@@ -139,16 +139,17 @@ EMSCRIPTEN_KEEPALIVE const char *web_message(void) { return message; }
 #ifndef __EMSCRIPTEN__
 int main(int argc, char **argv)
 {
+    const char *light = NULL;
+    int ok;
+    const common_option options[] = {{"env", 'P', (void *)&light, 0, 0, "equirectangular picture of the light; without it a sky of our own"}};
     common_settings common;
-    int first = common_parse(&common, argc, argv, "demo_web [--out FILE] [light.hdr]", NULL, 0);
-    const char *out = common.out ? common.out : "demo_web.png";
-    if ((first < argc && !web_open(argv[first])) || !web_create(640, 360, SCENE_DUSK) || !web_frame(0) || !image_save_u8(out, rgba, 640, 360, 4)) {
-        fprintf(stderr, "demo_web: %s\n", message[0] ? message : "the picture cannot be written");
-        return 1;
-    }
+    common_parse(&common, argc, argv, "demo_web", ".png", options, 1);
+    ok = ((!light || web_open(light)) && web_create(640, 360, SCENE_DUSK) && web_frame(0)) || common_say(&common, message);
+    ok = ok && common_save_u8(&common, common.out, rgba, 640, 360, 4);
     pipeline_destroy(&web);
     image_free(&dropped[0]), image_free(&dropped[1]), image_free(&dropped[2]);
     free(rgba);
-    return 0;
+    common_close(&common);
+    return !ok;
 }
 #endif

@@ -1,9 +1,9 @@
 /* fiv_shadows - meshes above a plane under an environment map, with soft shadows on the plane, on each other and on
    themselves.                                                         SPDX-License-Identifier: MIT-0 OR Unlicense
 
-       fiv_shadows out.png                                        the light turns, then the meshes
-       fiv_shadows --env sky.exr --mesh bunny.ply --mesh2 dragon.ply out.png
-       fiv_shadows --compare --size 160x120 out.png               beside rays through every light, and the difference
+       fiv_shadows                                                the light turns, then the meshes: out/fiv_shadows.png
+       fiv_shadows sky.exr bunny.ply dragon.ply --out out.png
+       fiv_shadows --compare --size 160x120 --out out.png         beside rays through every light, and the difference
 
    Without files: a sky with a low sun, and two knots. */
 
@@ -402,7 +402,6 @@ static void open_program(program *p, const char *environment, const char *meshes
     sat_image sky;
     float *memory;
     int i;
-    if (size[0] < 1 || size[1] < 1 || size[0] > 4096 || size[1] > 4096) fail("--size is out of range");
     if (environment && !image_load(&p->sky, environment)) fail(p->sky.message);
     if (!environment) make_sky(&p->sky);
     sky = image_view(&p->sky);
@@ -441,28 +440,29 @@ static void close_program(program *p)
     image_free(&p->sky);
     free(p->v.depth);
     free(p->v.what);
+    common_close(&p->common);
 }
 
 int main(int argc, char **argv)
 {
     program p;
-    const char *environment = NULL, *meshes[OBJECTS] = {NULL, NULL}, *out;
+    const char *environment = NULL, *meshes[OBJECTS] = {NULL, NULL};
     static const char *const labels[6] = {"light 0", "light 70", "light 140", "meshes 0", "meshes 70", "meshes 140"};
     common_cell cells[6];
-    int size[2] = {400, 300}, theta = 32, masks = 0, compare = 0, first, i, count;
+    int size[2] = {400, 300}, theta = 32, masks = 0, compare = 0, i, count, ok;
     unsigned char *difference;
-    common_option options[] = {
-        {"env", 's', &environment, "environment map, .exr or .hdr; a sky of its own"},
-        {"mesh", 's', &meshes[0], "first mesh, .ply or .obj; a knot"},
-        {"mesh2", 's', &meshes[1], "second mesh; a ring"},
-        {"size", 'z', size, "of one picture, 400x300"},
-        {"theta", 'i', &theta, "azimuths of the samples, 32"},
-        {"masks", 'b', &masks, "stored masks where the horizon or two occluders cut"},
-        {"compare", 'b', &compare, "beside rays through every light (minutes when large)"},
+    const common_option options[] = {
+        {"env", 'P', (void *)&environment, 0, 0, "environment map; without one a sky of its own"},
+        {"mesh", 'M', (void *)&meshes[0], 0, 0, "instead of a knot"},
+        {"mesh2", 'M', (void *)&meshes[1], 0, 0, "instead of a ring"},
+        {"size", 'z', size, 1, 4096, "of one picture"},
+        {"theta", 'i', &theta, 4, 4096, "azimuths of the samples, even"},
+        {"masks", 'b', &masks, 0, 0, "stored masks where the horizon or two occluders cut"},
+        {"compare", 'b', &compare, 0, 0, "beside rays through every light (minutes when large)"},
     };
     memset(&p, 0, sizeof p);
-    first = common_parse(&p.common, argc, argv, "fiv_shadows [options] out.png", options, 7);
-    out = p.common.out ? p.common.out : first < argc ? argv[first] : "fiv_shadows.png";
+    common_parse(&p.common, argc, argv, "fiv_shadows", ".png", options, (int)(sizeof options / sizeof options[0]));
+    if (theta % 2) common_leave(&p.common, 2, "--theta", "must be even");
     open_program(&p, environment, meshes, size, theta);
     p.options = fiv_irradiance_defaults();
     p.options.threads = p.common.threads;
@@ -481,8 +481,8 @@ int main(int argc, char **argv)
             difference[i] = (unsigned char)sat__clamp_int(128 + 4 * (cells[0].rgb[i] - cells[1].rgb[i]), 0, 255);
         cells[2].rgb = difference;
     }
-    if (!common_contact_sheet(out, cells, count, 3)) fail("cannot write the picture");
+    ok = common_contact_sheet(&p.common, p.common.out, cells, count, 3);
     for (i = 0; i < count; ++i) free((void *)(uintptr_t)cells[i].rgb);
     close_program(&p);
-    return 0;
+    return !ok;
 }

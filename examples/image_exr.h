@@ -8,61 +8,113 @@ enum { IMAGE_EXR_CHANNELS = 3 };
 typedef struct image_exr {
     exr_context_t file;
     exr_attr_box2i_t window;
-    int width, height;
+    int part, width, height;
     const char *names[IMAGE_EXR_CHANNELS];           /* R G B, or Y RY BY, or one channel and NULL */
     int chroma;                                      /* the names are Y RY BY */
     unsigned char *planes[IMAGE_EXR_CHANNELS];       /* samples as they are stored */
     int types[IMAGE_EXR_CHANNELS], x_step[IMAGE_EXR_CHANNELS], y_step[IMAGE_EXR_CHANNELS];
     int plane_width[IMAGE_EXR_CHANNELS], plane_height[IMAGE_EXR_CHANNELS];
+    char text[130];                                  /* a sentence of its own */
 } image_exr;
 
-/* What the library says goes into the message of the image. */
-static void image_exr_error(exr_const_context_t file, exr_result_t code, const char *text)
-{
-    void *user = NULL;
-    (void)code;
-    if (file && exr_get_user_data(file, &user) == EXR_ERR_SUCCESS && user) snprintf((char *)user, 128, "%s", text);
-}
+/* The library calls this with its lock held, so that nothing can be asked of it here: the codes of the calls tell enough. */
+static inline void image_exr_error(exr_const_context_t file, exr_result_t code, const char *text) { (void)file, (void)code, (void)text; }
 
-static inline void image_exr_initializer(exr_context_initializer_t *options, char *text)
+static inline void image_exr_initializer(exr_context_initializer_t *options)
 {
     memset(options, 0, sizeof *options);
     options->size = sizeof *options;
     options->error_handler_fn = image_exr_error;
-    options->user_data = text;
     options->zip_level = -2;
     options->dwa_quality = -1.0f;
 }
 
 /* ---- which channels make the picture ---- */
 
-static inline int image_exr_find(const exr_attr_chlist_t *list, const char *name)
+/* The name of the channel that is prefix and name, or NULL. */
+static inline const char *image_exr_find(const exr_attr_chlist_t *list, const char *prefix, int prefix_length, const char *name)
 {
     int i;
-    for (i = 0; i < list->num_channels; ++i)
-        if (strcmp(list->entries[i].name.str, name) == 0) return i;
-    return -1;
+    for (i = 0; i < list->num_channels; ++i) {
+        const char *have = list->entries[i].name.str;
+        if (strncmp(have, prefix, (size_t)prefix_length) == 0 && strcmp(have + prefix_length, name) == 0) return have;
+    }
+    return NULL;
 }
 
-static inline const char *image_exr_choose(image_exr *exr)
+/* R G B or Y RY BY under this prefix: 1 when all three are there. */
+static inline int image_exr_three(image_exr *exr, const exr_attr_chlist_t *list, const char *prefix, int prefix_length)
 {
     static const char *const sets[2][3] = {{"R", "G", "B"}, {"Y", "RY", "BY"}};
-    const exr_attr_chlist_t *list = NULL;
-    int i, set;
-    if (exr_get_channels(exr->file, 0, &list) != EXR_ERR_SUCCESS || list->num_channels < 1) return "has no channels";
-    for (set = 0; set < 2 && !exr->names[0]; ++set) {
-        int found = 1;
-        for (i = 0; i < 3; ++i) found &= image_exr_find(list, sets[set][i]) >= 0;
-        for (i = 0; i < 3 && found; ++i) exr->names[i] = sets[set][i];
-        exr->chroma = found && set == 1;
+    int set, i, found;
+    for (set = 0; set < 2; ++set) {
+        for (i = 0, found = 1; i < 3; ++i) {
+            exr->names[i] = image_exr_find(list, prefix, prefix_length, sets[set][i]);
+            found &= exr->names[i] != NULL;
+        }
+        exr->chroma = set == 1;
+        if (found) return 1;
     }
-    if (!exr->names[0]) {       /* grey: Y, else the first one */
-        i = image_exr_find(list, "Y");
-        exr->names[0] = list->entries[i < 0 ? 0 : i].name.str;
+    exr->names[0] = exr->names[1] = exr->names[2] = NULL;
+    exr->chroma = 0;
+    return 0;
+}
+
+/* The picture without a layer; else a layer whose name says that it is the picture; else the first layer with colours; else
+   the one channel beside alpha as grey. 0: nothing of that. */
+static inline int image_exr_names(image_exr *exr, const exr_attr_chlist_t *list)
+{
+    int i, pass, others = 0;
+    if (image_exr_three(exr, list, "", 0)) return 1;
+    for (pass = 0; pass < 2; ++pass) /* Blender writes "ViewLayer.Combined.R" */
+        for (i = 0; i < list->num_channels; ++i) {
+            const char *name = list->entries[i].name.str, *dot = strrchr(name, '.');
+            if (dot && (pass || strstr(name, "Combined.") || strstr(name, "beauty.") || strstr(name, "rgba.")) &&
+                image_exr_three(exr, list, name, (int)(dot + 1 - name))) return 1;
+        }
+    exr->names[0] = image_exr_find(list, "", 0, "Y");
+    for (i = 0; !exr->names[0] && i < list->num_channels; ++i) {
+        const char *name = list->entries[i].name.str, *dot = strrchr(name, '.');
+        if (strcmp(dot ? dot + 1 : name, "A") == 0 && list->num_channels > 1) continue;
+        if (others++ == 0) exr->names[1] = name;
     }
+    if (others == 1) exr->names[0] = exr->names[1];
+    exr->names[1] = NULL;
+    return exr->names[0] != NULL;
+}
+
+/* The names of the channels for a sentence. */
+static inline const char *image_exr_list(char *text, size_t size, const exr_attr_chlist_t *list)
+{
+    size_t used = (size_t)snprintf(text, size, "has neither R, G and B nor a single channel, but");
+    int i;
+    for (i = 0; i < list->num_channels && used < size; ++i) used += (size_t)snprintf(text + used, size - used, " %s", list->entries[i].name.str);
+    return text;
+}
+
+/* The first part that holds a picture, its channels and memory for them. NULL, or what is wrong. */
+static inline const char *image_exr_choose(image_exr *exr)
+{
+    const exr_attr_chlist_t *list = NULL, *first = NULL;
+    int parts = 0, i, k;
+    exr_get_count(exr->file, &parts);
+    for (exr->part = 0; exr->part < parts && !exr->names[0]; ++exr->part) {
+        if (exr_get_channels(exr->file, exr->part, &list) != EXR_ERR_SUCCESS || list->num_channels < 1) continue;
+        if (!first) first = list;
+        if (image_exr_names(exr, list)) break;
+    }
+    if (!first) return "has no channels";
+    if (!exr->names[0]) return image_exr_list(exr->text, sizeof exr->text, first);
+    if (exr_get_data_window(exr->file, exr->part, &exr->window) != EXR_ERR_SUCCESS) return "has no data window";
+    exr->width = exr->window.max.x - exr->window.min.x + 1;
+    exr->height = exr->window.max.y - exr->window.min.y + 1;
+    if (exr->width < 1 || exr->height < 1 || exr->width > IMAGE_MAX_SIDE || exr->height > IMAGE_MAX_SIDE) return "is too large or empty";
     for (i = 0; i < 3 && exr->names[i]; ++i) {
-        const exr_attr_chlist_entry_t *entry = &list->entries[image_exr_find(list, exr->names[i])];
-        size_t bytes = entry->pixel_type == EXR_PIXEL_HALF ? 2 : 4;
+        const exr_attr_chlist_entry_t *entry = list->entries;
+        size_t bytes;
+        for (k = 0; k < list->num_channels; ++k)
+            if (list->entries[k].name.str == exr->names[i]) entry = &list->entries[k];
+        bytes = entry->pixel_type == EXR_PIXEL_HALF ? 2 : 4;
         exr->types[i] = (int)entry->pixel_type;
         exr->x_step[i] = entry->x_sampling;
         exr->y_step[i] = entry->y_sampling;
@@ -85,7 +137,7 @@ static inline exr_result_t image_exr_chunk(image_exr *exr, const exr_chunk_info_
     exr_result_t rc;
     int c, i;
     memset(&decode, 0, sizeof decode);
-    rc = exr_decoding_initialize(exr->file, 0, chunk, &decode);
+    rc = exr_decoding_initialize(exr->file, exr->part, chunk, &decode);
     if (rc != EXR_ERR_SUCCESS) return rc;
     for (c = 0; c < decode.channel_count; ++c) {
         exr_coding_channel_info_t *channel = &decode.channels[c];
@@ -102,8 +154,8 @@ static inline exr_result_t image_exr_chunk(image_exr *exr, const exr_chunk_info_
             channel->decode_to_ptr = exr->planes[i] + (py * (size_t)exr->plane_width[i] + px) * (size_t)channel->bytes_per_element;
         }
     }
-    rc = exr_decoding_choose_default_routines(exr->file, 0, &decode);
-    if (rc == EXR_ERR_SUCCESS) rc = exr_decoding_run(exr->file, 0, &decode);
+    rc = exr_decoding_choose_default_routines(exr->file, exr->part, &decode);
+    if (rc == EXR_ERR_SUCCESS) rc = exr_decoding_run(exr->file, exr->part, &decode);
     exr_decoding_destroy(exr->file, &decode);
     return rc;
 }
@@ -111,10 +163,10 @@ static inline exr_result_t image_exr_chunk(image_exr *exr, const exr_chunk_info_
 static inline exr_result_t image_exr_lines(image_exr *exr)
 {
     int step = 0, y;
-    exr_result_t rc = exr_get_scanlines_per_chunk(exr->file, 0, &step);
+    exr_result_t rc = exr_get_scanlines_per_chunk(exr->file, exr->part, &step);
     for (y = 0; rc == EXR_ERR_SUCCESS && y < exr->height; y += step) {
         exr_chunk_info_t chunk;
-        rc = exr_read_scanline_chunk_info(exr->file, 0, y + exr->window.min.y, &chunk);
+        rc = exr_read_scanline_chunk_info(exr->file, exr->part, y + exr->window.min.y, &chunk);
         if (rc == EXR_ERR_SUCCESS) rc = image_exr_chunk(exr, &chunk, 0, y);
     }
     return rc;
@@ -123,11 +175,11 @@ static inline exr_result_t image_exr_lines(image_exr *exr)
 static inline exr_result_t image_exr_tiles(image_exr *exr)
 {
     int width = 0, height = 0, x, y;
-    exr_result_t rc = exr_get_tile_sizes(exr->file, 0, 0, 0, &width, &height);
+    exr_result_t rc = exr_get_tile_sizes(exr->file, exr->part, 0, 0, &width, &height);
     for (y = 0; rc == EXR_ERR_SUCCESS && y < exr->height; y += height)
         for (x = 0; rc == EXR_ERR_SUCCESS && x < exr->width; x += width) {
             exr_chunk_info_t chunk;
-            rc = exr_read_tile_chunk_info(exr->file, 0, x / width, y / height, 0, 0, &chunk);
+            rc = exr_read_tile_chunk_info(exr->file, exr->part, x / width, y / height, 0, 0, &chunk);
             if (rc == EXR_ERR_SUCCESS) rc = image_exr_chunk(exr, &chunk, x, y);
         }
     return rc;
@@ -204,7 +256,7 @@ static inline int image_exr_primaries(const image_exr *exr, double xy[4][2], dou
     const exr_attribute_t *attribute = NULL;
     int i, differs = 0;
     memcpy(xy, rec709, 8 * sizeof(double));
-    if (exr_get_attribute_by_name(exr->file, 0, "chromaticities", &attribute) != EXR_ERR_SUCCESS || !attribute ||
+    if (exr_get_attribute_by_name(exr->file, exr->part, "chromaticities", &attribute) != EXR_ERR_SUCCESS || !attribute ||
         attribute->type != EXR_ATTR_CHROMATICITIES) return 0;
     xy[0][0] = (double)attribute->chromaticities->red_x;
     xy[0][1] = (double)attribute->chromaticities->red_y;
@@ -280,18 +332,15 @@ static inline const char *image_exr_read(image_exr *exr, image *out)
     exr_compression_t compression = EXR_COMPRESSION_NONE;
     const char *why;
     exr_result_t rc;
-    exr_get_storage(exr->file, 0, &storage);
-    exr_get_compression(exr->file, 0, &compression);
+    why = image_exr_choose(exr);
+    if (why) return why;
+    exr_get_storage(exr->file, exr->part, &storage);
+    exr_get_compression(exr->file, exr->part, &compression);
     if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED) return "holds deep pixels, which are not supported";
     if (compression == EXR_COMPRESSION_DWAA || compression == EXR_COMPRESSION_DWAB)
         return compression == EXR_COMPRESSION_DWAA ? "is DWAA-compressed, which OpenEXR's C library cannot decode; try exrmaketiled -z piz (Debian's openexr)"
                                                    : "is DWAB-compressed, which OpenEXR's C library cannot decode; try exrmaketiled -z piz (Debian's openexr)";
-    if (exr_get_data_window(exr->file, 0, &exr->window) != EXR_ERR_SUCCESS) return "has no data window";
-    exr->width = exr->window.max.x - exr->window.min.x + 1;
-    exr->height = exr->window.max.y - exr->window.min.y + 1;
-    if (!image_create(out, exr->width, exr->height, 3)) return "is too large or empty";
-    why = image_exr_choose(exr);
-    if (why) return why;
+    if (!image_create(out, exr->width, exr->height, 3)) return "is too large for the memory";
     rc = storage == EXR_STORAGE_TILED ? image_exr_tiles(exr) : image_exr_lines(exr);
     if (rc != EXR_ERR_SUCCESS) return exr_get_default_error_message(rc);
     image_exr_pixels(exr, out);
@@ -300,14 +349,13 @@ static inline const char *image_exr_read(image_exr *exr, image *out)
 
 static inline int image_load_exr(image *out, const char *path)
 {
-    char text[128] = "";
     image_exr exr;
     exr_context_initializer_t options;
     const char *why = "is not an OpenEXR file";
     int c;
     memset(&exr, 0, sizeof exr);
     memset(out, 0, sizeof *out);
-    image_exr_initializer(&options, text);
+    image_exr_initializer(&options);
     if (exr_start_read(&exr.file, path, &options) == EXR_ERR_SUCCESS) why = image_exr_read(&exr, out);
     if (why) image_fail(out, path, why);
     for (c = 0; c < 3; ++c) free(exr.planes[c]);
@@ -316,6 +364,8 @@ static inline int image_load_exr(image *out, const char *path)
 }
 
 /* ---- writing ---- */
+
+typedef struct image_exr_sink { file_writer *file; uint64_t at; } image_exr_sink;
 
 static inline exr_result_t image_exr_write_chunk(exr_context_t file, const image *picture, const unsigned char *samples, int bytes, int y)
 {
@@ -361,24 +411,45 @@ static inline exr_result_t image_exr_write(exr_context_t file, const image *pict
     return rc;
 }
 
+/* The library's bytes into the file, where it wants them. */
+static inline int64_t image_exr_put(exr_const_context_t context, void *user, const void *bytes, uint64_t size, uint64_t at, exr_stream_error_func_ptr_t error)
+{
+    image_exr_sink *sink = (image_exr_sink *)user;
+    (void)context, (void)error;
+    if (at != sink->at) file_seek(sink->file, (long)at);
+    file_put(sink->file, bytes, (size_t)size);
+    sink->at = at + size;
+    return sink->file->error ? -1 : (int64_t)size;
+}
+
 /* Scan lines, ZIP; R G B (A), or Y for one channel; half rounds to 16 bits. */
 static inline int image_save_exr(image *picture, const char *path, int half)
 {
-    char text[128] = "";
+    file_writer writer;
+    image_exr_sink sink;
     exr_context_t file = NULL;
     exr_context_initializer_t options;
     exr_result_t rc;
     size_t i, n = (size_t)picture->width * (size_t)picture->height * (size_t)picture->channels;
     uint16_t *halves = half ? (uint16_t *)malloc(n * 2) : NULL;
-    if (half && !halves) return snprintf(picture->message, sizeof picture->message, "no memory"), 0;
+    if (half && !halves) return file_fail(picture->message, path, "no memory");
     for (i = 0; halves && i < n; ++i) halves[i] = sat__half_from_float(picture->pixels[i]);
-    image_exr_initializer(&options, text);
+    if (!file_open(&writer, path, picture->message)) { free(halves); return 0; }
+    sink.file = &writer, sink.at = 0;
+    image_exr_initializer(&options);
+    options.user_data = &sink;
+    options.write_fn = image_exr_put;
     rc = exr_start_write(&file, path, EXR_WRITE_FILE_DIRECTLY, &options);
     if (rc == EXR_ERR_SUCCESS)
         rc = image_exr_write(file, picture, half ? (const unsigned char *)halves : (const unsigned char *)picture->pixels, half);
-    if (file) exr_finish(&file);
+    if (file) {
+        exr_result_t end = exr_finish(&file);
+        if (rc == EXR_ERR_SUCCESS) rc = end;
+    }
     free(halves);
-    if (rc != EXR_ERR_SUCCESS)
-        snprintf(picture->message, sizeof picture->message, "%.180s: %.120s", path, text[0] ? text : exr_get_default_error_message(rc));
-    return rc == EXR_ERR_SUCCESS;
+    if (rc != EXR_ERR_SUCCESS && !writer.error) {
+        file_close(&writer, 0, NULL);
+        return file_fail(picture->message, path, exr_get_default_error_message(rc));
+    }
+    return file_close(&writer, 1, picture->message);
 }

@@ -243,8 +243,8 @@ static inline int mesh_load(mesh *out, const char *path)
     int i;
     memset(out, 0, sizeof *out);
     if (!file) return mesh_fail(out, path, "cannot be opened");
-    if (dot && strcmp(dot, ".ply") == 0) why = mesh_load_ply(out, file);
-    else if (dot && strcmp(dot, ".obj") == 0) why = mesh_load_obj(out, file);
+    if (dot && (strcmp(dot, ".ply") == 0 || strcmp(dot, ".PLY") == 0)) why = mesh_load_ply(out, file);
+    else if (dot && (strcmp(dot, ".obj") == 0 || strcmp(dot, ".OBJ") == 0)) why = mesh_load_obj(out, file);
     else why = "is neither .ply nor .obj";
     fclose(file);
     for (i = 0; !why && i < 3 * out->triangle_count; ++i)

@@ -4,14 +4,13 @@
        photomosaic target.jpg --tiles folder --gap 0.001 --method fast --compare --out both.png
        photomosaic target.jpg --tiles folder --method ants --video frames      frames/0000.png, ...: order out of chaos
        photomosaic target.jpg --tiles folder --pan 24 --switching 0.05 --video frames      a film, frame by frame warm
-       photomosaic --out mosaic.png                                             target and tiles drawn here
+       photomosaic                                                              target and tiles drawn here: out/photomosaic.png
 
    Several target pictures in a row need several calls. The proof stands in the last line: no other choice of tiles is
    nearer to the target by more than the gap. */
 
 #define _POSIX_C_SOURCE 200809L
 #include <dirent.h>
-#include <sys/stat.h>
 #define SAT_IMPLEMENTATION
 #define SOFTASSIGN_IMPLEMENTATION
 #include "../softassign.h"
@@ -24,6 +23,7 @@ enum { PARTS = 4, FEATURES = PARTS * PARTS * 3, MADE_TILES = 4096, MADE_ACROSS =
 typedef struct tile_set {
     unsigned char *pixels;
     int size, across, count, room;
+    common_settings *common;
 } tile_set;
 
 static sat_image bytes_view(const unsigned char *pixels, int width, int height)
@@ -71,65 +71,79 @@ static int add_picture(tile_set *set, const char *path, int sheet)
 {
     image picture;
     int across, down, i, j, x, y, n = set->size;
-    float *small;
+    float *shrunk;
     sat_image view;
-    if (!load_display(&picture, path)) {
-        fprintf(stderr, "photomosaic: %s\n", picture.message);
-        return 0;
-    }
+    if (!common_read(set->common, path)) exit(2);
+    if (!load_display(&picture, path)) return common_say(set->common, picture.message);
     across = sheet ? picture.width / n : 1;
     down = sheet ? picture.height / n : 1;
     if (across < 1 || down < 1) across = down = 1;
-    small = (float *)malloc((size_t)(across * n) * (size_t)(down * n) * 3 * sizeof(float));
+    shrunk = (float *)malloc((size_t)(across * n) * (size_t)(down * n) * 3 * sizeof(float));
     view = image_view(&picture);
-    if (!small || softassign_features(small, &view, across * n, down * n, 1, 1, NULL) != SAT_OK) return 0;
+    if (!shrunk || softassign_features(shrunk, &view, across * n, down * n, 1, 1, NULL) != SAT_OK) return 0;
     for (j = 0; j < down; j++)
         for (i = 0; i < across; i++) {
             unsigned char *tile = new_tile(set);
             for (y = 0; tile && y < n; y++)
                 for (x = 0; x < 3 * n; x++)
                     tile[y * set->across * n * 3 + x] =
-                        (unsigned char)(small[(size_t)(j * n + y) * (size_t)(across * n * 3) + (size_t)(i * n * 3 + x)] + 0.5f);
+                        (unsigned char)(shrunk[(size_t)(j * n + y) * (size_t)(across * n * 3) + (size_t)(i * n * 3 + x)] + 0.5f);
             if (!tile) return 0;
         }
-    free(small);
+    free(shrunk);
     image_free(&picture);
     return 1;
 }
 
 static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
-/* A folder of photographs, or sheets separated by commas. */
+/* All files of a folder but hidden ones, in the order of their names. */
+static char **list_folder(DIR *folder, const char *where, int *count)
+{
+    char **names = NULL;
+    struct dirent *entry;
+    int room = 0;
+    *count = 0;
+    while ((entry = readdir(folder)) != NULL) {
+        size_t length = strlen(where) + 1 + strlen(entry->d_name);
+        if (entry->d_name[0] == '.' || length >= FILE_PATH) continue;
+        if (*count == room) {
+            char **more = (char **)realloc(names, (size_t)(room ? 2 * room : 256) * sizeof *names);
+            if (!more) break;
+            names = more, room = room ? 2 * room : 256;
+        }
+        names[*count] = (char *)malloc(length + 1);
+        if (!names[*count]) break;
+        strcpy(names[*count], where);
+        strcat(strcat(names[(*count)++], "/"), entry->d_name);
+    }
+    if (names) qsort(names, (size_t)*count, sizeof *names, by_name);
+    return names;
+}
+
+/* A folder of photographs, of which those that cannot be read are named and left out; or sheets separated by commas. */
 static int load_tiles(tile_set *set, const char *where)
 {
     DIR *folder = opendir(where);
-    char path[1024], *names[65536];
-    int count = 0, i, ok = 1;
-    if (!folder) {
-        const char *p = where;
-        while (*p) {
-            size_t n = strcspn(p, ",");
-            snprintf(path, sizeof path, "%.*s", (int)n, p);
-            if (!add_picture(set, path, 1)) return 0;
-            p += n + (p[n] == ',');
-        }
-        return 1;
+    char path[FILE_PATH], **names;
+    int count = 0, i, read = 0;
+    while (!folder && *where) {
+        size_t n = strcspn(where, ",");
+        if (n >= sizeof path) return common_say(set->common, "--tiles: the path is too long");
+        snprintf(path, sizeof path, "%.*s", (int)n, where);
+        if (!add_picture(set, path, 1)) return 0;
+        where += n + (where[n] == ',');
     }
-    for (;;) {
-        struct dirent *entry = readdir(folder);
-        if (!entry || count == 65536) break;
-        if (entry->d_name[0] == '.') continue;
-        snprintf(path, sizeof path, "%s/%s", where, entry->d_name);
-        names[count] = (char *)malloc(strlen(path) + 1);
-        if (names[count]) strcpy(names[count++], path);
-    }
+    if (!folder) return set->count > 0 || common_say(set->common, "--tiles: no tiles");
+    names = list_folder(folder, where, &count);
     closedir(folder);
-    qsort(names, (size_t)count, sizeof *names, by_name);
     for (i = 0; i < count; i++) {
-        ok += add_picture(set, names[i], 0);
+        read += add_picture(set, names[i], 0);
         free(names[i]);
     }
-    return ok > 1;
+    free(names);
+    if (read == 0) fprintf(stderr, "photomosaic: --tiles %s: no picture in this folder can be read\n", where);
+    return read > 0;
 }
 
 /* 4096 drawn tiles: two colours parted by a line, a disc or stripes. */
@@ -181,10 +195,11 @@ typedef struct studio {
     unsigned char *mosaic;
     softassign_problem problem;
     softassign_options options;
-    int grid[2], stats;
+    int grid[2];
+    const common_settings *common;
     float blend;
     const char *folder; /* of the video */
-    int frame, frames;
+    int frame, frames, failed; /* failed: a frame could not be written */
     common_progress progress;
 } studio;
 
@@ -196,11 +211,11 @@ static int draw(studio *s, unsigned char *out, const int *columns)
 
 static int write_frame(studio *s, const int *columns)
 {
-    char path[1024];
+    char path[FILE_PATH];
+    if (strlen(s->folder) + 16 > sizeof path) return common_say(s->common, "--video: the path is too long");
     snprintf(path, sizeof path, "%s/%04d.png", s->folder, s->frame++);
-    if (draw(s, s->mosaic, columns) && image_save_u8(path, s->mosaic, s->grid[0] * s->tiles.size, s->grid[1] * s->tiles.size, 3)) return 1;
-    fprintf(stderr, "photomosaic: %s cannot be written\n", path);
-    return 0;
+    return (draw(s, s->mosaic, columns) || common_say(s->common, "the mosaic cannot be drawn")) &&
+           common_save_u8(s->common, path, s->mosaic, s->grid[0] * s->tiles.size, s->grid[1] * s->tiles.size, 3);
 }
 
 /* The bar shows what is proven: how far the mosaic can be from the best one. */
@@ -210,14 +225,15 @@ static int watch(const softassign_report *report, const int *columns, void *user
     char text[96] = "no mosaic yet";
     if (columns) snprintf(text, sizeof text, "at most %.3g %% from the best", 100 * report->gap);
     common_show_progress(&s->progress, text, s->folder && s->frames ? (double)s->frame / s->frames : 1 - (report->gap < 1 ? report->gap : 1), 1.0001);
-    return s->folder && columns && !write_frame(s, columns);
+    if (s->folder && columns && !write_frame(s, columns)) s->failed = 1;
+    return s->failed;
 }
 
 static void print_report(const studio *s, const softassign_report *r, double seconds)
 {
     printf("cost %.6g, no choice costs less than %.6g: gap %.3g %%, %.0f ms\n", r->cost, r->lower_bound, 100 * r->gap, 1e3 * seconds);
     if (r->conflicts) printf("  %d pairs of equal tiles are too close\n", r->conflicts);
-    if (s->stats)
+    if (s->common->stats)
         printf("  %zu distances, %zu lists, %zu paths, %zu prices raised back, %.2f MB\n", r->distances_computed, r->lists_built, r->paths,
                r->columns_finished, (double)r->bytes / 1e6);
 }
@@ -242,7 +258,8 @@ static sat_result film(studio *s, int frames)
         result = softassign_features(s->cells, &window, s->grid[0], s->grid[1], PARTS, PARTS, &s->options);
         s->problem.previous = frame ? s->columns : NULL;
         if (result == SAT_OK) result = softassign_step(solver, s->columns, &s->problem, (size_t)-1 / 4, &report);
-        if (result != SAT_OK || (s->folder && !write_frame(s, s->columns))) break;
+        s->failed = result == SAT_OK && s->folder && !write_frame(s, s->columns);
+        if (result != SAT_OK || s->failed) break;
         printf("frame %d: %d tiles changed, ", frame, report.switched);
         print_report(s, &report, common_clock() - start);
     }
@@ -273,20 +290,10 @@ static int compare(studio *s, const char *out)
         cells[i].height = height;
     }
     if (ok) printf("best match with repeats: cost %.6g, %d different tiles\n", report.cost, used);
-    ok = ok && common_contact_sheet(out, cells, 2, 2);
+    ok = ok && common_contact_sheet(s->common, out, cells, 2, 2);
     free(other);
     free(seen);
     return ok;
-}
-
-static int choose_method(const char *name)
-{
-    static const char *const names[] = {"auto", "exact", "fast", "entropic", "published", "greedy", "2opt", "annealing", "ants"};
-    int i;
-    for (i = 0; i < 9; i++)
-        if (strcmp(name, names[i]) == 0) return i;
-    fprintf(stderr, "--method: auto, exact, fast, entropic, published, greedy, 2opt, annealing or ants, not \"%s\"\n", name);
-    exit(2);
 }
 
 /* Pictures, tiles and their features; the target is cut to the shape of the grid. */
@@ -337,73 +344,63 @@ static int work(studio *s, int pan, int both, const char *out)
         result = softassign_solve(s->columns, &s->problem, &s->options, &report);
         if (result == SAT_OK) print_report(s, &report, common_clock() - start);
     }
+    if (s->failed) return 0;
     if (result != SAT_OK) {
         if (report.row_error >= 0) fprintf(stderr, "photomosaic: cell %d finds no tile: %d cells, %d tiles\n", report.row_error, s->problem.rows, s->problem.columns);
-        else fprintf(stderr, "photomosaic: %s\n", sat_result_text(result));
+        else common_say(s->common, sat_result_text(result));
         return 0;
     }
-    if (draw(s, s->mosaic, s->columns) && (both ? compare(s, out) : image_save_u8(out, s->mosaic, s->grid[0] * s->tiles.size, s->grid[1] * s->tiles.size, 3)))
-        return 1;
-    fprintf(stderr, "photomosaic: %s cannot be written\n", out);
-    return 0;
+    if (!draw(s, s->mosaic, s->columns)) return common_say(s->common, "the mosaic cannot be drawn");
+    return both ? compare(s, out) : common_save_u8(s->common, out, s->mosaic, s->grid[0] * s->tiles.size, s->grid[1] * s->tiles.size, 3);
 }
 
 int main(int argc, char **argv)
 {
-    float gap = 0.001f, distance = 0, switching = 0;
-    int capacity = 1, both = 0, pan = 0, seed = 1, iterations = 0, first, ok;
-    const char *tiles = NULL, *method = "auto", *out;
+    double gap = 0.001, distance = 0, switching = 0;
+    int method = 0, capacity = 1, both = 0, pan = 0, seed = 1, iterations = 0, ok;
+    const char *target = NULL, *tiles = NULL;
     studio s;
     common_settings common;
     const common_option options[] = {
-        {"tiles", 's', &tiles, "folder of pictures, or sheets of tiles separated by commas; none: drawn here"},
-        {"tile", 'i', &s.tiles.size, "side of a tile in pixels, 32"},
-        {"grid", 'z', s.grid, "tiles across and down, 30x30"},
-        {"method", 's', &method, "auto, exact, fast, entropic, published, greedy, 2opt, annealing or ants"},
-        {"gap", 'f', &gap, "fast: proven distance from the best mosaic, 0.001"},
-        {"capacity", 'i', &capacity, "uses of a tile, 1"},
-        {"distance", 'f', &distance, "smallest distance of equal tiles in cells, 0"},
-        {"blend", 'f', &s.blend, "0 to 1: tint tiles towards the target, 0"},
-        {"compare", 'b', &both, "beside it the mosaic in which tiles repeat"},
-        {"video", 's', &s.folder, "folder for numbered frames"},
-        {"pan", 'i', &pan, "frames of a pan over the target"},
-        {"switching", 'f', &switching, "what keeping a tile is worth, in mean costs, 0"},
-        {"iterations", 'i', &iterations, "of ants, annealing, published; 0: the method's own"},
-        {"seed", 'i', &seed, "of random methods, 1"},
+        {"target", 'P', (void *)&target, 0, 0, "picture to be made; without one it is drawn here"},
+        {"tiles", 's', (void *)&tiles, 0, 0, "folder of pictures, or sheets of tiles separated by commas; without them they are drawn"},
+        {"tile", 'i', &s.tiles.size, 1, 1024, "side of a tile in pixels"},
+        {"grid", 'z', s.grid, 1, 1000, "tiles across and down"},
+        {"method", 'w', &method, 0, 0, "auto|exact|fast|entropic|published|greedy|2opt|annealing|ants"},
+        {"gap", 'd', &gap, 0, 1e6, "fast: proven distance from the best mosaic"},
+        {"capacity", 'i', &capacity, 1, 1000000, "uses of a tile"},
+        {"distance", 'd', &distance, 0, 1000, "smallest distance of equal tiles in cells"},
+        {"blend", 'f', &s.blend, 0, 1, "tint tiles towards the target"},
+        {"compare", 'b', &both, 0, 0, "beside it the mosaic in which tiles repeat"},
+        {"video", 's', (void *)&s.folder, 0, 0, "folder for numbered frames"},
+        {"pan", 'i', &pan, 0, 9999, "frames of a pan over the target"},
+        {"switching", 'd', &switching, 0, 1e6, "what keeping a tile is worth, in mean costs"},
+        {"iterations", 'i', &iterations, 0, 1000000000, "of ants, annealing, published; 0: the method's own"},
+        {"seed", 'i', &seed, 0, 2147483647, "of random methods"},
     };
     memset(&s, 0, sizeof s);
     s.grid[0] = s.grid[1] = 30;
     s.tiles.size = 32;
     s.tiles.across = MADE_ACROSS;
-    first = common_parse(&common, argc, argv, "photomosaic [options] [target.jpg] [mosaic.png]", options, (int)(sizeof options / sizeof options[0]));
-    out = common.out ? common.out : first + 1 < argc ? argv[first + 1] : "mosaic.png";
-    s.options = softassign_method_defaults((softassign_method)choose_method(method));
-    s.options.gap = (double)gap;
+    common_parse(&common, argc, argv, "photomosaic", ".png", options, (int)(sizeof options / sizeof options[0]));
+    s.common = s.tiles.common = &common;
+    s.options = softassign_method_defaults((softassign_method)method);
+    s.options.gap = gap;
     s.options.capacity_default = capacity;
     s.options.seed = (uint64_t)seed;
-    s.options.switching = (double)switching;
+    s.options.switching = switching;
     s.options.grid_width = s.grid[0];
-    s.options.min_distance = (double)distance;
+    s.options.min_distance = distance;
     s.options.threads = common.threads;
     if (iterations > 0) s.options.iterations[0] = iterations;
     s.options.progress = watch;
     s.options.progress_user = &s;
     s.frames = s.options.iterations[0];
-    s.stats = common.stats;
-    if (s.grid[0] < 1 || s.grid[1] < 1 || s.grid[0] > 1000 || s.grid[1] > 1000 || s.tiles.size < 1 || s.tiles.size > 1024) {
-        fprintf(stderr, "photomosaic: a grid has 1x1 to 1000x1000 cells, a tile 1 to 1024 pixels\n");
-        return 2;
-    }
-    if (!(first < argc ? load_display(&s.picture, argv[first]) : draw_target(&s.picture))) {
-        fprintf(stderr, "photomosaic: %s\n", s.picture.message);
-        return 1;
-    }
-    if (!(tiles ? load_tiles(&s.tiles, tiles) : draw_tiles(&s.tiles)) || s.tiles.count < 1) {
-        fprintf(stderr, "photomosaic: no tiles\n");
-        return 1;
-    }
-    if (s.folder) mkdir(s.folder, 0777);
-    ok = work(&s, pan, both, out);
+    if (!(target ? load_display(&s.picture, target) : draw_target(&s.picture))) return common_say(&common, s.picture.message), 1;
+    if (!(tiles ? load_tiles(&s.tiles, tiles) : draw_tiles(&s.tiles) || common_say(&common, "no memory"))) return 1;
+    if (s.folder && !file_make_folder(s.folder)) common_leave(&common, 1, s.folder, strerror(errno));
+    ok = work(&s, pan, both, common.out);
     close_studio(&s);
+    common_close(&common);
     return !ok;
 }

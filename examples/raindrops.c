@@ -1,23 +1,24 @@
 /* raindrops.c - rain before an environment map: stills, paused, slow and real-time sequences, and one drop in close-up.
    SPDX-License-Identifier: MIT-0 OR Unlicense
 
-       raindrops --rate 25mm --exposure 0.01 --env forest.exr rain.png      rain at a rate, streaks of 1/100 s
-       raindrops --count 300000 --diameter 2 --env city.exr drops.png       as published: one size, frozen
-       raindrops --frames 24 --dt 0.0005 slow.png                           slow_000.png, slow_001.png, ...
-       raindrops --sheet --env night.exr sheet.png                          paused, slow motion and real time
-       raindrops --closeup --env forest.exr drop.png                        one drop beside ray tracing
+       raindrops forest.exr rain.png --rate 25mm --exposure 0.01            rain at a rate, streaks of 1/100 s
+       raindrops city.exr drops.png --count 300000 --diameter 2             as published: one size, frozen
+       raindrops --frames 24 --dt 0.0005 --out slow.png                     slow_000.png, slow_001.png, ...
+       raindrops night.exr sheet.png --sheet                                paused, slow motion and real time
+       raindrops forest.exr drop.png --closeup                              one drop beside ray tracing
 
-   Without --env the sky is made up. An .exr is written as it is; everything else is tone-mapped. */
+   Without a picture the sky is made up. A .png is tone-mapped; .exr, .hdr and .pfm are written as they are. */
 
+#define _POSIX_C_SOURCE 200809L
 #define LIGHTSCAN_IMPLEMENTATION
 #include "../raindrop.h"
 #include "../tonemap.h"
 #include "common.h"
 
 typedef struct settings {
-    const char *env, *rate, *look;
-    int size[2], count, frames, seed, oblate, sheet, closeup;
-    float diameter, box, exposure, aperture, focus, dt, fov, turn, key, near_distance, wind, bow;
+    const char *env;
+    int size[2], look, count, frames, seed, oblate, sheet, closeup;
+    float rate, diameter, box, exposure, aperture, focus, dt, fov, turn, key, near_distance, wind, bow;
     common_settings common;
 } settings;
 
@@ -34,7 +35,7 @@ typedef struct scene {
 
 static int check(const char *what, sat_result result)
 {
-    if (result != SAT_OK) fprintf(stderr, "%s: %s\n", what, sat_result_text(result));
+    if (result != SAT_OK) fprintf(stderr, "raindrops: %s: %s\n", what, sat_result_text(result));
     return result == SAT_OK;
 }
 
@@ -63,10 +64,7 @@ static int open_environment(scene *s)
     sat_image view;
     image sky;
     int ok;
-    if (s->set->env ? !image_load(&sky, s->set->env) : !made_up_sky(&sky)) {
-        fprintf(stderr, "%s\n", sky.message);
-        return 0;
-    }
+    if (s->set->env ? !image_load(&sky, s->set->env) : !made_up_sky(&sky)) return common_say(&s->set->common, sky.message);
     view = image_view(&sky);
     o.threads = s->set->common.threads;
     o.bow_optical_depth = s->set->bow;
@@ -89,7 +87,7 @@ static int open_rain(scene *s)
     raindrop_rain_options o = raindrop_rain_defaults();
     const settings *set = s->set;
     int i;
-    o.rate_mm_h = strtod(set->rate, NULL); /* "25mm" and "25" */
+    o.rate_mm_h = (double)set->rate;
     o.count = set->count;
     o.diameter_mm = (double)set->diameter;
     for (i = 0; i < 3; i++) o.box_size[i] = set->box;
@@ -130,31 +128,24 @@ static int save(scene *s, const char *path)
     size_t bytes = (size_t)s->picture.width * (size_t)s->picture.height * 3;
     unsigned char *rgb;
     int ok;
-    if (image_ends_with(path, ".exr") || image_ends_with(path, ".hdr") || image_ends_with(path, ".pfm")) return image_save(&s->picture, path);
+    if (!image_ends_with(path, ".png")) return common_save(&s->set->common, path, &s->picture);
     rgb = (unsigned char *)malloc(bytes);
-    ok = rgb && tone(rgb, s) && image_save_u8(path, rgb, s->picture.width, s->picture.height, 3);
+    ok = (rgb || common_say(&s->set->common, "no memory")) && tone(rgb, s) &&
+         common_save_u8(&s->set->common, path, rgb, s->picture.width, s->picture.height, 3);
     free(rgb);
     return ok;
 }
 
 /* ---- sequences ---- */
 
-/* path.png becomes path_007.png */
-static void frame_path(char *out, size_t size, const char *path, int frame)
-{
-    const char *dot = strrchr(path, '.');
-    int stem = dot ? (int)(dot - path) : (int)strlen(path);
-    snprintf(out, size, "%.*s_%03d%s", stem, path, frame, dot ? dot : ".png");
-}
-
 static int save_frames(scene *s, const char *path)
 {
     common_progress progress = {0, 0};
-    char name[1024];
+    char name[FILE_PATH], number[16];
     int i;
     for (i = 0; i < s->set->frames; i++) {
-        frame_path(name, sizeof name, path, i);
-        if (!draw(s) || !save(s, name) || !check("advance", raindrop_rain_advance(s->rain, (double)s->set->dt))) return 0;
+        snprintf(number, sizeof number, "_%03d", i);
+        if (!common_path(&s->set->common, name, path, number) || !draw(s) || !save(s, name) || !check("advance", raindrop_rain_advance(s->rain, (double)s->set->dt))) return 0;
         common_show_progress(&progress, "frames", i + 1, s->set->frames);
     }
     return 1;
@@ -188,7 +179,7 @@ static int save_sheet(scene *s, const char *path)
             ok = ok && draw(s) && tone(rgb + (size_t)(4 * row + i) * bytes, s) && check("advance", raindrop_rain_advance(s->rain, rows[row].dt));
         }
     }
-    ok = ok && common_contact_sheet(path, cells, 12, 4);
+    ok = ok && common_contact_sheet(&s->set->common, path, cells, 12, 4);
     free(rgb);
     return ok;
 }
@@ -282,7 +273,7 @@ static int save_closeup(scene *s, const char *path)
             ok = ok && tone(rgb + (size_t)(4 * place + i) * bytes, s);
         }
     }
-    ok = ok && common_contact_sheet(path, cells, 8, 4);
+    ok = ok && common_contact_sheet(&s->set->common, path, cells, 8, 4);
     free(rgb);
     return ok;
 }
@@ -291,16 +282,9 @@ static int save_closeup(scene *s, const char *path)
 
 static int set_look(scene *s)
 {
-    static const char *const words[4] = {"map", "sprite", "ray", "auto"};
-    int i;
     s->render = raindrop_render_defaults();
-    for (i = 0; i < 4 && strcmp(s->set->look, words[i]) != 0; i++) {}
-    if (i == 4) {
-        fprintf(stderr, "--look %s: must be map, sprite, ray or auto\n", s->set->look);
-        return 0;
-    }
-    s->render.look = (raindrop_look)i;
-    if (i > 0 && !s->set->closeup) return 1;
+    s->render.look = (raindrop_look)s->set->look;
+    if (s->set->look > 0 && !s->set->closeup) return 1;
     if (!check("map", raindrop_map_create(&s->map, 512, 32, RAINDROP_WATER, NULL))) return 0;
     s->render.map = s->map;
     return 1;
@@ -318,7 +302,8 @@ static int set_camera(scene *s)
     s->camera.exposure = set->exposure;
     s->camera.aperture = set->aperture;
     s->camera.focus_distance = set->focus;
-    if (!image_create(&s->picture, set->size[0], set->size[1], 3) || !image_create(&s->background, set->size[0], set->size[1], 3)) return 0;
+    if (!image_create(&s->picture, set->size[0], set->size[1], 3) || !image_create(&s->background, set->size[0], set->size[1], 3))
+        return common_say(&set->common, s->picture.pixels ? s->background.message : s->picture.message);
     return check("background", raindrop_environment_render(s->background.pixels, (ptrdiff_t)set->size[0] * 3 * (ptrdiff_t)sizeof(float), set->size[0], set->size[1],
                                                            &s->camera, s->environment, &set->common.threads));
 }
@@ -336,12 +321,35 @@ int main(int argc, char **argv)
 {
     settings set;
     scene s;
-    const char *path;
-    int first, ok;
+    int ok;
+    const common_option options[] = {
+        {"env", 'P', (void *)&set.env, 0, 0, "equirectangular environment; without one it is made up"},
+        {"rate", 'm', &set.rate, 0.01, 500, "rain rate in mm/h"},
+        {"count", 'i', &set.count, 0, 33554432, "number of drops instead of the rate's"},
+        {"diameter", 'f', &set.diameter, 0, 6, "mm, of all drops; 0: Marshall-Palmer"},
+        {"box", 'f', &set.box, 0.1, 1000, "edge of the rain box in metres"},
+        {"wind", 'f', &set.wind, -100, 100, "m/s to the right"},
+        {"oblate", 'b', &set.oblate, 0, 0, "flattened drops"},
+        {"bow", 'f', &set.bow, 0, 10, "optical depth of the rain that shows bows"},
+        {"exposure", 'f', &set.exposure, 0, 10, "seconds; 0: frozen drops"},
+        {"aperture", 'f', &set.aperture, 0, 1, "diameter of the lens in metres; 0: all in focus"},
+        {"focus", 'f', &set.focus, 0.001, 1000, "metres"},
+        {"look", 'w', &set.look, 0, 0, "map|sprite|ray|auto"},
+        {"size", 'z', set.size, 1, 16384, "of the picture"},
+        {"fov", 'f', &set.fov, 0.1, 170, "vertical, degrees"},
+        {"turn", 'f', &set.turn, -1000, 1000, "radians to the right"},
+        {"near", 'f', &set.near_distance, 0.001, 1000, "metres; nearer drops are left out"},
+        {"key", 'f', &set.key, 0, 10, "middle grey of the tone mapping; 0: estimated"},
+        {"seed", 'i', &set.seed, 0, 2147483647, "of the drops"},
+        {"frames", 'i', &set.frames, 0, 999, "write so many pictures, rain_000.png and so on"},
+        {"dt", 'f', &set.dt, 0, 1000, "seconds between them; 0: paused"},
+        {"sheet", 'b', &set.sheet, 0, 0, "contact sheet: paused, slow motion, real time"},
+        {"closeup", 'b', &set.closeup, 0, 0, "contact sheet: one drop beside ray tracing"},
+    };
     memset(&s, 0, sizeof s);
     memset(&set, 0, sizeof set);
-    set.rate = "10mm";
-    set.look = "auto";
+    set.rate = 10;
+    set.look = RAINDROP_LOOK_AUTO;
     set.size[0] = 1280;
     set.size[1] = 720;
     set.seed = 1;
@@ -351,49 +359,21 @@ int main(int argc, char **argv)
     set.fov = 60;
     set.key = 0.18f;
     set.near_distance = 0.05f;
-    {
-        common_option options[] = {
-            {"env", 's', (void *)&set.env, "equirectangular environment (.exr .hdr .pfm .png); made up"},
-            {"rate", 's', (void *)&set.rate, "rain rate in mm/h, 10mm"},
-            {"count", 'i', &set.count, "number of drops instead of the rate's"},
-            {"diameter", 'f', &set.diameter, "mm, of all drops; 0: Marshall-Palmer"},
-            {"box", 'f', &set.box, "edge of the rain box in metres, 6"},
-            {"wind", 'f', &set.wind, "m/s to the right, 0"},
-            {"oblate", 'b', &set.oblate, "flattened drops"},
-            {"bow", 'f', &set.bow, "optical depth of the rain that shows bows, 0"},
-            {"exposure", 'f', &set.exposure, "seconds; 0: frozen drops"},
-            {"aperture", 'f', &set.aperture, "diameter of the lens in metres, 0: all in focus"},
-            {"focus", 'f', &set.focus, "metres, 1"},
-            {"look", 's', (void *)&set.look, "map, sprite, ray or auto"},
-            {"size", 'z', set.size, "picture, 1280x720"},
-            {"fov", 'f', &set.fov, "vertical, degrees, 60"},
-            {"turn", 'f', &set.turn, "radians to the right, 0"},
-            {"near", 'f', &set.near_distance, "metres; nearer drops are left out, 0.05"},
-            {"key", 'f', &set.key, "middle grey of the tone mapping, 0.18"},
-            {"seed", 'i', &set.seed, "of the drops, 1"},
-            {"frames", 'i', &set.frames, "write so many pictures"},
-            {"dt", 'f', &set.dt, "seconds between them, 1/60; 0: paused"},
-            {"sheet", 'b', &set.sheet, "contact sheet: paused, slow motion, real time"},
-            {"closeup", 'b', &set.closeup, "contact sheet: one drop beside ray tracing"},
-        };
-        first = common_parse(&set.common, argc, argv, "raindrops [options] out.png", options, (int)(sizeof options / sizeof *options));
-    }
-    path = set.common.out ? set.common.out : first < argc ? argv[first] : "raindrops.png";
-    if (!common_can_write(path)) {
-        fprintf(stderr, "raindrops: %s cannot be written\n", path);
-        return 1;
-    }
+    common_parse(&set.common, argc, argv, "raindrops", ".png .exr .hdr .pfm", options, (int)(sizeof options / sizeof *options));
+    if (set.sheet || set.closeup) set.common.writes = ".png";
+    if (!common_may_write(&set.common, set.common.out)) return 2;
     s.set = &set;
     ok = open_environment(&s) && open_rain(&s) && set_look(&s) && set_camera(&s) && set_tone(&s);
-    if (ok && set.closeup) ok = save_closeup(&s, path);
-    else if (ok && set.sheet) ok = save_sheet(&s, path);
-    else if (ok && set.frames > 0) ok = save_frames(&s, path);
-    else if (ok) ok = draw(&s) && save(&s, path);
+    if (ok && set.closeup) ok = save_closeup(&s, set.common.out);
+    else if (ok && set.sheet) ok = save_sheet(&s, set.common.out);
+    else if (ok && set.frames > 0) ok = save_frames(&s, set.common.out);
+    else if (ok) ok = draw(&s) && save(&s, set.common.out);
     tonemap_destroy(s.tone);
     raindrop_rain_destroy(s.rain);
     raindrop_map_destroy(s.map);
     raindrop_environment_destroy(s.environment);
     image_free(&s.picture);
     image_free(&s.background);
+    common_close(&set.common);
     return ok ? 0 : 1;
 }

@@ -1,8 +1,9 @@
 /* ssao - ambient occlusion of a scene from its depth buffer.         SPDX-License-Identifier: MIT-0 OR Unlicense
 
-       ssao out.png                          a scene, shaded with its accessibility
+       ssao                                  a scene, shaded with its accessibility: out/ssao.png
        ssao bunny.ply out.png --radius 0.4   a mesh (PLY or OBJ) standing in a corner
-       ssao sheet.png --compare              all methods and a ray tracer on one contact sheet, with errors and times
+       ssao --occlusion --out open.pfm       the accessibility alone, as floats
+       ssao --compare --out sheet.png        all methods and a ray tracer on one contact sheet, with errors and times
 
    The pictures are drawn by a ray tracer; ssao_sat.h sees nothing of them but depths and normals. */
 
@@ -28,20 +29,30 @@ static unsigned char *grey(const float *v)
 }
 
 /* A lamp and the sky's light: S = rho (L_lamp + L_sky A) (Slomp 2012, eq 5.3, where A belongs to the ambient light). */
-static unsigned char *shade(const ref_picture *p, const float *open)
+static int light(image *out, const ref_picture *p, const float *open)
 {
-    unsigned char *rgb = (unsigned char *)malloc(count * 3);
-    static const float sky[3] = {0.55f, 0.68f, 0.85f}, surface[3] = {0.78f, 0.74f, 0.68f}, lamp[3] = {0.45f, 0.75f, 0.48f};
+    static const float sky[3] = {0.265f, 0.42f, 0.69f}, surface[3] = {0.78f, 0.74f, 0.68f}, lamp[3] = {0.45f, 0.75f, 0.48f};
     size_t i;
     int c;
-    for (i = 0; rgb && i < count; i++) {
+    if (!image_create(out, p->width, p->height, 3)) return 0;
+    for (i = 0; i < count; i++) {
         const float *n = p->normals + 3 * i;
         float facing = n[0] * lamp[0] + n[1] * lamp[1] + n[2] * lamp[2];
         for (c = 0; c < 3; c++) {
-            float light = 0.45f * (facing > 0 ? facing : 0) * (0.35f + 0.65f * open[i]) + 0.75f * open[i];
-            rgb[3 * i + (size_t)c] = to_byte(sat__srgb_encode(p->z[i] < 1e18f ? surface[c] * light : sky[c]));
+            float falls = 0.45f * (facing > 0 ? facing : 0) * (0.35f + 0.65f * open[i]) + 0.75f * open[i];
+            out->pixels[3 * i + (size_t)c] = p->z[i] < 1e18f ? surface[c] * falls : sky[c];
         }
     }
+    return 1;
+}
+
+static unsigned char *shade(const ref_picture *p, const float *open)
+{
+    image lit;
+    unsigned char *rgb = light(&lit, p, open) ? (unsigned char *)malloc(count * 3) : NULL;
+    size_t i;
+    for (i = 0; rgb && i < count * 3; i++) rgb[i] = to_byte(sat__srgb_encode(lit.pixels[i]));
+    image_free(&lit);
     return rgb;
 }
 
@@ -66,14 +77,14 @@ static double accessibility(float *out, const ref_picture *p, ssao_sat_options o
     return start;
 }
 
-static int compare(const char *path, ref_picture *p, ssao_sat_options options, const sat_threads *threads)
+static int compare(const common_settings *common, ref_picture *p, ssao_sat_options options, const sat_threads *threads)
 {
     static const char *const names[] = {"minimalist", "normal-guided", "refined", "plane", "slabs"};
     static const ssao_sat_method order[] = {SSAO_SAT_MINIMALIST, SSAO_SAT_NORMAL_GUIDED, SSAO_SAT_REFINED, SSAO_SAT_PLANE, SSAO_SAT_SLABS};
     common_cell cells[8];
     char labels[8][80];
     float *out = (float *)malloc(count * sizeof(float));
-    int i, ok;
+    int i, ok = out != NULL;
     memset(cells, 0, sizeof cells);
     for (i = 0; i < 8; i++) {
         cells[i].width = p->width;
@@ -94,7 +105,8 @@ static int compare(const char *path, ref_picture *p, ssao_sat_options options, c
     cells[6].rgb = shade(p, out);
     snprintf(labels[7], sizeof labels[7], "shaded with the ray tracer");
     cells[7].rgb = shade(p, p->ao[1]);
-    ok = out && common_contact_sheet(path, cells, 8, 3);
+    for (i = 0; i < 8; i++) ok &= cells[i].rgb != NULL;
+    ok = ok ? common_contact_sheet(common, common->out, cells, 8, 3) : common_say(common, "no memory");
     for (i = 0; i < 8; i++) free((void *)(uintptr_t)cells[i].rgb);
     free(out);
     return ok;
@@ -108,7 +120,7 @@ static int open_mesh(ref_scene *s, const char *path)
     int i;
     memset(s, 0, sizeof *s);
     if (!mesh_load(&m, path)) {
-        fprintf(stderr, "%s\n", m.message);
+        fprintf(stderr, "ssao: %s\n", m.message);
         return 0;
     }
     for (i = 0; i < m.vertex_count; i++) {
@@ -128,54 +140,64 @@ static int open_mesh(ref_scene *s, const char *path)
     return 1;
 }
 
+/* The accessibility, or the picture it shades, as the ending says. */
+static int write_picture(const common_settings *common, const ref_picture *p, const float *open, int occlusion)
+{
+    unsigned char *rgb;
+    image floats;
+    int ok;
+    if (image_ends_with(common->out, ".png")) {
+        rgb = occlusion ? grey(open) : shade(p, open);
+        ok = rgb ? common_save_u8(common, common->out, rgb, p->width, p->height, 3) : common_say(common, "no memory");
+        free(rgb);
+        return ok;
+    }
+    ok = occlusion ? image_create(&floats, p->width, p->height, 1) : light(&floats, p, open);
+    if (ok && occlusion) memcpy(floats.pixels, open, count * sizeof(float));
+    ok = ok ? common_save(common, common->out, &floats) : common_say(common, floats.message);
+    image_free(&floats);
+    return ok;
+}
+
 int main(int argc, char **argv)
 {
-    float radius = 0.25f, gain = 1;
-    int size = 512, scene = 0, sheet = 0, rays = 100, occlusion = 0, first, ok;
+    ssao_sat_options o = ssao_sat_defaults();
+    int size = 512, scene = 0, sheet = 0, rays = 100, occlusion = 0, ok;
+    const char *shape = NULL;
     common_settings common;
-    const char *path;
     ref_scene s;
     ref_picture p;
-    common_option options[] = {
-        {"radius", 'f', &radius, "world units, 0.25; the scenes are about 1 high"},
-        {"gain", 'f', &gain, "times the fitted strength, 1"},
-        {"size", 'i', &size, "side of the picture in pixels, 512"},
-        {"scene", 'i', &scene, "0 corner, 1 room, 2 field, 3 table"},
-        {"rays", 'i', &rays, "of the ray tracer, with --compare, 100"},
-        {"occlusion", 'b', &occlusion, "write the accessibility alone"},
-        {"compare", 'b', &sheet, "contact sheet of all methods"},
+    const common_option options[] = {
+        {"mesh", 'M', (void *)&shape, 0, 0, "in a corner of two walls, instead of a scene"},
+        {"radius", 'd', &o.radius, 0, 100, "world units; the scenes are about 1 high"},
+        {"gain", 'd', &o.gain, 0, 100, "times the fitted strength"},
+        {"size", 'i', &size, 8, 4096, "side of the picture in pixels"},
+        {"scene", 'i', &scene, 0, 3, "0 corner, 1 room, 2 field, 3 table"},
+        {"rays", 'i', &rays, 1, 10000, "of the ray tracer, with --compare"},
+        {"occlusion", 'b', &occlusion, 0, 0, "write the accessibility alone"},
+        {"compare", 'b', &sheet, 0, 0, "contact sheet of all methods"},
     };
-    ssao_sat_options o = ssao_sat_defaults();
-    first = common_parse(&common, argc, argv, "ssao [options] [mesh.ply] out.png", options, 7);
-    if (argc - first < 1 || argc - first > 2 || scene < 0 || scene >= REF_SCENES || size < 8 || size > 4096) {
-        fprintf(stderr, "usage: ssao [options] [mesh.ply] out.png (--help lists the options)\n");
-        return 2;
-    }
-    path = common.out ? common.out : argv[argc - 1];
-    if (argc - first == 2) {
-        if (!open_mesh(&s, argv[first])) return 1;
-    } else ref_open(&s, scene);
-    p = ref_draw(&s, size, size, 0, 0, ref_make(0, 0, 0), common.workers);
-    if (sheet) { /* the radius of the reference is the middle one of three */
-        ref_free(&p);
-        p = ref_draw_radii(&s, size, size, 0, rays, ref_make(0, 0, 0), common.workers, radius);
-    }
+    o.radius = 0.25;
+    common_parse(&common, argc, argv, "ssao", ".png .exr .hdr .pfm", options, (int)(sizeof options / sizeof options[0]));
+    if (sheet) common.writes = ".png";
+    if (!common_may_write(&common, common.out)) return 2;
+    if (shape ? !open_mesh(&s, shape) : (ref_open(&s, scene), 0)) return 1;
     count = (size_t)size * (size_t)size;
-    o.radius = (double)radius;
-    o.gain = (double)gain;
-    if (sheet) ok = compare(path, &p, o, &common.threads);
-    else {
+    if (sheet) { /* the radius of the reference is the middle one of three */
+        p = ref_draw_radii(&s, size, size, 0, rays, ref_make(0, 0, 0), common.workers, (float)o.radius);
+        ok = compare(&common, &p, o, &common.threads);
+    } else {
         float *out = (float *)malloc(count * sizeof(float));
-        unsigned char *rgb;
-        double seconds = accessibility(out, &p, o, &common.threads);
-        if (common.stats) printf("%d x %d: %.1f ms\n", size, size, 1e3 * seconds);
-        rgb = occlusion ? grey(out) : shade(&p, out);
-        ok = image_save_u8(path, rgb, size, size, 3);
-        free(rgb);
+        p = ref_draw(&s, size, size, 0, 0, ref_make(0, 0, 0), common.workers);
+        if (out) {
+            double seconds = accessibility(out, &p, o, &common.threads);
+            if (common.stats) printf("%d x %d: %.1f ms\n", size, size, 1e3 * seconds);
+        }
+        ok = out ? write_picture(&common, &p, out, occlusion) : common_say(&common, "no memory");
         free(out);
     }
-    if (!ok) fprintf(stderr, "%s could not be written\n", path);
     ref_free(&p);
     ref_close(&s);
+    common_close(&common);
     return !ok;
 }

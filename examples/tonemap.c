@@ -1,9 +1,9 @@
 /* tonemap - maps a high dynamic range picture to one for the screen.  SPDX-License-Identifier: MIT-0 OR Unlicense
 
-       tonemap in.exr out.png                        local photographic operator
+       tonemap in.exr out.png                        local photographic operator; out.exr: floats
        tonemap in.hdr out.png --operator ashikhmin --mesopic local --stats
        tonemap in.exr sheet.png --compare            all operators on one contact sheet
-       tonemap out.png                               a scene of its own: 10 decades from a dark room to the sun */
+       tonemap                                       a scene of its own: 10 decades from a dark room to the sun */
 
 #define _POSIX_C_SOURCE 200809L
 #define SAT_IMPLEMENTATION
@@ -62,21 +62,7 @@ static int make_scene(image *picture, int width, int height)
     return 1;
 }
 
-/* ---- words of the command line ---- */
-
-static const char *const operators[] = {"local", "global", "ashikhmin", "ashikhmin-global", "linear", NULL};
-static const char *const mesopics[] = {"off", "uniform", "local", NULL};
-
-static int choose(const char *option, const char *const *words, const char *word)
-{
-    int i;
-    for (i = 0; words[i]; ++i)
-        if (strcmp(words[i], word) == 0) return i;
-    fprintf(stderr, "--%s %s: must be one of", option, word);
-    for (i = 0; words[i]; ++i) fprintf(stderr, " %s", words[i]);
-    fputc('\n', stderr);
-    exit(2);
-}
+/* ---- one picture, or all operators on a sheet ---- */
 
 static void print_stats(const tonemap_stats *s, const image *picture, double seconds)
 {
@@ -96,9 +82,8 @@ static void print_stats(const tonemap_stats *s, const image *picture, double sec
     printf(" from the smallest to the largest\n");
 }
 
-/* ---- one picture, or all operators on a sheet ---- */
-
-static int map_picture(unsigned char *out, const image *picture, const tonemap_options *options, tonemap_stats *stats, double *seconds)
+/* Display values of 8 bits (sRGB) or floats (linear): the one of them that is not NULL. */
+static int map_picture(unsigned char *bytes, float *floats, const image *picture, const tonemap_options *options, tonemap_stats *stats, double *seconds)
 {
     sat_image view = image_view(picture);
     tonemap *map;
@@ -106,7 +91,8 @@ static int map_picture(unsigned char *out, const image *picture, const tonemap_o
     sat_result result = tonemap_create(&map, picture->width, picture->height, options);
     if (result == SAT_OK) {
         start = common_clock();
-        result = tonemap_apply_u8(map, out, (ptrdiff_t)picture->width * 3, &view, 0, stats);
+        if (bytes) result = tonemap_apply_u8(map, bytes, (ptrdiff_t)picture->width * 3, &view, 0, stats);
+        else result = tonemap_apply_f32(map, floats, (ptrdiff_t)picture->width * 3 * (ptrdiff_t)sizeof(float), &view, 0, stats);
         *seconds = common_clock() - start;
         tonemap_destroy(map);
     }
@@ -116,7 +102,7 @@ static int map_picture(unsigned char *out, const image *picture, const tonemap_o
 
 typedef struct variant { const char *label; tonemap_operator operation; tonemap_mesopic mesopic; int automatic; double soft; } variant;
 
-static int write_sheet(const char *path, const image *picture, const tonemap_options *options)
+static int write_sheet(const common_settings *common, const image *picture, const tonemap_options *options)
 {
     static const variant variants[] = {
         {"photographic local", TONEMAP_PHOTOGRAPHIC_LOCAL, TONEMAP_MESOPIC_OFF, 0, 0},
@@ -135,90 +121,72 @@ static int write_sheet(const char *path, const image *picture, const tonemap_opt
     size_t bytes = (size_t)picture->width * (size_t)picture->height * 3;
     unsigned char *pixels = (unsigned char *)malloc(COUNT * bytes);
     double seconds;
-    int i, ok = pixels != NULL;
+    int i, ok = pixels != NULL || common_say(common, "no memory");
     for (i = 0; i < COUNT && ok; ++i) {
         tonemap_options o = *options;
         o.operation = variants[i].operation;
         o.mesopic = variants[i].mesopic;
         o.soft = variants[i].soft;
         if (variants[i].automatic) o.key = o.white = 0;
-        ok = map_picture(pixels + (size_t)i * bytes, picture, &o, NULL, &seconds);
+        ok = map_picture(pixels + (size_t)i * bytes, NULL, picture, &o, NULL, &seconds);
         cells[i].rgb = pixels + (size_t)i * bytes;
         cells[i].width = picture->width;
         cells[i].height = picture->height;
         cells[i].label = variants[i].label;
         common_show_progress(&progress, "operators", i + 1, COUNT);
     }
-    if (ok && !common_contact_sheet(path, cells, COUNT, 3)) {
-        fprintf(stderr, "%s: cannot be written\n", path);
-        ok = 0;
-    }
+    ok = ok && common_contact_sheet(common, common->out, cells, COUNT, 3);
     free(pixels);
     return ok;
 }
 
-static int write_picture(const char *path, const image *picture, const tonemap_options *options, int print)
+/* Floats go into the picture itself. */
+static int write_picture(const common_settings *common, image *picture, const tonemap_options *options)
 {
-    unsigned char *pixels = (unsigned char *)malloc((size_t)picture->width * (size_t)picture->height * 3);
+    int as_bytes = image_ends_with(common->out, ".png"), ok;
+    unsigned char *pixels = as_bytes ? (unsigned char *)malloc((size_t)picture->width * (size_t)picture->height * 3) : NULL;
     tonemap_stats stats;
     double seconds = 0;
-    int ok = pixels && map_picture(pixels, picture, options, &stats, &seconds);
-    if (ok && !image_save_u8(path, pixels, picture->width, picture->height, 3)) {
-        fprintf(stderr, "%s: cannot be written\n", path);
-        ok = 0;
-    }
-    if (ok && print) print_stats(&stats, picture, seconds);
+    ok = (!as_bytes || pixels || common_say(common, "no memory")) && map_picture(pixels, picture->pixels, picture, options, &stats, &seconds);
+    ok = ok && (as_bytes ? common_save_u8(common, common->out, pixels, picture->width, picture->height, 3) : common_save(common, common->out, picture));
+    if (ok && common->stats) print_stats(&stats, picture, seconds);
     free(pixels);
     return ok;
 }
 
 int main(int argc, char **argv)
 {
-    float key = 0.18f, white = -1, phi = 8, epsilon = 0.05f, soft = 0, cd = 0, lux = 1, tolerance = 0, selective = 0;
-    int scales = 8, compare = 0, size[2] = {1280, 720}, first, ok;
-    const char *operation = "local", *mesopic = "off";
+    tonemap_options o = tonemap_defaults();
+    int operation = o.operation, mesopic = o.mesopic, compare = 0, size[2] = {1280, 720}, ok;
+    const char *in = NULL;
     const common_option options[] = {
-        {"operator", 's', &operation, "local, global, ashikhmin, ashikhmin-global or linear"},
-        {"key", 'f', &key, "display value of the log-average, 0.18; 0: estimated"},
-        {"white", 'f', &white, "smallest luminance shown as white; 0: estimated; -1: none, the default"},
-        {"phi", 'f', &phi, "sharpening of the scale test, 8"},
-        {"epsilon", 'f', &epsilon, "threshold of the scale test, 0.05"},
-        {"scales", 'i', &scales, "neighbourhoods tried, 1 to 8"},
-        {"soft", 'f', &soft, "0 to 1: mix neighbourhoods, against flicker"},
-        {"mesopic", 's', &mesopic, "off, uniform or local: reds fade in dim light"},
-        {"cd", 'f', &cd, "cd/m2 of a luminance of 1; 0: the log-average is 10"},
-        {"lux", 'f', &lux, "illuminance of a luminance of 1 cd/m2, 1"},
-        {"tolerance", 'f', &tolerance, "8-bit codes by which a skipped search may be wrong, 0"},
-        {"selective", 'f', &selective, "search only where the gradient exceeds this, 0: everywhere"},
-        {"compare", 'b', &compare, "all operators on a contact sheet"},
-        {"size", 'z', size, "of the scene drawn when no picture is given, 1280x720"},
+        {"in", 'P', (void *)&in, 0, 0, "picture to map; without one a scene is drawn"},
+        {"operator", 'w', &operation, 0, 0, "local|global|ashikhmin|ashikhmin-global|linear"},
+        {"key", 'd', &o.key, 0, 10, "display value of the log-average; 0: estimated"},
+        {"white", 'd', &o.white, 0, INFINITY, "smallest luminance shown as white; 0: estimated; inf: none"},
+        {"phi", 'd', &o.phi, -16, 16, "sharpening of the scale test"},
+        {"epsilon", 'd', &o.epsilon, 1e-6, 1e6, "threshold of the scale test"},
+        {"scales", 'i', &o.scales, 1, 8, "neighbourhoods tried"},
+        {"soft", 'd', &o.soft, 0, 1, "mix neighbourhoods, against flicker"},
+        {"mesopic", 'w', &mesopic, 0, 0, "off|uniform|local reds fade in dim light"},
+        {"cd", 'd', &o.cd_per_unit, 0, 1e9, "cd/m2 of a luminance of 1; 0: the log-average is 10"},
+        {"lux", 'd', &o.lux_per_cd, 1e-6, 1e6, "illuminance of a luminance of 1 cd/m2"},
+        {"tolerance", 'd', &o.tolerance_codes, 0, 255, "8-bit codes by which a skipped search may be wrong"},
+        {"selective", 'd', &o.selective, 0, 1e6, "search only where the gradient exceeds this; 0: everywhere"},
+        {"compare", 'b', &compare, 0, 0, "all operators on a contact sheet"},
+        {"size", 'z', size, 1, 16384, "of the scene drawn when no picture is given"},
     };
     common_settings common;
-    tonemap_options o = tonemap_defaults();
     image picture;
-    const char *out;
-    first = common_parse(&common, argc, argv, "tonemap [options] [in.exr|in.hdr|in.png] out.png", options,
-                         (int)(sizeof options / sizeof options[0]));
-    if (!common.out && first < argc) common.out = argv[--argc];
-    out = common.out ? common.out : "tonemap.png";
-    o.operation = (tonemap_operator)choose("operator", operators, operation);
-    o.mesopic = (tonemap_mesopic)choose("mesopic", mesopics, mesopic);
-    o.key = (double)key;
-    if (white >= 0) o.white = (double)white;
-    o.phi = (double)phi;
-    o.epsilon = (double)epsilon;
-    o.scales = scales;
-    o.soft = (double)soft;
-    o.cd_per_unit = (double)cd;
-    o.lux_per_cd = (double)lux;
-    o.tolerance_codes = (double)tolerance;
-    o.selective = (double)selective;
+    common_parse(&common, argc, argv, "tonemap", ".png .exr .hdr .pfm", options, (int)(sizeof options / sizeof options[0]));
+    if (compare) common.writes = ".png";
+    if (!common_may_write(&common, common.out)) return 2;
+    o.operation = (tonemap_operator)operation;
+    o.mesopic = (tonemap_mesopic)mesopic;
     o.threads = common.threads;
-    if (!(first < argc ? image_load(&picture, argv[first]) : make_scene(&picture, size[0], size[1]))) {
-        fprintf(stderr, "tonemap: %s\n", picture.message);
-        return 1;
-    }
-    ok = compare ? write_sheet(out, &picture, &o) : write_picture(out, &picture, &o, common.stats);
+    if (!(in ? image_load(&picture, in) : make_scene(&picture, size[0], size[1]))) return common_say(&common, picture.message), 1;
+    ok = compare ? write_sheet(&common, &picture, &o) : write_picture(&common, &picture, &o);
     image_free(&picture);
+    common_close(&common);
     return !ok;
 }

@@ -86,7 +86,7 @@ case $lib in
         convert -size 96x48 'gradient:#9bf-#321' "$dir/light.$kind" && dropped "$dir/light.$kind"
         if [ -f build/web/libexr.a ]; then
             rm -f "$dir/light.exr"
-            ok "the demo makes a light" build/demo --size 128x64 --samples 1 --out "$dir/light.png"
+            ok "the demo makes a light" build/demo --size 128x64 --samples 1 --out "$dir/light.exr"
             if [ -f "$dir/light.exr" ]; then dropped "$dir/light.exr"; else skip "no OpenEXR (libopenexr-dev) to write a light"; fi
         else skip "the page is without OpenEXR: the sources were not fetched"; fi
         ;;

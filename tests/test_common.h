@@ -257,24 +257,115 @@ TEST(bad_meshes_are_refused)
 TEST(options_are_read)
 {
     float key = 1;
-    int local = 0, frames = 2, size[2] = {0, 0}, first;
-    const char *hour = "noon";
+    double white = 2;
+    int local = 0, frames = 2, size[2] = {0, 0}, hour = 1, i;
+    const char *in = NULL, *shape = NULL;
     common_settings common;
-    common_option options[5] = {{"key", 'f', &key, ""}, {"local", 'b', &local, ""}, {"frames", 'i', &frames, ""},
-                                {"size", 'z', size, ""}, {"hour", 's', (void *)&hour, ""}};
-    char words[12][16] = {"prog", "--key", "0.5", "in.exr", "--local", "--size=1280x720", "--hour", "dusk", "--threads", "2", "--out", "o.png"};
-    char *argv[13];
-    int i;
-    for (i = 0; i < 12; ++i) argv[i] = words[i];
-    argv[12] = NULL;
-    first = common_parse(&common, 12, argv, "prog", options, 5);
+    common_option options[8] = {{"key", 'f', &key, 0, 1, ""}, {"local", 'b', &local, 0, 0, ""}, {"frames", 'i', &frames, 1, 9, ""}, {"size", 'z', size, 1, 4096, ""},
+                                {"hour", 'w', &hour, 0, 0, "dusk|night|noon of the day"}, {"in", 'P', (void *)&in, 0, 0, ""}, {"mesh", 'M', (void *)&shape, 0, 0, ""},
+                                {"white", 'd', &white, 0, INFINITY, ""}};
+    char words[13][24] = {"prog", "--key", "0.5", "in.exr", "--local", "--size=1280x720", "--hour", "noon", "--threads", "2", "-o", OUT_FILE("o.png"), "bunny.ply"};
+    char *argv[14], text[128];
+    for (i = 0; i < 13; ++i) argv[i] = words[i];
+    argv[13] = NULL;
+    common_parse(&common, 13, argv, "prog", ".png", options, 8);
     EXPECT_NEAR(key, 0.5, 0);
-    EXPECT(local && size[0] == 1280 && size[1] == 720 && strcmp(hour, "dusk") == 0);
+    EXPECT(local && size[0] == 1280 && size[1] == 720 && hour == 2);
     EXPECT_EQ(frames, 2);
-    EXPECT(strcmp(common.out, "o.png") == 0);
+    EXPECT(strcmp(common.out, OUT_FILE("o.png")) == 0);
     EXPECT(common.workers == 2 || !common.threads.parallel_for);
-    EXPECT(first == 11 && strcmp(argv[first], "in.exr") == 0);
-    EXPECT(!common_set(&options[0], "fast") && !common_set(&options[2], "1.5") && !common_set(&options[3], "10"));
+    EXPECT(in && strcmp(in, "in.exr") == 0 && shape && strcmp(shape, "bunny.ply") == 0);
+    EXPECT(!common_set(&options[0], "fast") && !common_set(&options[0], "1.1") && !common_set(&options[0], "nan") && !common_set(&options[2], "1.5"));
+    EXPECT(!common_set(&options[2], "0") && !common_set(&options[2], "10") && !common_set(&options[2], "99999999999999999999"));
+    EXPECT(!common_set(&options[3], "10") && !common_set(&options[3], "0x0") && !common_set(&options[3], "10x5000") && !common_set(&options[3], "1x1x"));
+    EXPECT(!common_set(&options[4], "du") && !common_set(&options[4], "") && !common_set(&options[4], "of") && common_set(&options[4], "dusk") && hour == 0);
+    EXPECT(common_set(&options[7], "inf") && white > 1e300);
+    options[0].type = 'm';
+    EXPECT(common_set(&options[0], "0.25mm") && !common_set(&options[0], "0.25cm"));
+    EXPECT_NEAR(key, 0.25, 0);
+    common_range(text, sizeof text, &options[2]);
+    EXPECT(strcmp(text, "must be 1 to 9") == 0);
+    common_range(text, sizeof text, &options[4]);
+    EXPECT(strcmp(text, "must be dusk, night or noon") == 0);
+    common_close(&common);
+}
+
+/* ---- files ---- */
+
+static int holds(const char *path, const char *text)
+{
+    char bytes[64] = "", why[FILE_MESSAGE];
+    size_t size;
+    unsigned char *have = file_read(path, &size, why);
+    if (have && size < sizeof bytes) memcpy(bytes, have, size);
+    free(have);
+    return strcmp(bytes, text) == 0;
+}
+
+TEST(a_file_is_written_whole_or_not_at_all)
+{
+    file_writer f;
+    char why[FILE_MESSAGE] = "";
+    if (!EXPECT(write_text(OUT_FILE("whole.txt"), "old"))) return;
+    EXPECT(file_open(&f, OUT_FILE("whole.txt"), why));
+    file_put(&f, "new", 3);
+    fflush(f.file);
+    EXPECT(holds(OUT_FILE("whole.txt"), "old"));
+    EXPECT(file_close(&f, 1, why) && holds(OUT_FILE("whole.txt"), "new"));
+    EXPECT(file_open(&f, OUT_FILE("whole.txt"), why));
+    file_put(&f, "half", 4);
+    f.error = ENOSPC;
+    EXPECT(!file_close(&f, 1, why) && strstr(why, "No space") && holds(OUT_FILE("whole.txt"), "new"));
+    EXPECT(access(f.part, F_OK) != 0);
+    EXPECT(!file_open(&f, "no/such/folder.txt", why) && strstr(why, "no such folder") && !file_close(&f, 1, why));
+    EXPECT(!file_open(&f, "build", why) && strstr(why, "is a folder"));
+    EXPECT(!file_open(&f, "Makefile/x.txt", why) && strstr(why, "cannot be written"));
+    EXPECT(!file_open(&f, "", why));
+}
+
+#ifndef _WIN32
+TEST(links_are_followed_and_known)
+{
+    file_writer f;
+    file_id a, b;
+    char why[FILE_MESSAGE] = "";
+    remove(OUT_FILE("soft.txt")), remove(OUT_FILE("loop.txt"));
+    if (!EXPECT(write_text(OUT_FILE("target.txt"), "old")) || symlink(strrchr(OUT_FILE("target.txt"), '/') + 1, OUT_FILE("soft.txt"))) return;
+    EXPECT(file_identify(&a, OUT_FILE("target.txt")) && file_identify(&b, OUT_FILE("soft.txt")) && a.volume == b.volume && a.number == b.number);
+    EXPECT(file_open(&f, OUT_FILE("soft.txt"), why));
+    file_put(&f, "new", 3);
+    EXPECT(file_close(&f, 1, why) && holds(OUT_FILE("target.txt"), "new") && holds(OUT_FILE("soft.txt"), "new"));
+    EXPECT(symlink(strrchr(OUT_FILE("loop.txt"), '/') + 1, OUT_FILE("loop.txt")) == 0 && !file_open(&f, OUT_FILE("loop.txt"), why));
+}
+
+TEST(a_full_disk_is_told)
+{
+    image a;
+    static const char *const paths[] = {OUT_FILE("full.png"), OUT_FILE("full.pfm"), OUT_FILE("full.hdr"), OUT_FILE("full.exr")};
+    size_t i;
+    if (access("/dev/full", W_OK)) SKIP("there is no /dev/full");
+    fill_image(&a, 64, 64, 3);
+    for (i = 0; i < 4; ++i) {
+        remove(paths[i]);
+        if (!EXPECT(symlink("/dev/full", paths[i]) == 0)) continue;
+        EXPECT(!image_save(&a, paths[i]) && (strstr(a.message, "No space") || strstr(a.message, "libopenexr-dev")));
+        EXPECT(access(paths[i], F_OK) == 0);
+    }
+    image_free(&a);
+}
+#endif
+
+/* The library's error handler must not ask the library anything. */
+TEST(a_missing_folder_ends_every_writer)
+{
+    image a;
+    fill_image(&a, 8, 8, 3);
+    EXPECT(!image_save(&a, "no/such/a.exr") && a.message[0]);
+    EXPECT(!image_save(&a, "no/such/a.png") && strstr(a.message, "no such folder"));
+    EXPECT(!image_save(&a, "no/such/a.hdr") && strstr(a.message, "no such folder"));
+    EXPECT(!image_save(&a, "no/such/a.pfm") && strstr(a.message, "no such folder"));
+    EXPECT(!image_save(&a, OUT_FILE("a.tga")) && strstr(a.message, "is none of"));
+    image_free(&a);
 }
 
 static void mark_range(int begin, int end, int worker, void *context)
@@ -304,10 +395,14 @@ TEST(contact_sheet_is_written)
     static unsigned char grey[40 * 30 * 3];
     common_cell cells[3] = {{grey, 40, 30, "A: 1e-6"}, {grey, 40, 30, "b_c"}, {grey, 40, 30, NULL}};
     common_canvas canvas = {grey, 40, 30};
+    common_settings common;
     int i, white = 0;
     memset(grey, 128, sizeof grey);
     common_text(&canvas, 1, 1, "I", 1);
     for (i = 0; i < 40 * 30; ++i) white += grey[3 * i] == 255;
     EXPECT_EQ(white, 11);       /* the serifs and the stem */
-    EXPECT(common_contact_sheet(OUT_FILE("sheet.png"), cells, 3, 2));
+    memset(&common, 0, sizeof common);
+    common.name = "prog";
+    common.writes = ".png";
+    EXPECT(common_contact_sheet(&common, OUT_FILE("sheet.png"), cells, 3, 2));
 }
