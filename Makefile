@@ -4,7 +4,7 @@
 
 all: examples
 .PHONY: all examples demo web check-view test bench report size check check-strict check-variants check-asan check-tsan \
-        check-analyze check-compilers fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
+        check-analyze check-compilers check-report fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
@@ -30,36 +30,32 @@ B       ?= build
 DEFS    := -D_POSIX_C_SOURCE=200809L -I. -Itests -Iexamples
 LDLIBS  := -lm -lpthread -ldl
 
-# Optional packages; each gives flags only where pkg-config or its header is found.
-PKG     := $(shell command -v pkg-config)
+# Optional packages: each gives flags where a program that includes its header compiles and links, asked when first needed.
+# NO_PACKAGES=1 does as if there were none. H is a hash sign: make 4.2 and 4.3 read \# in a shell function differently.
+H       := \#
+PKG     := $(if $(NO_PACKAGES),,$(shell command -v pkg-config))
 pkg      = $(if $(PKG),$(shell $(PKG) $(1) 2>/dev/null))
-found    = $(call pkg,--exists $(1) && echo 1)
 system   = $(patsubst -I%,-isystem %,$(filter-out -I/usr/include,$(filter -I%,$(call pkg,--cflags $(1)))))
-ifneq ($(call found,OpenEXR),)
-EXR     := -DHAVE_OPENEXR $(call system,OpenEXR)
-EXR_LIB := $(foreach l,$(call pkg,--libs OpenEXR),$(if $(findstring OpenEXRCore,$l),$l))
-endif
-ifneq ($(call found,stb),)
-STB     := -DHAVE_STB
-STB_LIB := $(call pkg,--libs stb)
-endif
-ifeq ($(shell echo 'int main(void){return 0;}' | $(CC) -fopenmp -x c - -o /dev/null >/dev/null 2>&1 && echo 1),1)
-OPENMP  := -fopenmp
-endif
-ifneq ($(call found,glfw3),)
-GLFW    := $(call pkg,--cflags glfw3)
-GLFW_LIB:= $(call pkg,--libs glfw3)
-endif
-ifneq ($(call found,opencv4),)
-OPENCV  := -DHAVE_OPENCV $(call system,opencv4)
-OPENCV_LIB := -lopencv_photo -lopencv_imgproc -lopencv_core
-endif
-ifeq ($(shell printf '\#include <embree3/rtcore.h>\n' | $(CC) -E -x c - >/dev/null 2>&1 && echo 1),1)
-EMBREE  := -DHAVE_EMBREE
-EMBREE_LIB := -lembree3
-endif
-PICTURES     := $(EXR) $(STB) $(OPENMP)
-PICTURE_LIBS := $(EXR_LIB) $(STB_LIB)
+# $(call links,NAME,COMPILER -x LANGUAGE,HEADER,FLAGS): 1 or nothing
+links    = $(if $(NO_PACKAGES),,$(if $(filter undefined,$(origin FOUND_$(1))),$(eval FOUND_$(1) := $(shell \
+           { [ -z '$(3)' ] || echo '$(H)include <$(3)>'; echo 'int main(void) { return 0; }'; } | \
+           $(2) -w - -o /dev/null $(4) >/dev/null 2>&1 && echo 1)))$(FOUND_$(1)))
+
+EXR_CORE = $(filter -lOpenEXRCore%,$(call pkg,--libs OpenEXR))
+EXR_LIB  = $(if $(EXR),$(EXR_CORE))
+EXR      = $(if $(call links,EXR,$(CC) -x c,openexr.h,$(call system,OpenEXR) $(EXR_CORE)),-DHAVE_OPENEXR $(call system,OpenEXR))
+STB_LIB  = $(if $(STB),-lstb)
+STB      = $(if $(call links,STB,$(CC) -x c,stb/stb_image.h,-lstb -lm),-DHAVE_STB)
+OPENMP   = $(if $(call links,OPENMP,$(CC) -x c,,-fopenmp),-fopenmp)
+GLFW     = $(call pkg,--cflags glfw3)
+GLFW_LIB = $(if $(call links,GLFW,$(CC) -x c,GLFW/glfw3.h,$(call pkg,--cflags --libs glfw3)),$(call pkg,--libs glfw3))
+OPENCV_LIB = $(if $(OPENCV),-lopencv_photo -lopencv_imgproc -lopencv_core)
+OPENCV   = $(if $(if $(HAVE_CXX),$(call links,OPENCV,$(CXX) -x c++,opencv2/photo.hpp,$(call system,opencv4) -lopencv_photo \
+           -lopencv_imgproc -lopencv_core)),-DHAVE_OPENCV $(call system,opencv4))
+EMBREE_LIB = $(if $(EMBREE),-lembree3)
+EMBREE   = $(if $(call links,EMBREE,$(CC) -x c,embree3/rtcore.h,-lembree3),-DHAVE_EMBREE)
+PICTURES     = $(EXR) $(STB) $(OPENMP)
+PICTURE_LIBS = $(EXR_LIB) $(STB_LIB)
 
 # V=1 shows the commands. The old program goes first, lest it be taken for the result of a failed compilation.
 SAY         = $(if $(V),,@echo '  $@';) rm -f $@; mkdir -p $(@D);
@@ -188,6 +184,10 @@ check-view: examples
 	+@if command -v emcc >/dev/null; then $(MAKE) --no-print-directory web; fi
 	@RUNNER='bash tests/check_view.sh' JOBS=1 tests/run.sh view web
 
+# `make report` with all packages that are here and with none: whole, or a failure that is named
+check-report:
+	+@RUNNER='bash tests/check_report.sh' JOBS=1 TEST_TIMEOUT=600 tests/run.sh all none broken
+
 # bytes of machine code with and without each option
 size:
 	@bash tests/size.sh $(LIBS)
@@ -197,40 +197,53 @@ size:
 BENCH_SOURCES := $(wildcard tests/bench/bench_*.c tests/bench/bench_*.cpp)
 BENCH_NAMES   := $(sort $(patsubst tests/bench/bench_%.c,%,$(patsubst tests/bench/bench_%.cpp,%,$(BENCH_SOURCES))))
 BENCHES       := $(foreach l,$(PICK),$(filter $l $l_%,$(BENCH_NAMES)))
-PEERS         := $(OPENCV) $(EMBREE)
+PEERS          = $(OPENCV) $(EMBREE)
+OUT           ?= out/bench
+REPORT        ?= report
 
-build/bench/bench_%_avx2: CFLAGS += $(if $(filter x86_64,$(shell uname -m)),-mavx2)
-build/bench/bench_%: tests/bench/bench_%.c
+$(B)/bench/bench_%_avx2: CFLAGS += $(if $(filter x86_64,$(shell uname -m)),-mavx2)
+$(B)/bench/bench_%: tests/bench/bench_%.c
 	$(COMPILE_C) -Itests/bench $(PICTURES) $(EMBREE) $< -o $@ $(PICTURE_LIBS) $(EMBREE_LIB) $(LDLIBS)
-build/bench/bench_%: tests/bench/bench_%.cpp
+$(B)/bench/bench_%: tests/bench/bench_%.cpp
 	$(COMPILE_CXX) -Itests/bench $(PICTURES) $(PEERS) $< -o $@ $(PICTURE_LIBS) $(OPENCV_LIB) $(EMBREE_LIB) $(LDLIBS)
 
-bench: $(BENCHES:%=out/bench/%.tsv)
-out/bench/%.tsv: build/bench/bench_% FORCE
-	@mkdir -p $(@D)
-	@echo '  bench $*' >&2
-	@QUICK='$(QUICK)' $< $(ARGS) >$@.part && mv $@.part $@ && cat $@
+# a table comes whole or not at all: what fails is named, and no table of another day stands in for it
+RUN_BENCH = mkdir -p $(@D) && rm -f $@ && echo '  bench $(@F:.tsv=)' >&2 && \
+    { QUICK='$(QUICK)' SMOKE='$(SMOKE)' NO_PACKAGES='$(NO_PACKAGES)' $< $(ARGS) >$@.part && mv $@.part $@ || \
+      { echo 'failed: bench $(@F:.tsv=)' >&2; false; }; }
+bench: $(BENCHES:%=$(OUT)/%.tsv)
+	@cat $^
+$(OUT)/%.tsv: $(B)/bench/bench_% FORCE
+	@$(RUN_BENCH)
 .PHONY: FORCE
 FORCE:
 
 # the same tables on the machine's GPU, through EGL
 GPU_BENCHES := $(patsubst tests/bench/gpu_%.c,%,$(wildcard $(if $(LIB),tests/bench/gpu_$(LIB).c,tests/bench/gpu_*.c)))
-build/bench/gpu_%: tests/bench/gpu_%.c
+$(B)/bench/gpu_%: tests/bench/gpu_%.c
 	$(COMPILE_C) -Itests/bench $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
-gpu-bench: $(GPU_BENCHES:%=out/bench/gpu_%.tsv)
-out/bench/gpu_%.tsv: build/bench/gpu_% FORCE
+gpu-bench: export LIGHTSCAN_GL := $(or $(LIGHTSCAN_GL),egl)
+gpu-bench: $(GPU_BENCHES:%=$(OUT)/gpu_%.tsv)
+	@cat $^
+$(OUT)/gpu_%.tsv: $(B)/bench/gpu_% FORCE
+	@$(RUN_BENCH)
+$(OUT)/size.tsv: FORCE
 	@mkdir -p $(@D)
-	@LIGHTSCAN_GL=$${LIGHTSCAN_GL:-egl} QUICK='$(QUICK)' $< $(ARGS) >$@.part && mv $@.part $@ && cat $@
+	@$(if $(SMOKE),SMOKE=1) bash tests/size.sh $(LIBS) >$@
 
+# A short run (QUICK, SMOKE) makes two tables at a time; SMOKE=1 shows that all benches work, its figures say nothing.
+report: SHORT = $(if $(QUICK)$(SMOKE),-j2)
 report:
-	@sh tests/deps.sh gnuplot-nox
-	+@$(MAKE) --no-print-directory -k -j2 $(BENCHES:%=build/bench/bench_%) || true
-	+@$(MAKE) --no-print-directory -k bench QUICK='$(QUICK)' >/dev/null || true
-	@mkdir -p out/bench report
-	@$(MAKE) --no-print-directory -s size >out/bench/size.tsv
-	@bash tests/report.sh $(BENCHES:%=out/bench/%.tsv) $(wildcard out/bench/gpu_*.tsv) out/bench/size.tsv >report/index.html.part
-	@mv report/index.html.part report/index.html
-	@echo report/index.html
+	@NO_DEPS='$(NO_DEPS)$(NO_PACKAGES)' sh tests/deps.sh gnuplot-nox
+	@rm -f $(BENCHES:%=$(OUT)/%.tsv)
+	+@$(MAKE) --no-print-directory -k -j2 $(BENCHES:%=$(B)/bench/bench_%) || true
+	+@$(MAKE) --no-print-directory -k $(SHORT) $(BENCHES:%=$(OUT)/%.tsv) $(OUT)/size.tsv || true
+	@mkdir -p $(REPORT)
+	@bash tests/report.sh $(BENCHES:%=$(OUT)/%.tsv) $(wildcard $(OUT)/gpu_*.tsv) $(OUT)/size.tsv >$(REPORT)/index.html.part
+	@mv $(REPORT)/index.html.part $(REPORT)/index.html
+	@echo $(REPORT)/index.html
+	@failed=; for b in $(BENCHES); do [ -s $(OUT)/$$b.tsv ] || failed="$$failed $$b"; done; \
+	 [ -z "$$failed" ] || { echo "failed:$$failed (not built, or ended with an error: see above)" >&2; exit 1; }
 
 # ---- the rest --------------------------------------------------------------------------------------------------
 
@@ -244,13 +257,14 @@ help:
 	@echo 'make check-variants   the tests without SIMD, with AVX2, without optimisation, with clang'
 	@echo 'make check-asan       the tests under AddressSanitizer and UBSan; check-tsan: ThreadSanitizer'
 	@echo 'make check-analyze    gcc -fanalyzer, clang --analyze; check-compilers: aarch64, mingw-w64, tcc, 32 bit'
+	@echo 'make check-report     every bench once, with all packages and with none: the report is whole'
 	@echo 'make fuzz             libFuzzer on each header          [FUZZ_SECONDS=20]'
 	@echo 'make check            all of check-*; each takes LIB=sat'
 	@echo 'make deps      install missing packages (Debian)'
 	@echo 'make gpu-bench the OpenGL tables on the GPU (EGL), out/bench/gpu_*.tsv'
 	@echo 'make web       the demo in a browser: out/web/index.html  [needs emscripten]'
 	@echo 'make check-view the window and the page against the demo: Xvfb, headless Chromium'
-	@echo 'make report    all tables and plots in report/index.html  [QUICK=1]'
+	@echo 'make report    all tables and plots in report/index.html  [QUICK=1, SMOKE=1]'
 	@echo 'make docs      put the programs of tests/test_readme.h and the plots of the last bench into README.md'
 	@echo 'make data      fetch free environment maps and meshes into data/'
 	@echo 'make dist      one-file editions in dist/: each header with what it needs of sat.h inside'

@@ -16,6 +16,7 @@ split() {
         /^# table:/ { ++n; open = 1; print substr($0, 10) > name("title"); next }
         /^# plot:/ && n { print substr($0, 9) > name("plots"); next }
         /^# note:/ && n { print substr($0, 9) > name("notes"); next }
+        /^# missing:/ && n { print substr($0, 12) > name("notes"); next }
         /^#/ { next }
         /^[ \t]*$/ { next }
         open { print > name("rows") }

@@ -4,7 +4,9 @@
 lib=
 . "$(dirname "$0")/check.sh"
 mkdir -p build/size
-measure() { ${CC:-cc} -std=c99 -Os -DNDEBUG $DEFS "$@" -c build/size/x.c -o build/size/x.o 2>/dev/null && size build/size/x.o | awk 'NR == 2 { print $1 }'; }
+# SMOKE=1: without the optimiser, to see that it works
+size=-Os; [ -z "$SMOKE" ] || size=-O0
+measure() { ${CC:-cc} -std=c99 $size -DNDEBUG $DEFS "$@" -c build/size/x.c -o build/size/x.o 2>/dev/null && size build/size/x.o | awk 'NR == 2 { print $1 }'; }
 echo "# table: Object size by option (bytes of code and constants at -Os)"
 printf 'header\tconfiguration\tbytes\tsaved\tdefault\n'
 for lib in "$@"; do

@@ -21,7 +21,11 @@
        bench_plot("Error against time; x=time_ratio; y=error; log=xy");
        bench_row("%s\t%.3g\t%.3g\t%d", "tiled", ratio, error, 1);
 
-   QUICK=1 in the environment asks for a short run: bench_quick(). */
+   QUICK=1 in the environment asks for a short run: bench_quick(). SMOKE=1 asks for the shortest that shows every table
+   once: bench_smoke(), and bench_quick() too; every call is made once, and the figures say nothing.
+
+   A peer that is not installed loses only its own cells: bench_missing("OpenCV", "libopencv-dev") after bench_table says
+   so, bench_cell(value, have_it) makes "-" of them, and the report leaves out a column that has nothing else. */
 
 #ifndef BENCH_H
 #define BENCH_H
@@ -29,14 +33,17 @@
 #include <stdarg.h>
 #include "support.h"
 
-static inline int bench_quick(void)
+static inline int bench_set(const char *name)
 {
-    const char *quick = getenv("QUICK");
-    return quick && *quick && strcmp(quick, "0") != 0;
+    const char *value = getenv(name);
+    return value && *value && strcmp(value, "0") != 0;
 }
 
+static inline int bench_smoke(void) { return bench_set("SMOKE"); }
+static inline int bench_quick(void) { return bench_set("QUICK") || bench_smoke(); }
+
 /* full rounds, or what a short run affords */
-static inline int bench_rounds(int full) { return bench_quick() ? (full > 5 ? 5 : full) : full; }
+static inline int bench_rounds(int full) { return bench_smoke() ? 1 : bench_quick() && full > 3 ? 3 : full; }
 
 /* Name of the processor, compiler and instruction set as a comment line. */
 static inline void bench_start(const char *header)
@@ -76,6 +83,22 @@ static inline void bench_table(const char *title, const char *columns)
 
 static inline void bench_plot(const char *plot) { printf("# plot: %s\n", plot); }
 static inline void bench_note(const char *note) { printf("# note: %s\n", note); }
+
+/* A peer that is not here, by name and package: rows or columns of this table are left out. */
+static inline void bench_missing(const char *peer, const char *package)
+{
+    printf("# missing: %s is not installed (%s): its rows or columns are left out\n", peer, package);
+}
+
+/* A number for a cell, or "-" where there is none. The text stays for the next seven calls. */
+static inline const char *bench_cell(double value, int digits, int there)
+{
+    static char text[8][32];
+    static int turn;
+    turn = (turn + 1) % 8;
+    snprintf(text[turn], sizeof text[0], there ? "%.*g" : "-", digits, value);
+    return text[turn];
+}
 
 #if defined(__GNUC__)
 __attribute__((format(printf, 1, 2)))
@@ -118,15 +141,18 @@ static inline bench_times bench_ratio(bench_fn *work, void *work_user, bench_fn 
     int i, k, repeat[2] = {1, 1};
     if (rounds < 1) rounds = 1;
     if (rounds > 64) rounds = 64;
-    work(work_user);
-    peer(peer_user);
+    if (!bench_smoke()) {
+        work(work_user);
+        peer(peer_user);
+    }
     t0 = bench_clock();
     work(work_user);
     t1 = bench_clock();
     peer(peer_user);
     t2 = bench_clock();
-    if (t1 - t0 < 1e-3) repeat[0] = 1 + (int)(1e-3 / (t1 - t0 + 1e-8));
-    if (t2 - t1 < 1e-3) repeat[1] = 1 + (int)(1e-3 / (t2 - t1 + 1e-8));
+    if (bench_smoke()) rounds = 1;
+    else if (t1 - t0 < 1e-3) repeat[0] = 1 + (int)(1e-3 / (t1 - t0 + 1e-8));
+    if (!bench_smoke() && t2 - t1 < 1e-3) repeat[1] = 1 + (int)(1e-3 / (t2 - t1 + 1e-8));
     for (i = 0; i < rounds; ++i) {
         t0 = bench_clock();
         for (k = 0; k < repeat[0]; ++k) work(work_user);
@@ -150,7 +176,8 @@ static inline double bench_time(bench_fn *work, void *user, int rounds)
     int i;
     if (rounds < 1) rounds = 1;
     if (rounds > 64) rounds = 64;
-    work(user);
+    if (bench_smoke()) rounds = 1;
+    else work(user);
     for (i = 0; i < rounds; ++i) {
         start = bench_clock();
         work(user);

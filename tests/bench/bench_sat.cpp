@@ -86,7 +86,10 @@ static void bench_build(void)
     static const int sizes[] = {512, 2048, 4096, 8192};
     bench_table("Build: time against memcpy of the same traffic and against OpenCV", "kind\tside\ttime_memcpy_ratio\topencv_speedup\tbytes_a_pixel\tdefault");
     bench_plot("Build time; x=side; y=time_memcpy_ratio; by=kind; log=x; style=linespoints");
-    bench_note("opencv_speedup: time of cv::integral (float or double output) over ours; 0: OpenCV is not installed");
+    bench_note("opencv_speedup: time of cv::integral (float or double output) over ours");
+#ifndef HAVE_OPENCV
+    bench_missing("OpenCV", "libopencv-dev");
+#endif
     for (int s = 0; s < (bench_quick() ? 2 : 4); s++) {
         int n = sizes[s];
         size_t pixels = (size_t)n * (size_t)n;
@@ -114,7 +117,7 @@ static void bench_build(void)
             cv::setNumThreads(1);
             peer = 1 / bench_ratio(build, &w, k == SAT_KIND_DOUBLE || k == SAT_KIND_FIXED64 ? integrate_f64 : integrate_f32, &w, bench_rounds(n > 5000 ? 7 : 21)).ratio;
 #endif
-            bench_row("%s\t%d\t%.2f\t%.2f\t%.3f\t%d", kind_names[k], n, ratio, peer, (double)sat_get_statistics(w.table).bytes / (double)pixels, k == 0);
+            bench_row("%s\t%d\t%.2f\t%s\t%.3f\t%d", kind_names[k], n, ratio, bench_cell(peer, 3, peer > 0), (double)sat_get_statistics(w.table).bytes / (double)pixels, k == 0);
             sat_destroy(w.table);
         }
         free(p);
@@ -197,7 +200,7 @@ static void bench_precision(void)
     bench_plot("The same against the size of the table; x=side; y=median_relative; by=representation; where=picture:14 decades,box:3; log=xy; style=linespoints");
     bench_plot("Boxes of all sizes in uniform noise; x=time_memcpy_ratio; y=median_relative; by=representation; where=picture:uniform,side:2048; log=xy");
     bench_note("rms and max are of the image's mean; relative errors are of each box's own mean; fixed kinds are given boxes up to 201 x 201");
-    for (int n = 512; n <= (bench_quick() ? 2048 : 8192); n *= n == 512 ? 4 : 2) {
+    for (int n = 512; n <= (bench_smoke() ? 512 : bench_quick() ? 2048 : 8192); n *= n == 512 ? 4 : 2) {
         float *p = (float *)malloc((size_t)n * (size_t)n * 4);
         for (int which = 0; which < PICTURES; which++) {
             make_picture(p, n, which);
@@ -269,7 +272,7 @@ static void look_up(void *user)
 static void bench_lookups(void)
 {
     static const int radii[] = {1, 5, 10, 20, 50, 100};
-    int n = bench_quick() ? 2048 : 4096;
+    int n = bench_smoke() ? 256 : bench_quick() ? 2048 : 4096;
     float *p = (float *)malloc((size_t)n * (size_t)n * 4);
     int *x = (int *)malloc(LOOKUPS * sizeof(int)), *y = (int *)malloc(LOOKUPS * sizeof(int));
     sat_table *tables[5];
@@ -403,16 +406,16 @@ static void scan(void *user)
 static void bench_scans(void)
 {
     static const int ks[] = {2, 3, 4, 6, 8, 12, 16};
-    enum { N = 1 << 20 };
-    float *in = (float *)malloc(N * 4), *out = (float *)malloc(N * 4);
-    support_fill(in, N, 0, 1, 3);
+    const int N = bench_smoke() ? 1 << 14 : 1 << 20;
+    float *in = (float *)malloc((size_t)N * 4), *out = (float *)malloc((size_t)N * 4);
+    support_fill(in, (size_t)N, 0, 1, 3);
     bench_table("k-ary scans of 2^20 floats: work and time against the sequential scan", "algorithm\tk\tpasses\tadds_a_value\taccesses_a_value\tnodes_a_value\ttime_ratio\terror_ulp\tdefault");
     bench_plot("Accesses a value; x=k; y=accesses_a_value; by=algorithm; style=linespoints");
     bench_note("these are the algorithms of the GPU; on a CPU the sequential scan is the fast one");
     for (int a = 1; a < 3; a++)
         for (int i = 0; i < 7; i++) {
             sat_scan_counters c;
-            scan_work work = {in, out, N, sat_scan_defaults()}, peer = work;
+            scan_work work = {in, out, (size_t)N, sat_scan_defaults()}, peer = work;
             double worst = 0;
             long double exact = 0;
             work.options.algorithm = (sat_scan_algorithm)a;

@@ -312,11 +312,12 @@ static void radius_table(void)
 static void resolution_table(void)
 {
     static const char *const names[4] = {"traditional", "horizon-based", "refined (5.3.5)", "slabs"}, *const published[4] = {"1.71", "2.44", "1", ""};
-    int size, top = bench_quick() ? 512 : 2048, m, half_size = 0;
+    int size, top = bench_quick() ? 512 : 2048, first = bench_smoke() ? 128 : 256, m, half_size = 0;
     double half[4] = {0, 0, 0, 0};
     bench_table("Figure 5.16 re-made: time against resolution, scene 0, R = 0.25", "method\tsize\tms\tto_minimalist_ratio");
     bench_plot("Time against resolution; x=size; y=ms; by=method; log=xy; style=linespoints");
-    for (size = 256; size <= top; size *= 2) {
+    if (bench_smoke()) top = first;
+    for (size = first; size <= top; size *= 2) {
         ref_scene s;
         ref_picture p;
         double base = 0;
@@ -506,7 +507,7 @@ static void format_table(void)
     int size, kind, decades;
     bench_table("Largest error of a box mean of 1/z, in units of one depth step R / z^2, R = 0.25 (1/10 shows)", "table\tsize\tlargest_error");
     bench_plot("Table formats; x=size; y=largest_error; by=table; log=xy; style=linespoints");
-    for (size = 128; size <= (bench_quick() ? 512 : 4096); size *= 2)
+    for (size = 128; size <= (bench_smoke() ? 128 : bench_quick() ? 512 : 4096); size *= 2)
         for (kind = 0; kind < 3; kind++) {
             size_t n = (size_t)size * (size_t)size, i;
             float *z = (float *)malloc(n * 4);
@@ -531,13 +532,13 @@ int main(void)
 {
     const char *fit = getenv("FIT");
     int i;
-    side = bench_quick() ? 192 : 512;
+    side = bench_smoke() ? 64 : bench_quick() ? 192 : 512;
     pixels = (size_t)side * (size_t)side;
     out = (float *)malloc(pixels * 4);
     other = (float *)malloc(pixels * 4);
     for (i = 0; i < REF_SCENES * REF_RADII; i++) occlusions[i] = (float *)malloc(pixels * 4);
     bench_start("ssao_sat.h");
-    draw_pictures(bench_quick() ? 64 : 256);
+    draw_pictures(bench_smoke() ? 16 : bench_quick() ? 64 : 256);
     list_methods();
     if (fit && *fit) fit_comparators();
     if (fit && strcmp(fit, "only") == 0) return 0;

@@ -75,6 +75,20 @@ static void enlarge(scene *out, const scene *s, int width, int height)
     settle(out, s->name);
 }
 
+/* Every eighth pixel each way: enough to show that a bench works. */
+static void shrink(scene *s)
+{
+    image small_one;
+    image_create(&small_one, s->picture.width / 8, s->picture.height / 8, 3);
+    for (int y = 0; y < small_one.height; ++y)
+        for (int x = 0; x < small_one.width; ++x)
+            memcpy(small_one.pixels + 3 * ((size_t)y * (size_t)small_one.width + (size_t)x),
+                   s->picture.pixels + 3 * ((size_t)(8 * y) * (size_t)s->picture.width + (size_t)(8 * x)), 3 * sizeof(float));
+    image_free(&s->picture);
+    s->picture = small_one;
+    settle(s, s->name);
+}
+
 /* ---- one configuration as a piece of work */
 
 struct work { tonemap *map; const scene *s; unsigned char *out; tonemap_stats stats; tonemap_options options; };
@@ -200,6 +214,8 @@ static void run_drago(void *user)
 }
 #endif
 
+static void name_missing_pfs(void) { if (!have_pfs()) bench_missing("pfstools", "pfstools, pfstmo"); }
+
 /* ---- tables */
 
 static void times(scene *still)
@@ -209,7 +225,8 @@ static void times(scene *still)
     tonemap_options o = tonemap_defaults();
     auto add = [&](const char *name) { rows[count].name = name; rows[count++].o = o; o = tonemap_defaults(); };
     scene big;
-    enlarge(&big, still, 1920, 1080);
+    const int width = bench_smoke() ? 320 : 1920, height = bench_smoke() ? 180 : 1080;
+    enlarge(&big, still, width, height);
     add("local");
     o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL, add("global");
     o.mesopic = TONEMAP_MESOPIC_LOCAL, add("local + local mesopic");
@@ -223,6 +240,10 @@ static void times(scene *still)
     bench_table("Time of one picture: StillLife mirrored to 1920 x 1080, float RGB in, 8-bit sRGB out, one core",
                 "configuration\ttime_ratio\tns_per_pixel\tdefault");
     bench_note("time_ratio: to the local operator, in pairs; pfstools: CPU time with its stream, 1 run in 3 of each; below 1 it would be faster than we are");
+#ifndef HAVE_OPENCV
+    bench_missing("OpenCV", "libopencv-dev");
+#endif
+    name_missing_pfs();
     work base = make_work(&big, &rows[0].o);
     for (int i = 0; i < count; ++i) {
         work w = make_work(&big, &rows[i].o);
@@ -234,7 +255,7 @@ static void times(scene *still)
     {
         opencv_peer p;
         cv::setNumThreads(1);
-        p.in = cv::Mat(1080, 1920, CV_32FC3, big.picture.pixels);
+        p.in = cv::Mat(height, width, CV_32FC3, big.picture.pixels);
         p.drago = cv::createTonemapDrago(2.2f);
         bench_times t = bench_ratio(run_drago, &p, run_work, &base, bench_rounds(15));
         bench_row("peer: OpenCV Drago (global)\t%.3f\t%.2f\t0", t.ratio, 1e9 * t.work / (double)big.n);
@@ -266,6 +287,7 @@ static void portable(void)
     double ratio[9], out[2] = {0, 0};
     int rounds = bench_rounds(9);
     FILE *file = fopen(source, "w");
+    bench_table("Portable C against vector code", "code\ttime_ratio\tns_per_pixel\tdefault");
     if (!file) return;
     fputs("#define SAT_IMPLEMENTATION\n#define TONEMAP_IMPLEMENTATION\n#include \"tonemap.h\"\n#include \"support.h\"\n"
           "int main(void){int w=1500,h=1000,i;float*p=malloc(sizeof(float)*3*w*h);unsigned char*o=malloc(3*w*h);tonemap*t;clock_t c;double best=1e9;\n"
@@ -277,9 +299,11 @@ static void portable(void)
         char build[4096];
         snprintf(command[i], sizeof command[i], "%s/once%d", bench_folder, i);
         snprintf(build, sizeof build, "cc -std=c99 -O2 -D_POSIX_C_SOURCE=200809L %s -I. -Itests %s -o %s -lm -lpthread 2>/dev/null", i ? "-DSAT_NO_SIMD" : "", source, command[i]);
-        if (!shell(build)) return;
+        if (!shell(build)) {
+            bench_missing("a C compiler called cc", "gcc");
+            return;
+        }
     }
-    bench_table("Portable C against vector code", "code\ttime_ratio\tns_per_pixel\tdefault");
     for (int k = 0; k < rounds; ++k) {
         for (int i = 0; i < 2; ++i) {
             FILE *pipe = popen(command[i], "r");
@@ -768,6 +792,7 @@ int main(int argc, char **argv)
         settle(&scenes[0], "room");
         count = 1;
     }
+    for (int i = 0; bench_smoke() && i < count; ++i) shrink(&scenes[i]);
     if (wanted_table(argc, argv, "times")) times(&scenes[0]);
     if (wanted_table(argc, argv, "portable")) portable();
     if (wanted_table(argc, argv, "accuracy")) accuracy(scenes, count);
