@@ -21,23 +21,28 @@
    WHAT IT DOES
 
    - SSAO_SAT_SLABS: the depth range is cut into slabs; tables of count, depth and position give the exact centroid of what each slab
-     holds in 24 cells around a pixel, and the sines of these over the tangent plane are summed with their distance. The error is
-     below that of HBAO with 128 samples and a blur; see COST.
+     holds in 24 cells around a pixel, and the sines of these over the tangent plane are summed with their distance. COST puts its
+     error beside that of others.
    - SSAO_SAT_PLANE: the table of 5.4.1 with two changes: it holds what is affine on planes (1/z in perspective, z in orthographic
      views), and the tangent plane is subtracted. A flat wall at any slant then gives exactly nothing.
    - The three methods of Slomp 2012, chapter 5, with what the text leaves open settled by measurement; `as_printed` keeps its letter.
    - One matrix decides the convention: linear, hardware or reversed depth, [-1,1] or [0,1], infinite far planes, off-centre,
-     flipped, orthographic. A depth kind that contradicts the matrix is refused.
-   - Half-resolution tables with an upsample that knows planes and never reads sky; bent normals; signed depth unsharp masking; bands
-     of rows for stills of any size; statistics of what was left out; OpenGL 3.3 / ES 3.0.
+     flipped, left-handed, orthographic, jittered, an oblique near plane (mirrors, water). What must be 0 may be the rounding of a
+     matrix product. A depth kind that contradicts the matrix is refused.
+   - No pixel and no small object moves the frame: depth ranges leave out the nearest and farthest 4 of 256 blocks of a sample, and
+     what lies beyond is in the end slabs.
+   - Half-resolution tables (SLABS: of all pixels, so a wire counts at every column) with an upsample that knows planes and never
+     reads sky; bent normals; signed depth unsharp masking; bands of rows for stills of any size; statistics of what was left out and
+     of normals in the wrong space; other sizes and options without a new object; OpenGL 3.3 / ES 3.0, nothing compiled in a frame.
 
    WHAT IT DOES NOT
 
    - It sees what the depth buffer holds: occluders off the screen or behind others do not count. Nothing is assumed about thickness, so
      thin poles darken a little what lies behind them.
    - No temporal accumulation: there is no noise to accumulate away. No shading: the accessibility is yours to multiply.
-   - On the GPU no bent normals and no signed output. No left-handed view spaces: mirror the matrix.
+   - On the GPU no bent normals and no signed output. Logarithmic depth is not decoded: give distances.
    - GTAO has a smaller error at small radii (bench_ssao_sat): cells average what samples resolve.
+   - Smooth normals on a coarse mesh are believed: its facets then darken at their edges. Without normals they are taken from depth.
 
    DEVIATIONS from chapter 5, with their reasons
 
@@ -65,47 +70,52 @@
 
    MEMORY, THREADS, ERRORS
 
-   ssao_sat_create makes one allocation; frames make none. Bytes a pixel of the tables: 16 a slab and about 50; so 8 slabs at half
-   resolution take 45 a pixel of the picture. With band_rows the memory is that of band_rows + 2 max_pixels + 8 table rows.
+   ssao_sat_create makes one allocation; frames make none. Bytes a pixel of the tables: 16 a slab and about 60; so 8 slabs at half
+   resolution take 47 a pixel of the picture. Stack: at most 3 KB. With band_rows the memory is that of band_rows + 2 max_pixels + 8
+   table rows.
    An object serves one call at a time. The input is only read. Every argument is checked in every build, and on an error nothing is
-   written. Options may carry a parallel_for: rows, slabs and estimates are shared out by it.
+   written; ssao_sat_explain and ssao_sat_explain_input say in a sentence what was wrong. NULL options are the defaults.
+   Options may carry a parallel_for: rows, slabs and estimates are shared out by it.
 
    NUMERICS
 
    - Tables are integers modulo 2^32: sums over boxes are exact at every size (the picture may be 32768 wide), so a box mean is wrong
-     by at most half a quantum: 2^-21 of its range or less for regions up to 22 pixels, 2^-15 at 128. The same bits for any number of
-     workers and any bands; with and without SIMD to the last bits of the compiler's float contraction.
+     by at most half a quantum: 2^-21 of its range (from a quarter of the nearest distance on) or less for regions up to 22 pixels,
+     2^-15 at 128. The same bits for any number of workers and any bands; with and without SIMD to the last bits of the compiler's float contraction.
    - Depths that are NaN, infinite, <= 0, cleared, or beyond 1e18 are sky: accessibility 1, part of no slab, never an occluder.
      Normals that are NaN, infinite or zero are taken from depth; any length will do.
    - The bias (a sine of 0.06) hides the rounding of depths. Conventions agree to 1e-3 as long as their depths resolve the radius.
    - Edges of slabs follow both the depth range and where pixels are: nine decades of depth keep their slabs useful.
-   - Regions are cut at the border of the picture and divided by what is left; radii beyond max_pixels are cut and counted.
+   - Regions are cut at the border of the picture and divided by what is left. SLABS: what a cell loses goes to the cells beside the
+     pixel, so that a crease keeps its value up to the border (within 0.03) without seams. Radii beyond max_pixels are cut and counted.
 
    COST
 
    Work a table pixel: 16 lookups a ring and slab in reach; flat regions cost 4. Measured by bench_ssao_sat, three scenes x radii 0.1,
-   0.25, 0.6 at 512 x 512, one thread, gcc -O2 (SSE2), processor time in the same run (1 = half-resolution GTAO, 3 x (3 + 3) samples):
+   0.25, 0.6 at 512 x 512, 96 rays a pixel, one thread, gcc -O2 (SSE2), processor time in the same run (1 = half-resolution GTAO,
+   3 x (3 + 3) samples). The others are plain scalar C, the slabs four lanes wide: a GTAO in vectors is faster than the slabs.
 
      method                        time   RMSE    SSIM   RMSE, gain and power    RMSE, another scene,
                                                          from other scenes       nothing fitted to it
-     minimalist                    0.16   0.174   0.76   0.167                   0.139
-     normal-guided                 0.21   0.158   0.80   0.156                   0.222
-     refined                       0.54   0.170   0.76   0.164                   0.148
-     plane, one box                0.22   0.118   0.77   0.121                   0.103
-     plane, 2 x 2                  0.32   0.103   0.80   0.107                   0.092
-     slabs, 4 of them              0.31   0.063   0.91   0.064                   0.053
-     slabs (default)               0.39   0.062   0.91   0.062                   0.050
-     SSAO 16 + 15 x 15 blur        0.63   0.073   0.87   0.074                   0.080
-     HBAO 16 x 8, half resolution  2.00   0.065   0.90   0.067                   0.047
-     HBAO 16 x 8 + 15 x 15 blur    4.63   0.066   0.90   0.068                   0.047
-     GTAO, half resolution         1.00   0.059   0.90   0.059                   0.048
-     GTAO 3 x (3 + 3) + 5 x 5      1.64   0.057   0.90   0.057                   0.047
+     minimalist                    0.19   0.183   0.73   0.168                   0.139
+     normal-guided                 0.20   0.173   0.76   0.165                   0.222
+     refined                       0.60   0.173   0.73   0.165                   0.149
+     plane, one box                0.22   0.118   0.75   0.121                   0.104
+     plane, 2 x 2                  0.29   0.103   0.77   0.107                   0.092
+     slabs, 4 of them              0.42   0.066   0.88   0.067                   0.055
+     slabs (default)               0.48   0.065   0.89   0.066                   0.051
+     SSAO 16 + 15 x 15 blur        0.67   0.073   0.85   0.075                   0.080
+     HBAO 16 x 8, half resolution  2.34   0.066   0.88   0.068                   0.048
+     HBAO 16 x 8 + 15 x 15 blur    4.82   0.066   0.87   0.068                   0.047
+     GTAO, half resolution         1.00   0.060   0.88   0.060                   0.049
+     GTAO 3 x (3 + 3) + 5 x 5      1.72   0.058   0.88   0.058                   0.047
 
-   Time grows with the radius, because more slabs come into reach and less is flat: radii 0.1 : 0.25 : 0.6 cost 1 : 1.7 : 2.6; the
-   others cost 1 : 1.0 : 1.1. Leaving out flat regions: 1.2 to 1.7 times as fast where a third of the picture or more is flat,
-   identical output. Bent normals: 1.05 to 1.19 times the time, 1 to 7 degrees off the ray-traced ones. A gliding camera changes the
-   result by 0.0014 a frame where half-resolution GTAO changes by 0.0023. Box means of 1/z at 4096 x 4096: 5e-6 of a depth step
-   off, where float tables are 0.6 off. SAT_NO_SIMD without auto-vectorisation: 1.7 times the time. Full-resolution tables cost 4 times as much and gain nothing at these sizes.
+   Where things are thinner than cells the order is another: RMSE on grass and poles (192 x 192) 0.105, HBAO 0.093, GTAO 0.148; in a
+   hall of 40 m 0.077, HBAO 0.076, GTAO 0.081, all at half resolution. Time grows with the radius, because more slabs come into reach
+   and less is flat: radii 0.1 : 0.25 : 0.6 cost 1 : 1.4 : 2.0; the others cost 1 : 1.0 : 1.1. Leaving out flat regions changes nothing
+   in the output. Bent normals cost a tenth or so and are 1 to 7 degrees off the ray-traced ones. A gliding camera (192 x 192) changes
+   the result by 0.0016 a frame where half-resolution GTAO changes by 0.0031, HBAO by 0.0020. Box means of 1/z at 4096 x 4096: 5e-6 of
+   a depth step off, where float tables are 0.6 off. Full-resolution tables cost 2.7 times as much and gain 0.0005.
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SSAO_SAT_IMPLEMENTATION)

@@ -190,7 +190,69 @@ static inline void ref_table(ref_scene *s)
     s->at = ref_make(0, 0.1f, 0);
 }
 
-enum { REF_SCENES = 4 };
+/* The same numbers every time, 0..1. */
+static inline float ref_random(uint32_t *state)
+{
+    *state = *state * 1664525u + 1013904223u;
+    return (float)(*state >> 8) / 16777216;
+}
+
+/* 4: 1500 blades of grass, poles 1.2 cm thick under a rail, a box: what is thinner than a pixel or a cell. */
+static inline void ref_grass(ref_scene *s)
+{
+    uint32_t state = 777;
+    int i;
+    ref_quad(s, ref_make(-12, 0, -20), ref_make(12, 0, -20), ref_make(12, 0, 5), ref_make(-12, 0, 5));
+    for (i = 0; i < 1500; i++) {
+        float x = -2.2f + 4.4f * ref_random(&state), z = -4.5f + 5.4f * ref_random(&state), tall = 0.12f + 0.28f * ref_random(&state);
+        float w = 0.006f + 0.008f * ref_random(&state), turn = 6.28f * ref_random(&state), lean = 0.12f * (ref_random(&state) - 0.5f);
+        int a = ref_add_vertex(s, ref_make(x - w * cosf(turn), 0, z - w * sinf(turn)));
+        int b = ref_add_vertex(s, ref_make(x + w * cosf(turn), 0, z + w * sinf(turn)));
+        mesh_add_triangle(&s->m, a, b, ref_add_vertex(s, ref_make(x + lean, tall, z - 0.7f * lean)));
+    }
+    for (i = 0; i < 14; i++) {
+        float x = -2 + 4 * ref_random(&state), z = -4 + 4.3f * ref_random(&state);
+        ref_box(s, x, 0, z, x + 0.012f, 0.9f + 0.6f * ref_random(&state), z + 0.012f);
+    }
+    ref_box(s, -3, 0.55f, -2, 3, 0.57f, -1.98f);
+    ref_box(s, -0.6f, 0, -1.4f, 0.1f, 0.45f, -0.9f);
+    s->eye = ref_make(0.1f, 0.75f, 2.2f);
+    s->at = ref_make(0, 0.25f, -0.6f);
+}
+
+/* 5: a hall of 40 m with columns, beams, chairs, and a rail close to the eye: far and near at once. */
+static inline void ref_hall(ref_scene *s)
+{
+    int i, j;
+    ref_box(s, -3.1f, -0.1f, -40, 3.1f, 0, 4);
+    ref_box(s, -3.1f, 5, -40, 3.1f, 5.1f, 4);
+    ref_box(s, -3.1f, 0, -40, -3, 5, 4);
+    ref_box(s, 3, 0, -40, 3.1f, 5, 4);
+    ref_box(s, -3.1f, 0, -40.1f, 3.1f, 5, -40);
+    for (i = 0; i < 14; i++) {
+        float z = 0.2f - 2.8f * (float)i;
+        for (j = 0; j < 2; j++) {
+            float x = j ? 1.9f : -2.2f;
+            ref_box(s, x, 0, z, x + 0.3f, 4.4f, z + 0.3f);
+            ref_box(s, x - 0.1f, 0, z - 0.1f, x + 0.4f, 0.2f, z + 0.4f);
+            ref_box(s, x - 0.12f, 4.2f, z - 0.12f, x + 0.42f, 4.5f, z + 0.42f);
+        }
+        ref_box(s, -3, 4.5f, z - 0.05f, 3, 5, z + 0.35f);
+    }
+    for (i = 0; i < 8; i++) {
+        float z = 0.1f - 0.9f * (float)i;
+        ref_box(s, -1.4f, 0.42f, z, -0.4f, 0.46f, z + 0.35f);
+        ref_box(s, -1.35f, 0, z + 0.05f, -1.3f, 0.42f, z + 0.3f);
+        ref_box(s, -0.5f, 0, z + 0.05f, -0.45f, 0.42f, z + 0.3f);
+        ref_box(s, -1.4f, 0.46f, z, -0.4f, 0.9f, z + 0.04f);
+    }
+    ref_box(s, -1.5f, 1.02f, 2.55f, 3, 1.06f, 2.6f);
+    for (i = 0; i < 9; i++) ref_box(s, -1 + 0.4f * (float)i, 0, 2.56f, -0.985f + 0.4f * (float)i, 1.02f, 2.575f);
+    s->eye = ref_make(0.2f, 1.5f, 3.6f);
+    s->at = ref_make(0, 1.25f, -6);
+}
+
+enum { REF_SCENES = 6 };
 
 /* ---- rays: a hierarchy of boxes, split at the middle of the longest side ---- */
 
@@ -259,7 +321,7 @@ static inline void ref_finish(ref_scene *s)
 
 static inline void ref_open(ref_scene *s, int which)
 {
-    void (*const make[REF_SCENES])(ref_scene *) = {ref_corner, ref_room, ref_field, ref_table};
+    void (*const make[REF_SCENES])(ref_scene *) = {ref_corner, ref_room, ref_field, ref_table, ref_grass, ref_hall};
     memset(s, 0, sizeof *s);
     make[which](s);
     ref_finish(s);

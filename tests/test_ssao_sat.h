@@ -1418,7 +1418,7 @@ TEST(a_refused_input_is_explained)
     EXPLAINED(bad.depth_stride = 6, "depth_stride");
     EXPLAINED(bad.normals = z; bad.normal_stride = 8, "normal_stride");
     EXPLAINED(bad.sky = -1, "sky");
-    EXPLAINED(bad.depth_kind = (ssao_sat_depth)7, "depth_kind");
+    EXPLAINED(bad.depth_kind = (ssao_sat_depth)3, "depth_kind");
     EXPLAINED(bad.projection[11] = 1, "projection");
     EXPLAINED(bad.depth_kind = SSAO_SAT_DEPTH_REVERSED; bad.clip_zero_to_one = 0, "depth_kind");
     EXPECT(strstr(ssao_sat_explain_input(text, sizeof text, NULL), "NULL") != NULL);
