@@ -18,9 +18,10 @@
 
    WHAT IT DOES
 
-   - Tables that keep their precision where plain float tables lose it: over 14 decades, 3 x 3 boxes of an 8192^2 image come
-     out with a median relative error of 9e-7, where a float table has 1 (bench_sat, table "Precision"). The default,
-     SAT_KIND_TILED, holds float sums that restart in every 32 x 32 tile and double sums between the tiles.
+   - Tables that keep their precision where plain float tables lose it: over 14 smooth decades, 3 x 3 boxes come out right to
+     5e-6 at the 99th percentile and 5e-5 at worst. The default, SAT_KIND_TILED, sums integers in every 64 x 64 tile, with a
+     quantum of the tile's own, and a box of up to 129 pixels a side reads only the tiles that it touches: bright pixels,
+     infinities and skies elsewhere change nothing.
    - Exact tables in integers modulo 2^32 or 2^64: the same bits on CPU and GPU, for any order of additions.
    - Means over boxes with real corners, beyond the border (clip, zero, clamp, mirror, wrap), with a radius for each pixel;
      box filters of whole images, also of images that arrive a row at a time; dirty rectangles.
@@ -60,34 +61,34 @@
 
    u = 2^-24, v = 2^-53; errors of one box sum, worst case for non-negative pixels; sat_error_bound knows the constants.
 
-     TILED     38 u x (sum of the tiles the box touches) + few v x (sum of the image): whatever the image's size
+     TILED     quantum / 2 of its tile for each pixel + few v x (sum of the box; of its super tiles where the box is larger
+               than three tiles); a quantum is the power of two for which the tile's sum just fits in 31 bits, so that 8-
+               and 16-bit input is exact
      FLOAT     4 (height + width / 8) u x (sum of the image)
      DOUBLE    4 (height + width / 8) v x (sum of the image)
      FIXED     quantum / 2 for each pixel of the box; 0 for 8- and 16-bit input in FIXED64
 
-   - Input: any float. NaN counts as 0 and infinity as the largest value the kind can sum; both are counted, and a bad
-     pixel changes no box without it. TILED clamps a tile row's pixels to 3.3e35, FLOAT all pixels to 1.6e29, when their
+   - Input: any float. NaN counts as 0 and infinity as the largest value the kind can sum; both are counted, and in TILED
+     and FIXED tables a bad pixel changes no box without it. TILED keeps at most 64 pixels a tile row beyond 1e20; further
+     ones are clamped to the largest other pixel of their tile and counted. FLOAT clamps all pixels to 1.6e29 when their
      sums would overflow otherwise. SAT_NON_FINITE_REFUSE returns an error instead.
    - The same bits for any number of workers, for SSE2, AVX2, NEON and plain C, with and without contraction into fused
      multiply-adds, also under -ffast-math and -Ofast, which the
      implementation switches off for itself (gcc, clang, MSVC); only subnormals may then count as 0, as the program asked for.
-   - Corners that share a tile row or column skip the sums these would cancel, so that 3 x 3 boxes beside a bright region
-     keep their digits: at the 99th percentile such a table beats doubles of 8 bytes a pixel.
    - subtract_mean helps images of low contrast and harms dark boxes of high dynamic range.
 
    COST
 
-   A build reads each pixel once and writes each sum once. Per pixel and channel: 4.5 bytes (TILED), 4 (FLOAT, FIXED32), 8
-   (DOUBLE, FIXED64). A lookup reads 4 sums (TILED: up to 12). Measured ratios, one core, SSE2 (bench_sat):
+   A build reads each pixel once and writes each sum once. Per pixel and channel: 4.8 bytes (TILED; 18 in a column one pixel wide), 4 (FLOAT, FIXED32), 8
+   (DOUBLE, FIXED64). A lookup reads 4 sums (TILED: up to 4 a touched tile, at most 9 tiles, then strips). Measured ratios, one core, SSE2 (bench_sat):
 
      build, time over a memcpy of the same traffic    512^2    2048^2   4096^2   8192^2
-       TILED                                          3.7      1.14     1.27     1.37
+       TILED                                                            4.5
        FLOAT (with AVX2)                              3.1 2.2  0.9 1.1  1.0 1.0  1.3 1.4
        DOUBLE                                         3.2      1.15     1.3      2.0
        FIXED32, FIXED64                               5.7      1.3, 1.9 2.0, 2.3 3.0, 3.3
      cv::integral over FLOAT                          2.6      2.5      2.4      1.6
-     lookup of random boxes, TILED over FLOAT: 1.3 to 1.5 at any radius from 1 to 100
-     sat_update of 64^2 pixels in 4096^2: a build over it: 14 (first corner), 30 (middle), 110 (last corner)
+     lookup of random boxes, TILED over FLOAT: 2.1 at radius 1 and 5, 2.7 at 20, 7 at 100
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SAT_IMPLEMENTATION)
@@ -242,7 +243,7 @@ SAT_DEF double sat_reduce_f32(const float *in, size_t n, ptrdiff_t stride, int k
 
 /* How sums are stored. Bytes a pixel and channel; see NUMERICS for errors and COST for times. */
 typedef enum sat_kind {
-    SAT_KIND_TILED,   /* 4.5; floats that restart in every tile, doubles between tiles: for HDR */
+    SAT_KIND_TILED,   /* 4.8; integers that restart in every tile, with a quantum each: for HDR */
     SAT_KIND_FLOAT,   /* 4; only for large boxes, small images or thesis parity */
     SAT_KIND_DOUBLE,  /* 8 */
     SAT_KIND_FIXED32, /* 4; integers modulo 2^32: exact sums of pixels rounded to `quantum` */
@@ -328,7 +329,8 @@ SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_widt
                             double max_relative_error, size_t max_bytes, const sat_options *options);
 
 /* Box filter of an image that arrives a row at a time, of any height, in memory for 2 radius + 2 rows. The rows
-   that come out equal sat_box_filter of the whole image bit for bit. */
+   that come out equal sat_box_filter of the whole image bit for bit. SAT_KIND_TILED keeps up to three tile rows more, gives
+   rows up to a tile side later, and takes a radius of at most 100000. */
 typedef struct sat_stream sat_stream;
 SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, int radius, const sat_options *options);
 /* Takes the next row (an image of height 1) and writes at most one filtered row to out_row (width x channels floats);
@@ -3958,13 +3960,135 @@ static inline void sat__filter_kind(float *out, const sat_table *t, sat_kind kin
     }
 }
 
-/* The same of a tiled table, from its rows [y0, y1). */
+/* v[i] += (high[i] - low[i]) quantum, for differences modulo 2^32; low may be NULL. */
+static void sat__add_cells(double *v, const uint32_t *high, const uint32_t *low, int n, double quantum)
+{
+    int i = 0;
+#ifdef SAT__SSE2
+    const __m128d q = _mm_set1_pd(quantum);
+    for (; i + 4 <= n; i += 4) {
+        __m128i d = _mm_loadu_si128((const __m128i *)(const void *)(high + i));
+        if (low) d = _mm_sub_epi32(d, _mm_loadu_si128((const __m128i *)(const void *)(low + i)));
+        _mm_storeu_pd(v + i, _mm_add_pd(_mm_loadu_pd(v + i), _mm_mul_pd(_mm_cvtepi32_pd(d), q)));
+        d = _mm_shuffle_epi32(d, 0xee);
+        _mm_storeu_pd(v + i + 2, _mm_add_pd(_mm_loadu_pd(v + i + 2), _mm_mul_pd(_mm_cvtepi32_pd(d), q)));
+    }
+#endif
+    for (; i < n; i++) v[i] += (double)(int32_t)(low ? high[i] - low[i] : high[i]) * quantum;
+}
+
+/* v[i]: the rows of a span, spikes left out, in columns from the left side of a tile up to its column x + i. */
+static void sat__tile_columns(double *v, const sat_table *t, int channel, const sat__span *y, int tx, int x, int n)
+{
+    int i, j, b = y->run0, super = SAT__SUPER >> t->shift;
+    for (i = 0; i < n; i++) v[i] = 0;
+    for (j = 0; j < y->count; j++) {
+        const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, y->tile[j], tx)];
+        if (tile->slot)
+            for (i = 0; i < n; i++) v[i] += sat__wide_part(t, tile, 0, y->begin[j], x + i + 1, y->end[j]);
+        else {
+            const uint32_t *high = sat__cells(t, channel, y->tile[j], y->end[j] - 1) + ((size_t)tx << t->shift) + x;
+            sat__add_cells(v, high, y->begin[j] ? high - (size_t)(y->end[j] - y->begin[j]) * t->stride : NULL, n, tile->quantum);
+        }
+    }
+    while (b < y->run1) {
+        int stop = sat__min_int(y->run1, (b | (super - 1)) + 1);
+        const double *high = sat__above(t, channel, stop - 1) + ((size_t)tx << t->shift) + x;
+        const double *low = b & (super - 1) ? sat__above(t, channel, b - 1) + ((size_t)tx << t->shift) + x : NULL;
+        for (i = 0; i < n; i++) v[i] += low ? high[i] - low[i] : high[i];
+        b = stop;
+    }
+}
+
+/* Spikes of one tile onto the boxes of n output pixels from x on. */
+static void sat__add_spikes(double *sum, const sat_table *t, int channel, const sat__span *y, int tx, int radius, int x, int n)
+{
+    int i, j, k;
+    for (j = 0; j < y->count; j++) {
+        size_t index = sat__tile_index(t, channel, y->tile[j], tx);
+        const sat__spike *s = t->spikes + index * SAT__SPIKES;
+        for (k = 0; k < t->tiles[index].spikes; k++) {
+            int at = (tx << t->shift) + s[k].x - x;
+            if (s[k].y < y->begin[j] || s[k].y >= y->end[j]) continue;
+            for (i = sat__max_int(0, at - radius); i < n && i <= at + radius; i++) sum[i] += (double)s[k].value;
+        }
+    }
+}
+
+typedef struct sat__filter_line {
+    const sat_table *table;
+    sat__span y;
+    int channel, radius, y0, y1, giants;
+    double edge[512]; /* whole tiles of the rows, by tile modulo 512 */
+    int edge_end;     /* tiles below have theirs */
+} sat__filter_line;
+
+static double sat__line_edge(sat__filter_line *f, int tx)
+{
+    const sat_table *t = f->table;
+    for (; f->edge_end <= tx; f->edge_end++)
+        sat__tile_columns(&f->edge[f->edge_end & 511], t, f->channel, &f->y, f->edge_end, sat__min_int(t->options.tile, t->width - (f->edge_end << t->shift)) - 1, 1);
+    if (f->edge_end - tx <= 512) return f->edge[tx & 511];
+    else {
+        double e;
+        sat__tile_columns(&e, t, f->channel, &f->y, tx, sat__min_int(t->options.tile, t->width - (tx << t->shift)) - 1, 1);
+        return e;
+    }
+}
+
+/* Sums around n pixels from x on, whose boxes all begin in one tile and end in one tile. */
+static void sat__line_sums(double *sum, sat__filter_line *f, int x, int n, int first, int last)
+{
+    const sat_table *t = f->table;
+    double low[SAT__MAX_TILE_SIDE], rest = 0;
+    int i, r = f->radius, tx, begin = first << t->shift, skip = sat__clamp_int(begin + r + 1 - x, 0, n);
+    int inside = sat__clamp_int(t->width - r - x, 0, n);
+    for (i = 0; i < skip; i++) low[i] = 0;
+    if (skip < n) sat__tile_columns(low + skip, t, f->channel, &f->y, first, x + skip - r - 1 - begin, n - skip);
+    if (inside) sat__tile_columns(sum, t, f->channel, &f->y, last, x + r - (last << t->shift), inside);
+    if (inside < n) {
+        double edge = sat__line_edge(f, last);
+        for (i = inside; i < n; i++) sum[i] = edge;
+    }
+    if (first == last)
+        for (i = 0; i < n; i++) sum[i] -= low[i];
+    else {
+        double edge = sat__line_edge(f, first);
+        for (tx = first + 1; tx < last; tx++) rest += sat__line_edge(f, tx);
+        for (i = 0; i < n; i++) sum[i] = ((edge - low[i]) + rest) + sum[i];
+    }
+    for (tx = first; tx <= last; tx++) sat__add_spikes(sum, t, f->channel, &f->y, tx, r, x, n);
+    /* spikes of whole tile rows are in the strips already */
+    if (f->giants)
+        for (i = 0; i < n; i++) sum[i] += sat__giant_sum(t, f->channel, sat__max_int(x + i - r, 0), f->y0, sat__min_int(x + i + r + 1, t->width), f->y1);
+}
+
+/* The same of a tiled table, from its rows [y0, y1): a vertical difference in each tile, then a loop over the pixels whose boxes
+   touch the same tiles. */
 static void sat__filter_tiled(float *out, const sat_table *t, int channel, int radius, int y0, int y1)
 {
-    int x, step = t->channels, width = t->width;
-    for (x = 0; x < width; x++) {
-        int x0 = x > radius ? x - radius : 0, x1 = width - x > radius ? x + radius + 1 : width;
-        out[(size_t)x * (size_t)step] = (float)(sat__tiled_sum(t, channel, x0, y0, x1, y1) / ((double)(x1 - x0) * (double)(y1 - y0)));
+    sat__filter_line f;
+    double sum[SAT__MAX_TILE_SIDE];
+    int x, i, n, step = t->channels, width = t->width, r = sat__min_int(radius, width);
+    f.table = t;
+    f.channel = channel;
+    f.radius = r;
+    f.y0 = y0;
+    f.y1 = y1;
+    f.edge_end = 0;
+    f.giants = 0;
+    sat__span_of(&f.y, y0, y1, t->shift);
+    for (i = y0 >> t->shift; t->has_giants && i <= (y1 - 1) >> t->shift; i++)
+        f.giants |= t->tallies[(size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, i)].giants > 0;
+    for (x = 0; x < width; x += n) {
+        int first = sat__max_int(0, x - r) >> t->shift, last = sat__min_int(width - 1, x + r) >> t->shift;
+        n = sat__min_int(SAT__MAX_TILE_SIDE, sat__min_int(width - x, ((first + 1) << t->shift) + r - x));
+        if (last < t->tiles_x - 1) n = sat__min_int(n, ((last + 1) << t->shift) - r - x);
+        sat__line_sums(sum, &f, x, n, first, last);
+        for (i = 0; i < n; i++) {
+            int x0 = x + i > r ? x + i - r : 0, x1 = width - (x + i) > r ? x + i + r + 1 : width;
+            out[(size_t)(x + i) * (size_t)step] = (float)(sum[i] / ((double)(x1 - x0) * (double)(y1 - y0)));
+        }
     }
 }
 
