@@ -62,7 +62,7 @@ static void print_table(const pipeline *p, const gl_context *context)
         print_row("occlusion", p->seconds[PIPELINE_OCCLUSION], percent(error, sizeof error, reference_occlusion_error(p), "rms (CPU, all pixels)"), gpu);
     else if (p->options.occlusion) {
         snprintf(rest, sizeof rest, "sky %.0f %%, flat %.0f %%, too small %.0f %% of %zu pixels", 100 * (double)a->sky / (double)a->pixels,
-                 100 * (double)a->flat / (double)a->pixels, 100 * (double)a->small / (double)a->pixels, a->pixels);
+                 100 * (double)a->flat / (double)a->pixels, 100 * (double)a->tiny / (double)a->pixels, a->pixels);
         print_row("occlusion", p->seconds[PIPELINE_OCCLUSION], percent(error, sizeof error, reference_occlusion_error(p), "rms (all pixels)"), rest);
     }
     print_row("shade", p->seconds[PIPELINE_SHADE], "-", "");

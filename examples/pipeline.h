@@ -27,7 +27,7 @@ typedef struct pipeline_gl pipeline_gl;
 
 typedef enum pipeline_stage {
     PIPELINE_LIGHT,    /* sky or environment, made ready for shadows and drops; once */
-    PIPELINE_MASKS,    /* what each sculpture hides from where; once */
+    PIPELINE_MASKS,    /* what each sculpture hides from where; once, when shadows are first asked for */
     PIPELINE_SCENE,    /* rasteriser */
     PIPELINE_SHADOWS,  /* fiv.h */
     PIPELINE_OCCLUSION, /* ssao_sat.h */
@@ -166,6 +166,7 @@ static inline int pipeline_masks(pipeline *p)
     double start = common_clock();
     common_progress progress = {0, 0};
     int i;
+    if (!p->options.shadows || p->occluders[SCENE_OBJECTS - 1]) return 1;
     for (i = 0; i < SCENE_OBJECTS; ++i) {
         const scene_object *o = &p->scene.objects[i];
         fiv_occluder_options fo = fiv_occluder_defaults();
@@ -176,6 +177,7 @@ static inline int pipeline_masks(pipeline *p)
         fo.threads = p->options.threads;
         if (!pipeline_check(p, "fiv_occluder_create", fiv_occluder_create(&p->occluders[i], o->positions, o->vertices, o->indices, o->triangles,
                                                                          &fo, &p->mask_stats[i]))) return 0;
+        if (p->light && !pipeline_check(p, "fiv_occluder_light", fiv_occluder_light(p->occluders[i], p->light, NULL))) return 0;
     }
     p->seconds[PIPELINE_MASKS] = common_clock() - start;
     return 1;
@@ -555,7 +557,7 @@ static inline int pipeline_change(pipeline *p, const pipeline_options *options)
 {
     pipeline_options old = p->options;
     p->options = *options;
-    if (!pipeline_gl_ready(p)) return 0;
+    if (!pipeline_gl_ready(p) || !pipeline_masks(p)) return 0;
     if (old.get_proc != options->get_proc) p->settled = 0;
     if (old.get_proc != options->get_proc || old.rate != options->rate) PIPELINE_GL_FORGET(p);
     if (old.rate != options->rate) raindrop_rain_destroy(p->rain), p->rain = NULL;

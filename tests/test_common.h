@@ -104,6 +104,176 @@ TEST(png_keeps_8_bits)
     image_free(&b);
 }
 
+static int write_bytes(const char *path, const void *bytes, size_t size)
+{
+    FILE *file = fopen(path, "wb");
+    size_t written = file ? fwrite(bytes, 1, size, file) : 0;
+    return file && fclose(file) == 0 && written == size;
+}
+
+TEST(hdr_comes_back)
+{
+    image a, b;
+    size_t i;
+    int worst = 0;
+    fill_image(&a, 37, 11, 3);
+    a.pixels[0] = (float)NAN, a.pixels[1] = -1, a.pixels[2] = 255.9f;
+    if (!EXPECT(image_save(&a, OUT_FILE("a.hdr"))) || !EXPECT(image_load(&b, OUT_FILE("a.hdr")))) return;
+    EXPECT(b.width == 37 && b.height == 11 && b.pixels[0] == 0 && b.pixels[1] == 0 && b.pixels[2] == 256);
+    for (i = 1; i < 37 * 11; ++i) {
+        float *u = a.pixels + 3 * i, *v = b.pixels + 3 * i, most = fmaxf(u[0], fmaxf(u[1], u[2]));
+        worst |= !(fabsf(u[0] - v[0]) <= most / 256 && fabsf(u[1] - v[1]) <= most / 256 && fabsf(u[2] - v[2]) <= most / 256);
+    }
+    EXPECT(!worst);
+    image_free(&a);
+    image_free(&b);
+}
+
+/* Every format, cut anywhere behind its first bytes, is refused with a sentence and never shown in part. */
+TEST(half_a_file_is_refused)
+{
+    static const char *const paths[] = {OUT_FILE("cut.hdr"), OUT_FILE("cut.pfm"), OUT_FILE("cut.png"), OUT_FILE("cut.exr"), OUT_FILE("cut.jpg")};
+    image a;
+    size_t i, size, part;
+    const char *rle = support_data("hdr/memorial.hdr"), *photo = support_data("photos/brushes.jpg");
+    for (i = 0; i < 5; ++i) {
+        unsigned char *bytes;
+        char why[FILE_MESSAGE];
+        fill_image(&a, 40, 30, 3);
+        if (i < 4 && !image_save(&a, paths[i])) { EXPECT(strstr(a.message, "libopenexr-dev") != NULL); image_free(&a); continue; }
+        image_free(&a);
+        if ((i == 4 && !photo) || !(bytes = file_read(i == 4 ? photo : i == 0 && rle ? rle : paths[i], &size, why))) continue;
+        for (part = size / 5; part < size - 1; part += size / 5) {
+            EXPECT(write_bytes(paths[i], bytes, part));
+            if (!EXPECT(!image_load(&a, paths[i]) && a.message[0] && !a.pixels)) { printf("%s of %d bytes\n", paths[i], (int)part); image_free(&a); }
+        }
+        free(bytes);
+    }
+}
+
+TEST(png_of_16_bits_keeps_them)
+{
+    static const unsigned char png[] = {
+        137, 80, 78, 71, 13, 10, 26, 10, 0, 0, 0, 13, 73, 72, 68, 82, 0, 0, 0, 2, 0, 0, 0, 1, 16, 2, 0, 0, 0, 43, 208,
+        52, 158, 0, 0, 0, 24, 73, 68, 65, 84, 120, 1, 1, 13, 0, 242, 255, 0, 1, 1, 1, 2, 1, 44, 255, 255, 0, 0, 128, 0,
+        13, 113, 2, 177, 45, 20, 135, 119, 0, 0, 0, 0, 73, 69, 78, 68, 174, 66, 96, 130};
+    static const float words[6] = {257, 258, 300, 65535, 0, 32768};
+    image a;
+    int i;
+    EXPECT(write_bytes(OUT_FILE("words.png"), png, sizeof png));
+    if (!image_load(&a, OUT_FILE("words.png"))) {
+        EXPECT(strstr(a.message, "libstb-dev") != NULL);
+        SKIP("reading .png needs libstb-dev");
+    }
+    for (i = 0; i < 6; ++i) EXPECT_NEAR(a.pixels[i], sat__srgb_decode(words[i] / 65535), 0);
+    image_free(&a);
+}
+
+#ifdef HAVE_STB
+typedef struct jpeg { unsigned char bytes[8192]; size_t size; } jpeg;
+
+static void jpeg_add(void *to, void *bytes, int size)
+{
+    jpeg *j = (jpeg *)to;
+    if (j->size + (size_t)size > sizeof j->bytes) return;
+    memcpy(j->bytes + j->size, bytes, (size_t)size);
+    j->size += (size_t)size;
+}
+
+/* A picture 32 x 16 with one red quarter, and a note on how the camera was held: where red is when it is shown upright. */
+TEST(jpeg_is_turned_as_the_camera_was_held)
+{
+    /* by the picture of EXIF 2.3, 4.6.4: the stored top left is shown top left, top right, bottom right, bottom left, and so on */
+    static const unsigned char right[9] = {0, 0, 1, 1, 0, 0, 1, 1, 0}, below[9] = {0, 0, 0, 1, 1, 0, 0, 1, 1};
+    static unsigned char pixels[32 * 16 * 3];
+    static jpeg plain, noted;
+    int turn, little, x, y;
+    for (y = 0; y < 8; ++y)
+        for (x = 0; x < 16; ++x) pixels[3 * (32 * y + x)] = 255;
+    plain.size = 0;
+    if (!EXPECT(stbi_write_jpg_to_func(jpeg_add, &plain, 32, 16, 3, pixels, 95))) return;
+    for (little = 0; little < 2; ++little)
+        for (turn = 1; turn <= 8; ++turn) {
+            unsigned char exif[] = {0xff, 0xd8, 0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f', 0, 0, 'M', 'M', 0, 42, 0, 0, 0, 8, 0, 1, 1, 0x12, 0, 3, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0};
+            unsigned char other[] = {'I', 'I', 42, 0, 8, 0, 0, 0, 1, 0, 0x12, 1, 3, 0, 1, 0, 0, 0, 0, 0};
+            image a;
+            int wide, u, v;
+            if (little) memcpy(exif + 12, other, sizeof other);
+            exif[little ? 30 : 31] = (unsigned char)turn;
+            exif[5] = 34;
+            noted.size = 0;
+            jpeg_add(&noted, exif, 38);
+            jpeg_add(&noted, plain.bytes + 2, (int)plain.size - 2);
+            EXPECT(write_bytes(OUT_FILE("turned.jpg"), noted.bytes, noted.size));
+            if (!EXPECT(image_load(&a, OUT_FILE("turned.jpg")))) { puts(a.message); continue; }
+            wide = turn < 5;
+            EXPECT(a.width == (wide ? 32 : 16) && a.height == (wide ? 16 : 32));
+            u = right[turn] ? a.width - 3 : 2, v = below[turn] ? a.height - 3 : 2;
+            EXPECT(a.pixels[3 * (v * a.width + u)] > 0.8f);
+            u = right[turn] ? 2 : a.width - 3, v = below[turn] ? 2 : a.height - 3;
+            EXPECT(a.pixels[3 * (v * a.width + u)] < 0.1f);
+            image_free(&a);
+        }
+}
+#endif
+
+#ifdef HAVE_OPENEXR
+/* An uncompressed picture of 2 x 1 pixels whose channel i holds i + 1 and i + 1.5. `layers`: names in the order of the alphabet. */
+static int write_layers(const char *path, const char *const *names, int count)
+{
+    static jpeg file;
+    unsigned char head[] = {0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0}, box[16] = {0}, four[4] = {0};
+    int i, k;
+    size_t list = 1;
+#define ADD(text, size) jpeg_add(&file, (void *)(uintptr_t)(text), (int)(size))
+#define ADD_INT(value) (four[0] = (unsigned char)(value), four[1] = (unsigned char)((value) >> 8), four[2] = four[3] = 0, ADD(four, 4))
+    file.size = 0;
+    ADD(head, 8);
+    for (i = 0; i < count; ++i) list += strlen(names[i]) + 17;
+    ADD("channels\0chlist", 16), ADD_INT(list);
+    for (i = 0; i < count; ++i) ADD(names[i], strlen(names[i]) + 1), ADD_INT(2), ADD_INT(0), ADD_INT(1), ADD_INT(1);
+    ADD("", 1);
+    ADD("compression\0compression", 24), ADD_INT(1), ADD("", 1);
+    box[8] = 1;
+    ADD("dataWindow\0box2i", 17), ADD_INT(16), ADD(box, 16);
+    ADD("displayWindow\0box2i", 20), ADD_INT(16), ADD(box, 16);
+    ADD("lineOrder\0lineOrder", 20), ADD_INT(1), ADD("", 1);
+    ADD("pixelAspectRatio\0float", 23), ADD_INT(4), ADD("\0\0\x80\x3f", 4);
+    ADD("screenWindowCenter\0v2f", 23), ADD_INT(8), ADD(box + 9, 4), ADD(box + 9, 4);
+    ADD("screenWindowWidth\0float", 24), ADD_INT(4), ADD("\0\0\x80\x3f", 4);
+    ADD("", 1);
+    ADD_INT(file.size + 8), ADD(box + 9, 4);
+    ADD_INT(0), ADD_INT(8 * count);
+    for (i = 0; i < count; ++i)
+        for (k = 0; k < 2; ++k) {
+            float v = (float)(i + 1) + 0.5f * (float)k;
+            ADD(&v, 4);
+        }
+    return write_bytes(path, file.bytes, file.size);
+}
+
+TEST(exr_with_layers_shows_its_picture)
+{
+    static const char *const blender[] = {"ViewLayer.Combined.A", "ViewLayer.Combined.B", "ViewLayer.Combined.G", "ViewLayer.Combined.R", "ViewLayer.Depth.Z"};
+    static const char *const passes[] = {"Diffuse.B", "Diffuse.G", "Diffuse.R", "beauty.B", "beauty.G", "beauty.R"};
+    static const char *const grey[] = {"A", "Y"}, *const depth[] = {"Z"}, *const odd[] = {"A", "U", "V"}, *const plain[] = {"B", "G", "R", "a.B", "a.G", "a.R"};
+    const struct { const char *const *names; int count; float r, g, b; } cases[] = {
+        {blender, 5, 4, 3, 2}, {passes, 6, 6, 5, 4}, {grey, 2, 2, 2, 2}, {depth, 1, 1, 1, 1}, {plain, 6, 3, 2, 1}, {odd, 3, 0, 0, 0}};
+    size_t i;
+    image a;
+    for (i = 0; i < 6; ++i) {
+        EXPECT(write_layers(OUT_FILE("layers.exr"), cases[i].names, cases[i].count));
+        if (i == 5) {
+            EXPECT(!image_load(&a, OUT_FILE("layers.exr")) && strstr(a.message, "but A U V"));
+            continue;
+        }
+        if (!EXPECT(image_load(&a, OUT_FILE("layers.exr")))) { puts(a.message); continue; }
+        EXPECT(a.pixels[0] == cases[i].r && a.pixels[1] == cases[i].g && a.pixels[2] == cases[i].b && a.pixels[3] == cases[i].r + 0.5f);
+        image_free(&a);
+    }
+}
+#endif
+
 TEST(bad_files_are_refused_with_a_sentence)
 {
     image a;
