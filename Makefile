@@ -3,7 +3,7 @@
 # LIB=sat restricts a target to one header.
 
 all: examples
-.PHONY: all examples demo web check-view test bench report size check check-strict check-variants check-asan check-tsan \
+.PHONY: all examples demo web check-view test bench report size check check-strict check-house check-variants check-asan check-tsan \
         check-analyze check-compilers check-report fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
@@ -25,6 +25,7 @@ WERROR  ?= -Werror
 WARN    := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wcast-qual -Wundef $(WERROR)
 WARN_C  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 OPT     ?= -O2
+STD      = $(if $(filter -std=%,$(CFLAGS)),,-std=c99)
 CFLAGS  ?=
 B       ?= build
 DEFS    := -D_POSIX_C_SOURCE=200809L -I. -Itests -Iexamples
@@ -59,7 +60,7 @@ PICTURE_LIBS = $(EXR_LIB) $(STB_LIB)
 
 # V=1 shows the commands. The old program goes first, lest it be taken for the result of a failed compilation.
 SAY         = $(if $(V),,@echo '  $@';) rm -f $@; mkdir -p $(@D);
-COMPILE_C   = $(SAY) $(CC) -std=c99 $(OPT) $(WARN_C) $(DEFS) $(CFLAGS) -MMD -MP
+COMPILE_C   = $(SAY) $(CC) $(STD) $(OPT) $(WARN_C) $(DEFS) $(CFLAGS) -MMD -MP
 COMPILE_CXX = $(SAY) $(CXX) -std=c++11 $(OPT) $(WARN) $(DEFS) $(CFLAGS) -MMD -MP
 
 # Missing packages are installed by the first `make demo` or `make test` that may do so; NO_DEPS=1 says no.
@@ -142,19 +143,26 @@ run-tests:
 # ---- checks ----------------------------------------------------------------------------------------------------
 # Each ends with the line "N passed, N failed, N skipped". TESTS_CXX= leaves the C++ twins out where they add nothing.
 
-check: check-strict check-variants check-asan check-tsan check-analyze check-compilers
+check: check-strict check-house check-variants check-asan check-tsan check-analyze check-compilers
 
 # warnings in all languages and compilers, linkage, names, macros, options, order of inclusion
 check-strict:
 	@RUNNER='bash tests/check_strict.sh' tests/run.sh $(LIBS) $(if $(LIB),,family dist examples)
 
-# the same tests compiled otherwise
+# names that other headers take, stack, functions that nobody calls, comments against tables; NULL for every argument
+check-house:
+	@RUNNER='bash tests/check_house.sh' tests/run.sh $(LIBS) $(if $(LIB),,null)
+
+# the same tests compiled otherwise; the three last are as games compile: the headers keep IEEE arithmetic by themselves
 again = $(MAKE) --no-print-directory run-tests TESTS_CXX= B=build/$(1) OPT='$(or $(3),-O2)' CFLAGS='$(2)'
 AVX2 := $(if $(shell grep -w -m1 avx2 /proc/cpuinfo 2>/dev/null),1)
 check-variants:
 	+@echo 'plain C instead of vector instructions:' && $(call again,no_simd,-DSAT_NO_SIMD)
 	+@$(if $(AVX2),echo 'AVX2 and contraction:' && $(call again,avx2,-mavx2 -mfma -ffp-contract=fast))
 	+@echo 'no contraction, no optimisation:' && $(call again,plain,-ffp-contract=off,-O0)
+	+@echo '-ffast-math:' && $(call again,fast_math,-ffast-math)
+	+@echo '-Ofast, GNU C, this processor:' && $(call again,ofast,-std=gnu11 -march=native,-Ofast)
+	+@echo 'GNU C and its contraction, this processor:' && $(call again,gnu,-std=gnu11 -march=native)
 	+@$(if $(shell command -v clang),echo 'clang:' && $(call again,clang,,-O3) CC=clang OPENMP= WERROR=)
 
 ASAN  := -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
@@ -254,7 +262,8 @@ help:
 	@echo 'make examples  build all programs of examples/ into build/'
 	@echo 'make size      bytes of machine code of each header, with and without each option'
 	@echo 'make check-strict     warnings, linkage, names, macros, options, order of inclusion'
-	@echo 'make check-variants   the tests without SIMD, with AVX2, without optimisation, with clang'
+	@echo 'make check-house      names that other headers take, stack, NULL arguments, comments against tables'
+	@echo 'make check-variants   the tests without SIMD, with AVX2, without optimisation, with clang, -ffast-math, -Ofast, GNU C'
 	@echo 'make check-asan       the tests under AddressSanitizer and UBSan; check-tsan: ThreadSanitizer'
 	@echo 'make check-analyze    gcc -fanalyzer, clang --analyze; check-compilers: aarch64, mingw-w64, tcc, 32 bit'
 	@echo 'make check-report     every bench once, with all packages and with none: the report is whole'

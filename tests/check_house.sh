@@ -1,0 +1,134 @@
+#!/bin/bash
+# The promises that all headers share: names that other headers take, stack, functions that nobody calls, comments that agree
+# with the tables of options; NULL and zero arguments. usage: tests/check_house.sh NAME, or `null` for the arguments of all
+#
+# Offences that are known are named in tests/known_faults.txt, "CHECK HEADER WORD" a line, and counted as skipped;
+# LIST_FAULTS=FILE appends those that there are.
+
+lib=$1
+. "$(dirname "$0")/check.sh"
+family="sat tonemap ssao_sat fiv raindrop softassign"
+known=tests/known_faults.txt
+
+# offences CHECK TEXT: each line's first word is what the list of known faults may name
+offences() {
+    local check=$1 line word new=
+    while IFS= read -r line; do
+        [ -n "$line" ] || continue
+        word=${line%%[ (:]*}
+        [ -z "$LIST_FAULTS" ] || echo "$check $lib $word" >>"$LIST_FAULTS"
+        if grep -qxF "$check $lib $word" "$known" 2>/dev/null; then skip "known: $check: $line"; else new+=$line$'\n'; fi
+    done <<<"$2"
+    empty "$check" "$new"
+}
+code() { ${CC:-cc} -fpreprocessed -dD -E -P -x c "$1" 2>/dev/null | sed "s/\"\([^\"\\\\]\|\\\\.\)*\"//g; s/'[^']*'//g"; }   # no comments, no texts
+
+# Names. The list of words is quick and names each; then compilers prove it, the interface alone and with everything.
+check_hostile() {
+    local words cc std text
+    words=$(sed -n 's/^#define \([A-Za-z0-9_]*\).*/\1/p' tests/hostile.h | paste -sd'|')
+    offences names "$(code "$lib.h" | grep -owE "$words" | sort | uniq -c | awk '{ print $2, $1, "times" }')"
+    printf '#include "tests/hostile.h"\n#include "%s.h"\n' "$lib" >"$dir/macros.c"
+    printf '#include <X11/Xlib.h>\n#include <X11/Xutil.h>\n#include "%s.h"\n' "$lib" >"$dir/x11.c"
+    printf '#include <windows.h>\n#include "%s.h"\n' "$lib" >"$dir/windows.c"
+    for name in macros x11 windows; do
+        cp "$dir/$name.c" "$dir/$name.cpp"
+        for cc in gcc g++; do
+            [ $name != windows ] || cc=x86_64-w64-mingw32-$cc
+            have $cc || { skip "no $cc"; continue; }
+            [ $name != x11 ] || echo '#include <X11/Xutil.h>' | $cc -fsyntax-only -x c - 2>/dev/null || { skip "no X11/Xlib.h (libx11-dev)"; continue; }
+            std="-std=c99 $dir/$name.c"; [[ $cc != *g++ ]] || std="-std=c++11 $dir/$name.cpp"
+            for mode in "" "$IMPL" "$IMPL $GL"; do
+                [ "$mode" != "$IMPL" ] || [ $cc = gcc ] || continue
+                text=$($cc $std -fsyntax-only -w $DEFS $mode 2>&1 | grep -F "$lib.h:" | grep error | head -3 | tr "\n" " ")
+                offences "$name" "${text:+$cc${mode:+ implementation}: $text}"
+            done
+        done
+    done
+}
+
+# At most 32 KiB of stack a function: threads of musl have 128 KiB.
+check_stack() {
+    local opt
+    for opt in -O2; do
+        ok "compiles $opt" gcc -std=c99 $opt -w -fstack-usage $DEFS -D${LIB}_IMPLEMENTATION= $GL -c "$dir/impl.c" -o "$dir/stack.o"
+        offences stack "$(awk -F'\t' '$2 > 32768 { sub(/.*:/, "", $1); print $1 " takes " $2 " bytes of stack" }' "$dir/stack.su")"
+    done
+}
+
+# Each public function is called by a test, an example or a bench.
+check_used() {
+    local name
+    ok "compiles" gcc -std=c99 -O0 -w $DEFS -D${LIB}_IMPLEMENTATION= $GL -c "$dir/impl.c" -o "$dir/used.o"
+    cat tests/test_*.[ch] tests/use_*.c tests/bench/*.[ch]* examples/*.[ch] >"$dir/callers"
+    offences unused "$(nm -g --defined-only "$dir/used.o" | awk '$2 == "T" { print $3 }' | grep -v __ | while read -r name; do
+        grep -qwF "$name" "$dir/callers" || echo "$name is called by no test, example or bench"; done)"
+}
+
+# Each function of OpenGL that a context must have is called.
+check_gl() {
+    [ "$lib" = sat ] || return
+    local name
+    code sat.h >"$dir/gl.txt"
+    for name in $family; do code "$name.h"; done >"$dir/gl_all.txt"
+    offences required "$(awk '/define SAT__GL_FUNCTIONS/ { on = 1 } on { print } on && !/\\$/ { exit }' sat.h | grep -oE 'X\([^,]*, *[A-Za-z0-9_]+' |
+        sed 's/.*[ ,]//' | while read -r name; do grep -qE "(->|\.)$name\(" "$dir/gl_all.txt" || echo "$name is required and never called"; done)"
+}
+
+# struct comments "default; low..high; words" against the rows SAT__FIELD(struct, type, field, default, low, high, also)
+check_comments() {
+    local text
+    awk -v lib="$lib" '
+        function trim(s) { gsub(/^[ \t*]+|[ \t]+$/, "", s); return s }
+        function value(s) { return s ~ /^[-+]?[0-9.]+([eE][-+]?[0-9]+)?f?$/ || s ~ /^-?[A-Z][A-Z0-9_]+$/ }
+        function same(what, a, b) { printf "    same(\"%s\", (double)(%s), (double)(%s), \"%s\");\n", what, a, b, b }
+        /^typedef struct [a-z_0-9]+ \{/ || /^struct [a-z_0-9]+ \{/ { name = $0; sub(/ *\{.*/, "", name); sub(/.* /, "", name); field = ""; next }
+        /^\}/ { name = ""; field = "" }
+        name != "" && match($0, /[a-z_0-9]+(\[[^]]*\])?; *\/\*/) {
+            field = substr($0, RSTART, RLENGTH); sub(/[\[;].*/, "", field)
+            words[name, field] = substr($0, RSTART + RLENGTH); next
+        }
+        name != "" && field != "" && /^ *[^ \/]/ { words[name, field] = words[name, field] " " trim($0) }
+        match($0, /SAT__FIELD\([a-z]/) && !/define/ {
+            row = substr($0, RSTART + 11); sub(/\),? *(\}.*)?$/, "", row)
+            n = split(row, c, / *, */)
+            at = c[1] SUBSEP c[3]; what = c[1] "." c[3]
+            if (c[2] !~ /[idf]/) next
+            if (!(at in words)) { printf "    fault(\"%s has no comment\");\n", what; next }
+            text = words[at]; sub(/ *\*\/.*/, "", text)
+            m = split(text, part, / *; */)
+            first = trim(part[1]); second = trim(part[2]); sub(/ .*/, "", second)
+            if (!value(first)) printf "    fault(\"%s: the comment starts with no default: %s\");\n", what, first
+            else same(what " default", c[4], first)
+            if (m > 1 && split(second, ends, /\.\./) == 2 && value(ends[1]) && value(ends[2])) {
+                same(what " low", c[5], ends[1]); same(what " high", c[6], ends[2])
+            } else if (c[2] ~ /[df]/) printf "    fault(\"%s: the comment has no range\");\n", what
+        }' "$lib.h" >"$dir/rows.txt"
+    [ -s "$dir/rows.txt" ] || { skip "no table of options (SAT__FIELD)"; return; }
+    { printf '#define LIGHTSCAN_IMPLEMENTATION\n#include "%s.h"\n#include <stdio.h>\n#include <math.h>\n' "$lib"
+      echo 'static void fault(const char *text) { puts(text); }'
+      echo 'static void same(const char *what, double row, double comment, const char *text) { if (!(row == comment)) printf("%s is %.9g in the table, %s in the comment\n", what, row, text); }'
+      echo 'int main(void) {'; echo '    (void)fault; (void)same;'; cat "$dir/rows.txt"; echo '    return 0; }'; } >"$dir/comments.c"
+    ok "comments compile" ${CC:-cc} -std=c99 -O0 -w $DEFS $GL "$dir/comments.c" -o "$dir/comments" $LIBS
+    offences comments "$("$dir/comments" | sed 's/^\([a-z_0-9.]*\)/\1/')"
+}
+
+# every public function, each argument NULL or zero in turn
+check_null() {
+    dir=build/check/house/null; rm -rf "$dir"; mkdir -p "$dir"
+    local flags; flags="-I. -I$dir $(gl_macros $family)"
+    printf '#include "%s.h"\n' $family >"$dir/all.c"
+    ${CC:-cc} -std=c99 -E -P $flags "$dir/all.c" | tr '\n' ' ' | sed 's/[;}]/&\n/g' | sed 's/  */ /g' | awk -f tests/null_arguments.awk >"$dir/null_arguments.h"
+    ok "the table of calls compiles" ${CC:-cc} -std=c99 -O1 -w $flags tests/null_arguments.c -o "$dir/null" $LIBS
+    [ "$failed" = 0 ] && offences null "$("./$dir/null")"
+    rm -f core
+}
+
+if [ "$lib" = null ]; then check_null; finish; fi
+setup house
+check_hostile
+check_stack
+check_used
+check_gl
+check_comments
+finish
