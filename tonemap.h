@@ -130,6 +130,13 @@ typedef enum tonemap_mesopic {
     TONEMAP_MESOPIC_LOCAL    /* the level around each pixel: a red lamp in the night stays red */
 } tonemap_mesopic;
 
+/* Which log-average becomes the key. */
+typedef enum tonemap_metering {
+    TONEMAP_METERING_LOG_AVERAGE, /* of every positive luminance, eq A.1 */
+    TONEMAP_METERING_PERCENTILES  /* between meter_low and meter_high; what is 10 to 14 octaves below the bright end counts
+                                     less and less; in steps of 1/64 octave: a bad texel, a lamp or residue moves nothing */
+} tonemap_metering;
+
 typedef struct tonemap_options {
     tonemap_operator operation; /* TONEMAP_PHOTOGRAPHIC_LOCAL */
     double key;                 /* 0.18; -1e6..10; the display value of the log-average luminance before compression;
@@ -143,6 +150,9 @@ typedef struct tonemap_options {
                                    epsilon; 0: the paper's hard choice, which flickers (and the default with TONEMAP_NO_SOFT) */
     double gamut;               /* 0.5; 0..1 or negative; how colours beyond the display come back: 0 keeps their luminance
                                    and fades them, 1 dims them and keeps their saturation; negative: each channel is clipped */
+    tonemap_metering metering;  /* TONEMAP_METERING_LOG_AVERAGE */
+    double meter_low;           /* 0.02; 0..0.5; share of the darkest that percentile metering leaves out */
+    double meter_high;          /* 0.98; 0.5..1; where it stops */
     tonemap_mesopic mesopic;    /* TONEMAP_MESOPIC_OFF */
     double cd_per_unit;         /* 0; 0..1e30; cd/m2 of a luminance of 1; 0: unknown, the log-average counts as 10 cd/m2 */
     double lux_per_cd;          /* 1; 0..1e6; illuminance that belongs to a luminance of 1 cd/m2, eq A.10 */
@@ -217,7 +227,8 @@ extern "C" {
 
 /* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL state
    as it was (but for pending errors, which are lost). Nothing waits for the GPU: the log-average and the adaptation stay
-   there. All options but threads and tolerance_codes work; an estimated key or white, and Ashikhmin's range, take a
+   there. All options but threads and tolerance_codes work; metering by percentiles, an estimated key or white, and
+   Ashikhmin's range take a
    histogram that draws one point a pixel (on ES they need EXT_float_blend). */
 typedef struct tonemap_gl tonemap_gl;
 
@@ -332,6 +343,9 @@ static const sat__field tonemap__fields[] = {
     SAT__FIELD(tonemap_options, 'i', scales, 8, 1, 8, ' '),
     SAT__FIELD(tonemap_options, 'd', soft, 1, 0, 1, ' '),
     SAT__FIELD(tonemap_options, 'd', gamut, 0.5, 0, 1, '-'),
+    SAT__FIELD(tonemap_options, 'i', metering, 0, 0, TONEMAP_METERING_PERCENTILES, ' '),
+    SAT__FIELD(tonemap_options, 'd', meter_low, 0.02, 0, 0.5, ' '),
+    SAT__FIELD(tonemap_options, 'd', meter_high, 0.98, 0.5, 1, ' '),
     SAT__FIELD(tonemap_options, 'i', mesopic, 0, 0, TONEMAP_MESOPIC_LOCAL, ' '),
     SAT__FIELD(tonemap_options, 'd', cd_per_unit, 0, 0, 1e30, ' '),
     SAT__FIELD(tonemap_options, 'd', lux_per_cd, 1, 0, 1e6, ' '),
@@ -733,7 +747,7 @@ static inline int tonemap__is_ashikhmin(const tonemap_options *o)
 
 static inline int tonemap__needs_histogram(const tonemap_options *o, const tonemap_stats *stats)
 {
-    return stats != NULL || o->key <= 0 || o->white <= 0 || tonemap__is_ashikhmin(o);
+    return stats != NULL || o->metering == TONEMAP_METERING_PERCENTILES || o->key <= 0 || o->white <= 0 || tonemap__is_ashikhmin(o);
 }
 
 /* log2 of the log-average, eq A.1, over positive luminances only: a mean of integers, so that neither the order of the
@@ -742,6 +756,33 @@ static inline double tonemap__log_average(int64_t log_sum, size_t positive)
 {
     int64_t step = (int64_t)positive * 65536, whole = log_sum / step, rest = log_sum % step;
     return (double)whole + (double)rest / (double)step;
+}
+
+/* Percentile metering: how far the mean between the percentiles is from that of all, in bins of the histogram, so that
+   a flat picture has exactly its log-average; then rounded to 1/64 octave. */
+static inline double tonemap__metered(const uint32_t *histogram, size_t positive, double average, const tonemap_options *o)
+{
+    double top = tonemap__quantile(histogram, positive, 0.99), all = 0, whole = 0, inner = 0, sum = 0, seen = 0, octave[16], low, high;
+    int bin, i;
+    for (i = 0; i < 16; i++) octave[i] = log2(1 + (i + 0.5) / 16);
+    for (bin = 0; bin < TONEMAP__BINS; bin++) {
+        double v = bin / 16 - 100 + octave[bin % 16], w = (v - (top - 14)) / 4;
+        whole += (double)histogram[bin] * v;
+        all += (double)histogram[bin] * (w < 0 ? 0 : w > 1 ? 1 : w);
+    }
+    low = o->meter_low * all;
+    high = o->meter_high * all;
+    for (bin = 0; bin < TONEMAP__BINS; bin++) {
+        double v = bin / 16 - 100 + octave[bin % 16], w = (v - (top - 14)) / 4, next = seen + (double)histogram[bin] * (w < 0 ? 0 : w > 1 ? 1 : w);
+        double n = (next < high ? next : high) - (seen > low ? seen : low);
+        if (n > 0) {
+            inner += n;
+            sum += n * v;
+        }
+        seen = next;
+    }
+    if (inner > 0) average += sum / inner - whole / (double)positive;
+    return floor(average * 64 + 0.5) / 64;
 }
 
 static inline void tonemap__collect(tonemap *map, int64_t *log_sum)
@@ -779,12 +820,16 @@ static inline int tonemap__measured_state(tonemap *map, double *state)
         low = tonemap__quantile(histogram, map->stats.positive, 0.01);
         high = tonemap__quantile(histogram, map->stats.positive, 0.99);
     }
+    map->stats.log_average = exp2(average);
+    if (o->metering == TONEMAP_METERING_PERCENTILES) {
+        if (map->started && map->stats.positive * 1000 < (size_t)map->width * (size_t)map->height) return 0; /* as good as black */
+        average = tonemap__metered(histogram, map->stats.positive, average, o);
+    }
     state[TONEMAP__AVERAGE] = average;
     state[TONEMAP__KEY] = o->key > 0 ? log2(o->key) : tonemap__estimated_key(average, low, high);
     state[TONEMAP__WHITE] = o->white > 0 ? 0 : tonemap__estimated_white(low, high);
     state[TONEMAP__LOW] = ashikhmin ? tonemap__quantile(histogram, map->stats.positive, 0.0005) : 0;
     state[TONEMAP__HIGH] = ashikhmin ? tonemap__quantile(histogram, map->stats.positive, 0.9995) : 0;
-    map->stats.log_average = exp2(average);
     map->stats.low = exp2(low);
     map->stats.high = exp2(high);
     return 1;
@@ -2447,13 +2492,40 @@ static const char tonemap__glsl_state[] =
     "    }\n"
     "    return 0.0;\n"
     "}\n"
+    "float tonemap_value(int bin) { return float(bin / 16 - 100) + log2(1.0 + (float(bin % 16) + 0.5) / 16.0); }\n"
+    "float tonemap_count(int bin) { return texelFetch(histogram, ivec2(bin % 64, bin / 64), 0).x; }\n"
+    "float tonemap_metered(float average, float positive) {\n"
+    "    float top = tonemap_quantile(0.99, positive), all = 0.0, whole = 0.0, inner = 0.0, sum = 0.0, seen = 0.0;\n"
+    "    for (int bin = 0; bin < TONEMAP_BINS; bin++) {\n"
+    "        float n = tonemap_count(bin), v = tonemap_value(bin) - top;\n"
+    "        whole += n * v;\n"
+    "        all += n * clamp((v + 14.0) / 4.0, 0.0, 1.0);\n"
+    "    }\n"
+    "    for (int bin = 0; bin < TONEMAP_BINS; bin++) {\n"
+    "        float v = tonemap_value(bin) - top, next = seen + tonemap_count(bin) * clamp((v + 14.0) / 4.0, 0.0, 1.0);\n"
+    "        float n = max(min(next, TONEMAP_METER_HIGH * all) - max(seen, TONEMAP_METER_LOW * all), 0.0);\n"
+    "        inner += n;\n"
+    "        sum += n * v;\n"
+    "        seen = next;\n"
+    "    }\n"
+    "    if (inner > 0.0) average += sum / inner - whole / positive;\n"
+    "    return floor(average * 64.0 + 0.5) / 64.0;\n"
+    "}\n"
     "void main() {\n"
     "    ivec4 sum = texelFetch(sums, ivec2(0), 0);\n"
     "    vec4 first = texelFetch(old, ivec2(0), 0), second = texelFetch(old, ivec2(1, 0), 0);\n"
-    "    if (sum.z > 0) {\n"
+    "    bool lit = sum.z > 0;\n"
+    "#if TONEMAP_METERING == 1\n"
+    "    lit = lit && (first.w <= 0.0 || float(sum.z) * 1000.0 >= pixels);\n"
+    "#endif\n"
+    "    if (lit) {\n"
     "        int whole = sum.x / sum.z;\n"
     "        float positive = float(sum.z), average = float(whole) + (float(sum.x - whole * sum.z) + float(sum.y) / 65536.0) / positive;\n"
-    "        vec4 now = vec4(average, key, white, 1.0), range = vec4(0.0);\n"
+    "        vec4 range = vec4(0.0);\n"
+    "#if TONEMAP_METERING == 1\n"
+    "        average = tonemap_metered(average, positive);\n"
+    "#endif\n"
+    "        vec4 now = vec4(average, key, white, 1.0);\n"
     "#if TONEMAP_HISTOGRAM\n"
     "        float low = tonemap_quantile(0.01, positive), high = tonemap_quantile(0.99, positive);\n"
     "        float place = high - low > 0.125 ? clamp((2.0 * average - low - high) / (high - low), -1.0, 1.0) : 0.0;\n"
@@ -2619,6 +2691,9 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define(gl, "TONEMAP_MESOPIC", (int)o->mesopic);
     sat__gl_define(gl, "TONEMAP_SCALES", o->scales);
     sat__gl_define(gl, "TONEMAP_SOFT", o->soft > 0);
+    sat__gl_define(gl, "TONEMAP_METERING", (int)o->metering);
+    sat__gl_define_float(gl, "TONEMAP_METER_LOW", (float)o->meter_low);
+    sat__gl_define_float(gl, "TONEMAP_METER_HIGH", (float)o->meter_high);
     sat__gl_define(gl, "TONEMAP_HISTOGRAM", g->histogram);
     sat__gl_define(gl, "TONEMAP_BINS", TONEMAP__BIN_ROWS * 64);
     sat__gl_define(gl, "TONEMAP_BURN", !tonemap__is_infinite(o->white));
@@ -2709,7 +2784,7 @@ static inline sat_result tonemap__gl_make(tonemap_gl *g, sat_gl_get_proc *get_pr
         r = sat_gl_create(&g->sat, get_proc, &table);
         if (r != SAT_OK) return r;
     }
-    g->histogram = (tonemap__is_ashikhmin(o) ? 1 : 0) + (o->key > 0 ? 0 : 2) + (o->white > 0 ? 0 : 4);
+    g->histogram = (tonemap__is_ashikhmin(o) ? 1 : 0) + (o->key > 0 ? 0 : 2) + (o->white > 0 ? 0 : 4) + (o->metering == TONEMAP_METERING_PERCENTILES ? 8 : 0);
     sat__gl_begin(&g->gl, &state, TONEMAP__GL_UNITS);
     r = tonemap__gl_targets(g);
     if (r == SAT_OK) r = tonemap__gl_programs(g);

@@ -210,6 +210,7 @@ static void check_global(double white)
     o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
     o.white = white;
     o.gamut = -1;
+    o.metering = TONEMAP_METERING_LOG_AVERAGE;
     s = shoot(&view, &o);
     reference_luminance(luminance, pixels, W * H);
     average = reference_log_average(luminance, W * H);
@@ -1006,6 +1007,7 @@ TEST(key_and_white_are_reinhards_estimate)
     double *sorted = metrics_alloc(N), low, high, average;
     shot s;
     o.key = o.white = 0;
+    o.metering = TONEMAP_METERING_LOG_AVERAGE;
     s = shoot(&view, &o);
     reference_luminance(sorted, pixels, N);
     average = log2(reference_log_average(sorted, N));
@@ -1028,6 +1030,7 @@ static tonemap *adapting(int width, int height, double seconds)
     tonemap_options o = tonemap_defaults();
     tonemap *map = NULL;
     o.adapt_seconds = seconds;
+    o.metering = TONEMAP_METERING_LOG_AVERAGE;
     o.key = o.white = 0;
     EXPECT_EQ(tonemap_create(&map, width, height, &o), SAT_OK);
     return map;
@@ -1304,6 +1307,50 @@ TEST(no_black_ring_round_a_lamp)
     shot_free(&s);
     free(flat);
     free(pixels);
+}
+
+/* Nothing that is no part of the scene moves the exposure. */
+TEST(metering_ignores_residue_and_bad_texels)
+{
+    enum { W = 200, H = 120 };
+    const float residue[3] = {0, 1e-30f, 1e-8f};
+    float *pixels = room_pixels(W, H, 8);
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    unsigned char *out = (unsigned char *)malloc(W * H * 3);
+    tonemap *map = NULL;
+    tonemap_stats stats;
+    double adapted = 0;
+    int i, k;
+    shot clean, s;
+    o.metering = TONEMAP_METERING_PERCENTILES;
+    clean = shoot(&view, &o);
+    for (k = 0; k < 3; ++k) {
+        for (i = 0; i < 3; ++i) pixels[i] = k == 0 ? 1e30f : k == 1 ? NAN : 0;
+        s = shoot(&view, &o);
+        EXPECT_NEAR(s.stats.adapted / clean.stats.adapted, 1, 0);
+        for (i = 3 * 22 * W; i < 3 * W * H && s.u8[i] == clean.u8[i]; ++i) {}
+        EXPECT_EQ(i, 3 * W * H);
+        shot_free(&s);
+    }
+    for (k = 0; k < 3; ++k) {
+        for (i = 0; i < W * H * 3; ++i) pixels[i] = i / 3 % W < 60 ? 0.1f + 0.9f * (float)(i / 3 % W) / 60 : residue[k];
+        s = shoot(&view, &o);
+        if (k == 0) adapted = s.stats.adapted;
+        EXPECT_NEAR(log2(s.stats.adapted / adapted), 0, 0.05);
+        shot_free(&s);
+    }
+    o.adapt_seconds = 2; /* half a second of black with one pixel of residue */
+    EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
+    EXPECT_EQ(tonemap_apply_u8(map, out, W * 3, &view, 0, &stats), SAT_OK);
+    adapted = stats.adapted;
+    for (i = 0; i < W * H * 3; ++i) pixels[i] = i < 3 ? 1e-28f : 0;
+    for (k = 0; k < 30; ++k) EXPECT_EQ(tonemap_apply_u8(map, out, W * 3, &view, 1 / 60.0, &stats), SAT_OK);
+    EXPECT_NEAR(stats.adapted, adapted, 0);
+    tonemap_destroy(map);
+    shot_free(&clean);
+    free(pixels);
+    free(out);
 }
 
 /* What only the new options need is there at once, not on its way up from 0. */

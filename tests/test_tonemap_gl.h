@@ -125,6 +125,8 @@ TEST(gl_gives_the_cpus_picture)
     compare(&s, &o, 100, 90, 0, 0.001, "estimated key and white");
     o = tonemap_defaults(), o.soft = 0.8;
     compare(&s, &o, 100, 90, 0, 0, "soft scales");
+    o = tonemap_defaults(), o.metering = TONEMAP_METERING_PERCENTILES;
+    compare(&s, &o, 100, 90, 1, 0.001, "percentile metering");
     o = tonemap_defaults(), o.selective = 0.1;
     compare(&s, &o, 100, 90, 0, 0.001, "selective");
     o = tonemap_defaults(), o.mesopic = TONEMAP_MESOPIC_LOCAL, o.cd_per_unit = 2;
