@@ -220,7 +220,7 @@ typedef struct sat_scan_options {
 SAT_DEF sat_scan_options sat_scan_defaults(void);
 SAT_DEF char *sat_explain_scan(char *text, size_t size, const sat_scan_options *options); /* as sat_explain_image; NULL options: the defaults */
 
-/* In place when out == in; otherwise the two must not overlap. n may be 0. Integers wrap around. */
+/* Sequential f32 scans without counters carry the sum in double. In place when out == in; otherwise the two must not overlap. n may be 0. Integers wrap around. */
 SAT_DEF sat_result sat_scan_f32(float *out, const float *in, size_t n, const sat_scan_options *options);
 SAT_DEF sat_result sat_scan_f64(double *out, const double *in, size_t n, const sat_scan_options *options);
 SAT_DEF sat_result sat_scan_i32(int32_t *out, const int32_t *in, size_t n, const sat_scan_options *options);
@@ -327,6 +327,10 @@ SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width,
    one that fits. Reads the image once. */
 SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_width, int box_height,
                             double max_relative_error, size_t max_bytes, const sat_options *options);
+/* The same as whole options, to be used as they are: FIXED kinds may then count on boxes of that size, which sat_plan alone,
+   where options leave max_box_area 0, may not. */
+SAT_DEF sat_result sat_plan_options(sat_options *out, const sat_image *image, int box_width, int box_height,
+                                    double max_relative_error, size_t max_bytes, const sat_options *options);
 
 /* Box filter of an image that arrives a row at a time, of any height, in memory for 2 radius + 2 rows. The rows
    that come out equal sat_box_filter of the whole image bit for bit. SAT_KIND_TILED keeps up to three tile rows more, gives
@@ -2165,7 +2169,7 @@ SAT_DEF sat_result sat_scan_any(void *out, const void *in, size_t n, size_t elem
 }
 
 /* The typed scans: a plain loop when sequential, else the general one with this sum. */
-#define SAT__DEFINE_SCAN(suffix, type)                                                                                 \
+#define SAT__DEFINE_SCAN(suffix, type, carry)                                                                          \
     static void sat__combine_##suffix(void *out, const void *left, const void *right, void *user)                      \
     {                                                                                                                  \
         type a, b;                                                                                                     \
@@ -2180,7 +2184,8 @@ SAT_DEF sat_result sat_scan_any(void *out, const void *in, size_t n, size_t elem
         sat_scan_options resolved;                                                                                     \
         sat_allocator allocator;                                                                                       \
         const type zero = 0;                                                                                           \
-        type sum = 0, value;                                                                                           \
+        carry sum = 0;                                                                                                 \
+        type value;                                                                                                    \
         size_t i;                                                                                                      \
         sat_result result = sat__scan_check(&resolved, &allocator, out, in, n, options);                               \
         if (result) return result;                                                                                     \
@@ -2188,17 +2193,17 @@ SAT_DEF sat_result sat_scan_any(void *out, const void *in, size_t n, size_t elem
             return sat_scan_any(out, in, n, sizeof(type), sat__combine_##suffix, &zero, NULL, options);                \
         for (i = 0; i < n; i++) {                                                                                      \
             value = in[i];                                                                                             \
-            if (resolved.exclusive) out[i] = sum;                                                                      \
-            sum = (type)(sum + value);                                                                                 \
-            if (!resolved.exclusive) out[i] = sum;                                                                     \
+            if (resolved.exclusive) out[i] = (type)sum;                                                                \
+            sum = (carry)(sum + (carry)value);                                                                               \
+            if (!resolved.exclusive) out[i] = (type)sum;                                                               \
         }                                                                                                              \
         return SAT_OK;                                                                                                 \
     }
 
-SAT__DEFINE_SCAN(f32, float)
-SAT__DEFINE_SCAN(f64, double)
-SAT__DEFINE_SCAN(u32, uint32_t)
-SAT__DEFINE_SCAN(u64, uint64_t)
+SAT__DEFINE_SCAN(f32, float, double) /* 2e7 times 0.1 is 2e6, where a float carry ends at 2097152 */
+SAT__DEFINE_SCAN(f64, double, double)
+SAT__DEFINE_SCAN(u32, uint32_t, uint32_t)
+SAT__DEFINE_SCAN(u64, uint64_t, uint64_t)
 
 /* Two's complement sums are the unsigned ones. */
 SAT_DEF sat_result sat_scan_i32(int32_t *out, const int32_t *in, size_t n, const sat_scan_options *options)
@@ -4253,7 +4258,7 @@ static void sat__survey(sat_table *t, const sat_image *image, double *tile_sums,
     total->negative = 0; /* the tile sums are of magnitudes already */
 }
 
-SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_width, int box_height,
+static sat_result sat__plan(sat_kind *kind, int whole, const sat_image *image, int box_width, int box_height,
                             double max_relative_error, size_t max_bytes, const sat_options *options)
 {
     static const sat_kind cheapest_first[] = {SAT_KIND_FLOAT, SAT_KIND_FIXED32, SAT_KIND_TILED, SAT_KIND_DOUBLE, SAT_KIND_FIXED64};
@@ -4282,7 +4287,7 @@ SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_widt
         t = *survey;
         t.options.kind = cheapest_first[i];
         t.options.max_value = survey->total[0].largest;
-        if (!(t.options.max_box_area > 0)) t.options.max_box_area = area;
+        if (!(t.options.max_box_area > 0)) t.options.max_box_area = whole ? (double)image->width * image->height : area;
         t.rows = image->height + (t.options.kind != SAT_KIND_TILED);
         t.tiles_y = (image->height - 1) / resolved.tile + 1;
         t.element = sat__kind_size(t.options.kind);
@@ -4299,6 +4304,29 @@ SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_widt
     sat_destroy(survey);
     return result;
 }
+
+SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_width, int box_height,
+                            double max_relative_error, size_t max_bytes, const sat_options *options)
+{
+    return sat__plan(kind, 1, image, box_width, box_height, max_relative_error, max_bytes, options);
+}
+
+SAT_DEF sat_result sat_plan_options(sat_options *out, const sat_image *image, int box_width, int box_height,
+                                    double max_relative_error, size_t max_bytes, const sat_options *options)
+{
+    sat_kind kind = SAT_KIND_TILED;
+    sat_result result;
+    if (!out) return SAT_ERR_ARGUMENT;
+    result = sat__plan(&kind, 0, image, box_width, box_height, max_relative_error, max_bytes, options);
+    if (result != SAT_OK && result != SAT_ERR_LIMIT) return result;
+    *out = options ? *options : sat_defaults();
+    out->kind = kind;
+    out->subtract_mean = 0;
+    if (sat__is_fixed(kind) && !(out->max_box_area > 0))
+        out->max_box_area = (double)sat__min_int(box_width, image->width) * sat__min_int(box_height, image->height);
+    return result;
+}
+
 
 /* ---- moments
 

@@ -1058,6 +1058,45 @@ TEST(plans_keep_their_word)
         }
 }
 
+/* What a plan names is built just so, and keeps its word for any kind, size and request. */
+TEST(planned_options_meet_the_request)
+{
+    static float p[BOUND_W * BOUND_H];
+    static const int sides[] = {1, 3, 41};
+    sat_image view = sat_image_f32(p, BOUND_W, BOUND_H, 1);
+    int which, s, e, i, whole;
+    for (which = 0; which < BOUND_IMAGES; which++) {
+        double mean = 0;
+        bound_image(p, which);
+        for (i = 0; i < BOUND_W * BOUND_H; i++) mean += fabs((double)p[i]) / (BOUND_W * BOUND_H);
+        for (s = 0; s < 3; s++)
+            for (e = 1; e < 8; e++)
+                for (whole = 0; whole < 2; whole++) {
+                    double allowed = pow(10, -e);
+                    sat_options o = sat_defaults();
+                    sat_table *t;
+                    sat_result r = whole ? sat_plan(&o.kind, &view, sides[s], sides[s], allowed, 0, NULL)
+                                         : sat_plan_options(&o, &view, sides[s], sides[s], allowed, 0, NULL);
+                    if (r != SAT_OK) continue;
+                    t = build(&view, &o);
+                    EXPECT(sat_error_bound(t, 0, sides[s], sides[s]) <= allowed * mean * 1.01);
+                    sat_destroy(t);
+                }
+    }
+    EXPECT_EQ(sat_plan_options(NULL, &view, 3, 3, 1, 0, NULL), SAT_ERR_ARGUMENT);
+}
+
+TEST(a_scan_of_many_floats_keeps_its_sum)
+{
+    size_t n = 20000000, i;
+    float *p = (float *)malloc(n * sizeof *p);
+    if (!EXPECT(p != NULL)) return;
+    for (i = 0; i < n; i++) p[i] = 0.1f;
+    EXPECT_EQ(sat_scan_f32(p, p, n, NULL), SAT_OK);
+    EXPECT_ULP(p[n - 1], (float)((double)0.1f * 2e7), 1);
+    free(p);
+}
+
 /* ---- moments */
 
 static double exact_covariance(const sat_image *view, int a, int b, int x0, int y0, int x1, int y1)
