@@ -42,20 +42,23 @@ static inline int file_fail(char *why, const char *path, const char *text)
     return 0;
 }
 
-/* "cannot be written" and what the system says */
-static inline int file_fail_errno(char *why, const char *path, int error)
-{
-    char text[130];
-    snprintf(text, sizeof text, "cannot be written: %.100s", error == ENOENT ? "there is no such folder" : strerror(error));
-    return file_fail(why, path, text);
-}
-
 /* How many characters of the path are its folder, with the last slash. */
 static inline size_t file_folder(const char *path)
 {
     size_t n = strlen(path);
     while (n > 0 && path[n - 1] != '/') --n;
     return n;
+}
+
+/* "cannot be written" and what the system says */
+static inline int file_fail_errno(char *why, const char *path, int error)
+{
+    char text[130], folder[FILE_PATH];
+    struct stat s;
+    snprintf(folder, sizeof folder, "%.*s.", (int)file_folder(path), path);
+    snprintf(text, sizeof text, "cannot be written: %.100s",
+             error != ENOENT ? strerror(error) : stat(folder, &s) ? "there is no such folder" : "files cannot be made in this folder");
+    return file_fail(why, path, text);
 }
 
 /* The path of what the symbolic links at its end lead to, there or not: 0 when they lead nowhere or the path is too long. */
