@@ -29,6 +29,9 @@
 #include "../sat.h"
 #undef SAT_SIBLING
 #include "file.h"
+#ifndef HAVE_STB
+#include "png.h"
+#endif
 
 typedef struct image {
     float *pixels;
@@ -343,87 +346,13 @@ static inline int image_load_stb(image *out, const char *path)
     return image_fail(out, path, "this program was built without libstb (libstb-dev), which reads .png and .jpg");
 }
 
-/* PNG with its deflate stream in stored blocks, one a row (PNG 1.2, RFC 1950 and 1951). */
-typedef struct image_png { file_writer *file; uint32_t crc, a, b; } image_png;
-
-static inline void image_png_bytes(image_png *png, const unsigned char *p, size_t n)
-{
-    size_t i;
-    int k;
-    for (i = 0; i < n; ++i) {
-        png->crc ^= p[i];
-        for (k = 0; k < 8; ++k) png->crc = png->crc & 1 ? png->crc >> 1 ^ UINT32_C(0xedb88320) : png->crc >> 1;
-    }
-    file_put(png->file, p, n);
-}
-
-static inline void image_png_u32(image_png *png, uint32_t v)
-{
-    unsigned char b[4];
-    b[0] = (unsigned char)(v >> 24);
-    b[1] = (unsigned char)(v >> 16);
-    b[2] = (unsigned char)(v >> 8);
-    b[3] = (unsigned char)v;
-    image_png_bytes(png, b, 4);
-}
-
-static inline void image_png_begin(image_png *png, uint32_t size, const char *name)
-{
-    image_png_u32(png, size);
-    png->crc = UINT32_C(0xffffffff);
-    image_png_bytes(png, (const unsigned char *)name, 4);
-}
-
-static inline void image_png_end(image_png *png) { image_png_u32(png, ~png->crc); }
-
-/* bytes of the deflate stream that count for its Adler checksum */
-static inline void image_png_data(image_png *png, const unsigned char *p, size_t n)
-{
-    size_t i;
-    for (i = 0; i < n; ++i) {
-        png->a = (png->a + p[i]) % 65521;
-        png->b = (png->b + png->a) % 65521;
-    }
-    image_png_bytes(png, p, n);
-}
-
 static inline int image_write_png(file_writer *file, const unsigned char *bytes, int width, int height, int channels)
 {
-    static const unsigned char colour[5] = {0, 0, 4, 2, 6}, signature[8] = {137, 'P', 'N', 'G', 13, 10, 26, 10}, zlib[2] = {0x78, 1};
-    uint32_t row = (uint32_t)width * (uint32_t)channels, blocks, part, at;
-    unsigned char head[5] = {8, 0, 0, 0, 0}, filter = 0;
-    image_png png = {NULL, 0, 1, 0};
-    int y;
-    png.file = file;
-    file_put(file, signature, 8);
-    image_png_begin(&png, 13, "IHDR");
-    image_png_u32(&png, (uint32_t)width);
-    image_png_u32(&png, (uint32_t)height);
-    head[1] = colour[channels];
-    image_png_bytes(&png, head, 5);
-    image_png_end(&png);
-    blocks = (row + 1 + 65534) / 65535;
-    image_png_begin(&png, 2 + (uint32_t)height * (row + 1 + 5 * blocks) + 4, "IDAT");
-    image_png_bytes(&png, zlib, 2);
-    for (y = 0; y < height; ++y) {
-        for (at = 0; at < row + 1; at += part) {      /* the row with its filter byte, at most 65535 a block */
-            unsigned char block[5];
-            part = row + 1 - at < 65535 ? row + 1 - at : 65535;
-            block[0] = y == height - 1 && at + part == row + 1;
-            block[1] = (unsigned char)part;
-            block[2] = (unsigned char)(part >> 8);
-            block[3] = (unsigned char)~part;
-            block[4] = (unsigned char)(~part >> 8);
-            image_png_bytes(&png, block, 5);
-            if (at == 0) image_png_data(&png, &filter, 1);
-            image_png_data(&png, bytes + (size_t)y * row + (at ? at - 1 : 0), part - (at == 0));
-        }
-    }
-    image_png_u32(&png, png.b << 16 | png.a);
-    image_png_end(&png);
-    image_png_begin(&png, 0, "IEND");
-    image_png_end(&png);
-    return 1;
+    size_t size = 0;
+    unsigned char *png = png_encode(&size, bytes, width, height, channels);
+    if (png) file_put(file, png, size);
+    free(png);
+    return png != NULL;
 }
 #endif
 
