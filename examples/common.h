@@ -126,6 +126,13 @@ static inline int common_say(const common_settings *common, const char *sentence
     return 0;
 }
 
+/* What a library call said, or better the sentence of the header's explain function; returns 0. */
+static inline int common_say_result(const common_settings *common, const char *what, sat_result result, const char *explained)
+{
+    fprintf(stderr, "%s: %s: %s\n", common->name, what, explained && *explained ? explained : sat_result_text(result));
+    return 0;
+}
+
 /* The same about a path or an option, and the end of the program. */
 static inline void common_leave(const common_settings *common, int status, const char *about, const char *sentence)
 {

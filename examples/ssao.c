@@ -56,28 +56,29 @@ static unsigned char *shade(const ref_picture *p, const float *open)
     return rgb;
 }
 
-static double accessibility(float *out, const ref_picture *p, ssao_sat_options options, const sat_threads *threads)
+static double accessibility(const common_settings *common, float *out, const ref_picture *p, ssao_sat_options options)
 {
+    char why[200];
     ssao_sat_input input = ssao_sat_input_linear(p->z, p->width, p->height, p->fov);
     ssao_sat *ao;
     double start;
     sat_result result;
     input.normals = p->normals;
-    options.threads = *threads;
+    options.threads = common->threads;
     result = ssao_sat_create(&ao, p->width, p->height, &options);
     if (result == SAT_OK) result = ssao_sat_apply(ao, out, 0, &input, NULL); /* touches the memory */
     start = common_clock();
     if (result == SAT_OK) result = ssao_sat_apply(ao, out, 0, &input, NULL);
     start = common_clock() - start;
     if (result != SAT_OK) {
-        fprintf(stderr, "ssao: %s\n", sat_result_text(result));
+        common_say_result(common, "occlusion", result, ssao_sat_explain(why, sizeof why, p->width, p->height, &options));
         exit(1);
     }
     ssao_sat_destroy(ao);
     return start;
 }
 
-static int compare(const common_settings *common, ref_picture *p, ssao_sat_options options, const sat_threads *threads)
+static int compare(const common_settings *common, ref_picture *p, ssao_sat_options options)
 {
     static const char *const names[] = {"minimalist", "normal-guided", "refined", "plane", "slabs"};
     static const ssao_sat_method order[] = {SSAO_SAT_MINIMALIST, SSAO_SAT_NORMAL_GUIDED, SSAO_SAT_REFINED, SSAO_SAT_PLANE, SSAO_SAT_SLABS};
@@ -94,7 +95,7 @@ static int compare(const common_settings *common, ref_picture *p, ssao_sat_optio
     for (i = 0; i < 5 && out; i++) {
         double seconds;
         options.method = order[i];
-        seconds = accessibility(out, p, options, threads);
+        seconds = accessibility(common, out, p, options);
         snprintf(labels[i], sizeof labels[i], "%s: RMSE %.3f, %.1f ms", names[i], ref_rmse(p, out, p->ao[1]), 1e3 * seconds);
         puts(labels[i]);
         cells[i].rgb = grey(out);
@@ -185,12 +186,12 @@ int main(int argc, char **argv)
     count = (size_t)size * (size_t)size;
     if (sheet) { /* the radius of the reference is the middle one of three */
         p = ref_draw_radii(&s, size, size, 0, rays, ref_make(0, 0, 0), common.workers, (float)o.radius);
-        ok = compare(&common, &p, o, &common.threads);
+        ok = compare(&common, &p, o);
     } else {
         float *out = (float *)malloc(count * sizeof(float));
         p = ref_draw(&s, size, size, 0, 0, ref_make(0, 0, 0), common.workers);
         if (out) {
-            double seconds = accessibility(out, &p, o, &common.threads);
+            double seconds = accessibility(&common, out, &p, o);
             if (common.stats) printf("%d x %d: %.1f ms\n", size, size, 1e3 * seconds);
         }
         ok = out ? write_picture(&common, &p, out, occlusion) : common_say(&common, "no memory");

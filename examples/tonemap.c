@@ -83,10 +83,11 @@ static void print_stats(const tonemap_stats *s, const image *picture, double sec
 }
 
 /* Display values of 8 bits (sRGB) or floats (linear): the one of them that is not NULL. */
-static int map_picture(unsigned char *bytes, float *floats, const image *picture, const tonemap_options *options, tonemap_stats *stats, double *seconds)
+static int map_picture(const common_settings *common, unsigned char *bytes, float *floats, const image *picture, const tonemap_options *options, tonemap_stats *stats, double *seconds)
 {
     sat_image view = image_view(picture);
     tonemap *map;
+    char why[200];
     double start;
     sat_result result = tonemap_create(&map, picture->width, picture->height, options);
     if (result == SAT_OK) {
@@ -96,8 +97,7 @@ static int map_picture(unsigned char *bytes, float *floats, const image *picture
         *seconds = common_clock() - start;
         tonemap_destroy(map);
     }
-    if (result != SAT_OK) fprintf(stderr, "tonemap: %s\n", sat_result_text(result));
-    return result == SAT_OK;
+    return result == SAT_OK || common_say_result(common, "tone mapping", result, tonemap_explain(why, sizeof why, picture->width, picture->height, options));
 }
 
 typedef struct variant { const char *label; tonemap_operator operation; tonemap_mesopic mesopic; int automatic; double soft; } variant;
@@ -128,7 +128,7 @@ static int write_sheet(const common_settings *common, const image *picture, cons
         o.mesopic = variants[i].mesopic;
         o.soft = variants[i].soft;
         if (variants[i].automatic) o.key = o.white = 0;
-        ok = map_picture(pixels + (size_t)i * bytes, NULL, picture, &o, NULL, &seconds);
+        ok = map_picture(common, pixels + (size_t)i * bytes, NULL, picture, &o, NULL, &seconds);
         cells[i].rgb = pixels + (size_t)i * bytes;
         cells[i].width = picture->width;
         cells[i].height = picture->height;
@@ -147,7 +147,7 @@ static int write_picture(const common_settings *common, image *picture, const to
     unsigned char *pixels = as_bytes ? (unsigned char *)malloc((size_t)picture->width * (size_t)picture->height * 3) : NULL;
     tonemap_stats stats;
     double seconds = 0;
-    ok = (!as_bytes || pixels || common_say(common, "no memory")) && map_picture(pixels, picture->pixels, picture, options, &stats, &seconds);
+    ok = (!as_bytes || pixels || common_say(common, "no memory")) && map_picture(common, pixels, picture->pixels, picture, options, &stats, &seconds);
     ok = ok && (as_bytes ? common_save_u8(common, common->out, pixels, picture->width, picture->height, 3) : common_save(common, common->out, picture));
     if (ok && common->stats) print_stats(&stats, picture, seconds);
     free(pixels);
@@ -168,6 +168,7 @@ int main(int argc, char **argv)
         {"epsilon", 'd', &o.epsilon, 1e-6, 1e6, "threshold of the scale test"},
         {"scales", 'i', &o.scales, 1, 8, "neighbourhoods tried"},
         {"soft", 'd', &o.soft, 0, 1, "mix neighbourhoods, against flicker"},
+        {"gamut", 'd', &o.gamut, -1, 1, "colours beyond the display: 0 fades them, 1 dims them, -1 cuts each channel"},
         {"mesopic", 'w', &mesopic, 0, 0, "off|uniform|local reds fade in dim light"},
         {"cd", 'd', &o.cd_per_unit, 0, 1e9, "cd/m2 of a luminance of 1; 0: the log-average is 10"},
         {"lux", 'd', &o.lux_per_cd, 1e-6, 1e6, "illuminance of a luminance of 1 cd/m2"},
