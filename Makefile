@@ -126,6 +126,10 @@ TESTS_C      := $(filter %.c,$(TEST_SOURCES))
 TESTS_CXX    := $(if $(HAVE_CXX),$(filter %.cpp,$(TEST_SOURCES)))
 TESTS        := $(TESTS_C:tests/%.c=$(B)/test/%_c) $(TESTS_CXX:tests/%.cpp=$(B)/test/%_cpp)
 
+# The C++ twins all compile, and these run: the rest would run the same code again. TWINS='%' runs all.
+TWINS        ?= support sat
+RUN           = $(filter-out %_cpp,$(TESTS)) $(filter $(TWINS:%=$(B)/test/test_%_cpp),$(TESTS))
+
 $(B)/test/%_c: tests/%.c
 	$(COMPILE_C) $(PICTURES) $< -o $@ $(PICTURE_LIBS) $(LDLIBS)
 $(B)/test/%_cpp: tests/%.cpp
@@ -138,7 +142,7 @@ build-tests: $(TESTS)
 run-tests:
 	$(if $(HAVE_CXX),,@echo "no C++ compiler (g++): the C++ twins of the tests are left out")
 	+@$(MAKE) --no-print-directory -k $(if $(filter -j%,$(MAKEFLAGS)),,-j2) build-tests || true
-	@TEST_ARGS='$(ARGS)' tests/run.sh $(TESTS)
+	@TEST_ARGS='$(ARGS)' BUILT='$(filter-out $(RUN),$(TESTS))' tests/run.sh $(RUN)
 
 # ---- checks ----------------------------------------------------------------------------------------------------
 # Each ends with the line "N passed, N failed, N skipped". TESTS_CXX= leaves the C++ twins out where they add nothing.
@@ -247,7 +251,7 @@ report:
 	+@$(MAKE) --no-print-directory -k -j2 $(BENCHES:%=$(B)/bench/bench_%) || true
 	+@$(MAKE) --no-print-directory -k $(SHORT) $(BENCHES:%=$(OUT)/%.tsv) $(OUT)/size.tsv || true
 	@mkdir -p $(REPORT)
-	@bash tests/report.sh $(BENCHES:%=$(OUT)/%.tsv) $(wildcard $(OUT)/gpu_*.tsv) $(OUT)/size.tsv >$(REPORT)/index.html.part
+	@REPORT_FLAGS='$(CC) -std=c99 $(OPT) $(CFLAGS)' REPORT_SHORT='$(if $(SMOKE),SMOKE=1,$(if $(QUICK),QUICK=1))' bash tests/report.sh $(BENCHES:%=$(OUT)/%.tsv) $(wildcard $(OUT)/gpu_*.tsv) $(OUT)/size.tsv >$(REPORT)/index.html.part
 	@mv $(REPORT)/index.html.part $(REPORT)/index.html
 	@echo $(REPORT)/index.html
 	@failed=; for b in $(BENCHES); do [ -s $(OUT)/$$b.tsv ] || failed="$$failed $$b"; done; \

@@ -38,6 +38,10 @@ case $lib in
             done < <(titles "$source")
         done
         html=$dir/report/index.html
+        for bench in sat tonemap ssao_sat fiv raindrop softassign; do   # the answers are there
+            if grep -q "<h3><a href=\"#$bench\">" "$html" && ! grep -A1 "<h3><a href=\"#$bench\">" "$html" | grep -q 'Not measured'; then pass
+            else fail "the page has no answer for $bench: its table has no default row, or another title"; fi
+        done
         if [ -s "$html" ] && grep -q '</html>' "$html"; then pass; else fail "the page is not whole"; fi
         if [ $lib = none ]; then
             for peer in OpenCV Embree; do
