@@ -29,7 +29,7 @@ case $lib in
             while IFS= read -r title; do
                 # a title, its plots and notes, then at least a line of column names and a row
                 rows=$(awk -v title="# table: $title" '$0 == title { open = 1; next } /^# table/ { open = 0 }
-                    open && /^# missing/ { lost = 1 } open && /./ && !/^#/ { ++n } END { print n > 1 ? n : lost ? "lost" : 0 }' "$out/$bench.tsv")
+                    open && /^# missing/ { lost = 1 } open && /./ && !/^#/ { ++n } END { if (n > 1) print n; else print lost ? "lost" : 0 }' "$out/$bench.tsv")
                 [ "$title" = "Fit of the comparators" ] || case $rows in
                     0) fail "$bench: the table is empty: $title" ;;
                     lost) [ $lib = none ] && pass || fail "$bench: nothing but a missing package: $title" ;;
