@@ -4,7 +4,7 @@
 
 all: examples
 .PHONY: all examples demo web check-view test bench report size check check-strict check-house check-variants check-asan check-tsan \
-        check-analyze check-compilers check-report fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
+        check-analyze check-compilers check-report check-install format format-check fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
@@ -200,6 +200,16 @@ check-view: examples
 check-report:
 	+@RUNNER='bash tests/check_report.sh' JOBS=1 TEST_TIMEOUT=600 tests/run.sh all none broken
 
+# what `make install` writes and docs/packaging.md says, by pkg-config, CMake and Meson where they are
+check-install:
+	@RUNNER='bash tests/check_install.sh' JOBS=1 tests/run.sh install
+
+# .clang-format over everything
+FORMATTED = $(wildcard *.h examples/*.[ch] tests/*.[ch] tests/*.cpp tests/bench/*.[ch] tests/bench/*.cpp)
+format format-check:
+	@command -v clang-format >/dev/null || { echo 'make $@ needs clang-format: apt-get install clang-format'; exit 1; }
+	clang-format $(if $(filter format,$@),-i,--dry-run -Werror) $(FORMATTED)
+
 # bytes of machine code with and without each option
 size:
 	@bash tests/size.sh $(LIBS)
@@ -271,6 +281,8 @@ help:
 	@echo 'make check-asan       the tests under AddressSanitizer and UBSan; check-tsan: ThreadSanitizer'
 	@echo 'make check-analyze    gcc -fanalyzer, clang --analyze; check-compilers: aarch64, mingw-w64, tcc, 32 bit'
 	@echo 'make check-report     every bench once, with all packages and with none: the report is whole'
+	@echo 'make check-install    what make install writes, by pkg-config, CMake and Meson'
+	@echo 'make format-check     .clang-format over all sources; make format changes them'
 	@echo 'make fuzz             libFuzzer on each header          [FUZZ_SECONDS=20]'
 	@echo 'make check            all of check-*; each takes LIB=sat'
 	@echo 'make deps      install missing packages (Debian)'
@@ -281,7 +293,7 @@ help:
 	@echo 'make docs      put the programs of tests/test_readme.h and the plots of the last bench into README.md'
 	@echo 'make data      fetch free environment maps and meshes into data/'
 	@echo 'make dist      one-file editions in dist/: each header with what it needs of sat.h inside'
-	@echo 'make install   headers and lightscan.pc                   [PREFIX=/usr/local] [DESTDIR=]'
+	@echo 'make install   headers, lightscan.pc, CMake files                 [PREFIX=/usr/local] [DESTDIR=]'
 	@echo 'make clean     remove build/, out/, dist/ and report/'
 
 # one-file editions: each header with what it needs of sat.h inside
@@ -307,11 +319,14 @@ PREFIX  ?= /usr/local
 DESTDIR ?=
 VERSION = $(shell awk '/define SAT_VERSION_(MAJOR|MINOR|PATCH)/ { printf "%s%s", dot, $$3; dot = "." }' sat.h)
 install:
-	install -d '$(DESTDIR)$(PREFIX)/include' '$(DESTDIR)$(PREFIX)/share/pkgconfig'
+	install -d '$(DESTDIR)$(PREFIX)/include' '$(DESTDIR)$(PREFIX)/share/pkgconfig' '$(DESTDIR)$(PREFIX)/share/cmake/lightscan'
 	install -m 644 $(wildcard $(FAMILY:=.h)) '$(DESTDIR)$(PREFIX)/include'
 	printf '%s\n' 'prefix=$(PREFIX)' 'includedir=$${prefix}/include' '' 'Name: lightscan' \
 	    'Description: Summed-area tables, tone mapping, ambient occlusion, soft shadows, rain and photomosaics in single headers' \
 	    'Version: $(VERSION)' 'Cflags: -I$${includedir}' 'Libs: -lm' >'$(DESTDIR)$(PREFIX)/share/pkgconfig/lightscan.pc'
+	install -m 644 tests/lightscan-config.cmake.in '$(DESTDIR)$(PREFIX)/share/cmake/lightscan/lightscan-config.cmake'
+	sed 's/@VERSION@/$(VERSION)/' tests/lightscan-config-version.cmake.in \
+	    >'$(DESTDIR)$(PREFIX)/share/cmake/lightscan/lightscan-config-version.cmake'
 
 clean:
 	rm -rf build out dist report

@@ -5,7 +5,7 @@ lib=$1
 . "$(dirname "$0")/check.sh"
 dir=build/report_$lib out=$dir/bench
 rm -rf "$out" "$dir/report"; mkdir -p "$dir"
-report() { make --no-print-directory report NO_DEPS=1 SMOKE=1 B="$dir" OUT="$out" REPORT="$dir/report" "$@" 2>&1; }
+report() { make OPT=-O1 --no-print-directory report NO_DEPS=1 SMOKE=1 B="$dir" OUT="$out" REPORT="$dir/report" "$@" 2>&1; }
 
 # Titles of the tables in the source of a bench; those that only a long run makes are named here.
 long="8192 x 65536"

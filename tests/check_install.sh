@@ -1,0 +1,67 @@
+#!/bin/bash
+# `make install` and the recipes of docs/packaging.md, used by a small program: pkg-config, CMake, Meson; the recipes for vcpkg
+# and Conan with stand-ins for their own commands. usage: tests/check_install.sh install
+lib=$1
+. "$(dirname "$0")/check.sh"
+dir=$PWD/build/check/install; rm -rf "$dir"; mkdir -p "$dir"
+prefix=$dir/usr
+here=$PWD
+# block NAME: the code under <!-- NAME -->, with our sources instead of the network
+block() { awk -v name="<!-- $1 -->" '$0 == name { on = 1; next } on == 1 && /^```/ { on = 2; next } on == 2 && /^```/ { exit } on == 2' docs/packaging.md |
+    sed "s|https://example.org/lightscan.git|$here|"; }
+project() { mkdir -p "$1"; cp "$dir/main.c" "$1"; }
+
+cat >"$dir/main.c" <<'C'
+#define LIGHTSCAN_IMPLEMENTATION
+#include "tonemap.h"
+#include "softassign.h"
+int main(void) { return tonemap_version() != softassign_version(); }
+C
+ok "make install" make --no-print-directory install PREFIX="$prefix"
+for h in sat tonemap ssao_sat fiv raindrop softassign; do cmp -s $h.h "$prefix/include/$h.h" && pass || fail "$h.h is not installed"; done
+
+if have pkg-config; then
+    export PKG_CONFIG_PATH=$prefix/share/pkgconfig
+    ok "pkg-config" ${CC:-cc} $(pkg-config --cflags lightscan) "$dir/main.c" -o "$dir/main" $(pkg-config --libs lightscan)
+    ok "pkg-config, run" "$dir/main"
+else skip "no pkg-config"; fi
+
+if have cmake; then
+    for way in installed fetched; do
+        project "$dir/$way"
+        block "cmake $way" >"$dir/$way/CMakeLists.txt"
+        ok "CMake $way" cmake -S "$dir/$way" -B "$dir/$way/build" -DCMAKE_PREFIX_PATH="$prefix" -DFETCHCONTENT_SOURCE_DIR_LIGHTSCAN="$here"
+        ok "CMake $way, build" cmake --build "$dir/$way/build"
+        ok "CMake $way, run" "$dir/$way/build/example"
+    done
+    # another major version is refused
+    sed 's/lightscan [0-9.]* REQUIRED/lightscan 99.0 REQUIRED/' "$dir/installed/CMakeLists.txt" >"$dir/x" && mkdir -p "$dir/wrong" && cp "$dir/main.c" "$dir/wrong" && mv "$dir/x" "$dir/wrong/CMakeLists.txt"
+    if cmake -S "$dir/wrong" -B "$dir/wrong/build" -DCMAKE_PREFIX_PATH="$prefix" >/dev/null 2>&1; then fail "CMake takes version 99"; else pass; fi
+    { echo "set(PORT lightscan)"; echo "set(CURRENT_PACKAGES_DIR \"$dir/vcpkg\")"
+      echo "macro(vcpkg_from_git)"; echo "set(SOURCE_PATH \"$here\")"; echo "endmacro()"
+      echo 'function(vcpkg_replace_string file from to)'; echo 'file(READ "${file}" text)'; echo 'string(REPLACE "${from}" "${to}" text "${text}")'; echo 'file(WRITE "${file}" "${text}")'; echo 'endfunction()'
+      echo 'function(vcpkg_install_copyright)'; echo 'endfunction()'; block "vcpkg portfile"; } >"$dir/portfile.cmake"
+    ok "vcpkg's portfile" cmake -P "$dir/portfile.cmake"
+    project "$dir/vcpkg_user"; sed 's/lightscan [0-9.]* REQUIRED/lightscan REQUIRED/' "$dir/installed/CMakeLists.txt" >"$dir/vcpkg_user/CMakeLists.txt"
+    ok "vcpkg's package by CMake" cmake -S "$dir/vcpkg_user" -B "$dir/vcpkg_user/build" -Dlightscan_DIR="$dir/vcpkg/share/lightscan"
+    ok "vcpkg's package, build" cmake --build "$dir/vcpkg_user/build"
+else skip "no cmake"; fi
+
+if have meson && have ninja; then
+    project "$dir/meson"; mkdir -p "$dir/meson/subprojects/packagefiles/lightscan" "$dir/meson/subprojects/lightscan"
+    block "meson wrap" >"$dir/meson/subprojects/lightscan.wrap"
+    block "meson build" >"$dir/meson/subprojects/packagefiles/lightscan/meson.build"
+    block "meson user" >"$dir/meson/meson.build"
+    cp ./*.h "$dir/meson/subprojects/packagefiles/lightscan/meson.build" "$dir/meson/subprojects/lightscan"   # as the wrap would
+    ok "Meson" meson setup "$dir/meson/build" "$dir/meson"
+    ok "Meson, build" ninja -C "$dir/meson/build"
+    ok "Meson, run" "$dir/meson/build/example"
+else skip "no meson or ninja (meson, ninja-build)"; fi
+
+if have python3; then
+    block conan >"$dir/conanfile.py"
+    ok "Conan's recipe is Python" python3 -m py_compile "$dir/conanfile.py"
+    block "vcpkg json" >"$dir/vcpkg.json"
+    ok "vcpkg.json" python3 -m json.tool "$dir/vcpkg.json"
+else skip "no python3"; fi
+finish
