@@ -32,6 +32,9 @@
      (d + R) / 2R makes a FIV, which is too small there, smaller still, and remains as FIV_TRILINEAR.
    - Suns leave the cube as directional lights with exact direction and power. Their shadow is the interpolated distance to
      the silhouette, not an interpolated bit.
+   - Near contact no interpolation is right: an occluder that keeps its mesh (keep_mesh) draws a mask for each such receiver, and
+     the edges of its suns are rays: what rests on a floor does not leak, and ears keep their shadows. fiv_irradiance
+     only; OpenGL, self-shadows and loaded occluders interpolate.
    - Overlapping occluders: the union of their masks (FIV_MASK), or discs of their true solid angle; never below 0.
    Deviations from the text: sums carry the solid angle of their texels, which eq 6 to 10 leave out; a sample's position is the
    occluder's centre minus the receiver; the first shell is free (0.3 R halves the error of the inner tangent sphere).
@@ -47,7 +50,7 @@
      FIV_NO_SELF         no self-shadows (eq 13)             FIV_NO_DELTA          no split-off lights
 
    MEMORY, THREADS, ERRORS
-   An environment is one block; an occluder two (its tables, its masks) or, without keep_masks, two (tables, mesh). Only
+   An environment is one block; an occluder has one each for tables, masks (keep_masks) and mesh (keep_mesh, or no keep_masks). Only
    create, share and load allocate. Functions take sat_threads in their options; different objects may be used at
    once, and any number of threads may call fiv_irradiance on the same ones. All arguments are checked in every build.
    fiv_irradiance takes 64 to 90 KB of stack a worker.
@@ -184,6 +187,8 @@ typedef struct fiv_occluder_options {
     int keep_masks;                /* 1; 0: each fiv_occluder_light rasterises all masks anew; no FIV_MASK, no save */
     int lazy;                      /* 0; 1 (without keep_masks): only what fiv_occluder_prepare asks for is computed */
     int max_lights;                /* 8; 0..FIV_MAX_LIGHTS: one byte a sample each */
+    int keep_mesh;                 /* 0; 1: the triangles stay, for receivers near contact and for edges of suns: see
+                                      fiv_irradiance_options.own_masks. Load has none to keep */
     fiv_progress_fn *progress;     /* NULL */
     void *progress_user;
     sat_allocator allocator; /* malloc; not used after create */
@@ -252,6 +257,9 @@ typedef struct fiv_irradiance_options {
     int partial;           /* 1; 0: no correction where the horizon cuts an occluder (figure 23, left) */
     int overlap;           /* 1; 0: no correction where occluders overlap (figure 21, left) */
     float cutoff;          /* 0.001; 0..1: an occluder that cannot take more than this part of I_tot is left out */
+    int own_masks;         /* 64; 0..64: of each 64 receivers so many may get masks of their own of the occluders that keep their
+                              mesh, from FIV_SCALED on: those in a cell with a sample inside the mesh, or from which it may
+                              cover 2 sr; 0: none */
     sat_threads threads;   /* serial; same bits for any worker count */
 } fiv_irradiance_options;
 FIV_DEF fiv_irradiance_options fiv_irradiance_defaults(void);
@@ -262,6 +270,7 @@ typedef struct fiv_irradiance_stats {
     size_t whole, clipped;              /* looked up: entirely above the horizon, cut by it */
     size_t overlaps;                    /* receivers that see occluders overlap */
     size_t masks;                       /* masks integrated for the last two */
+    size_t own_masks, rays;             /* of occluders that keep their mesh: masks made, rays to split-off lights */
     size_t non_finite;                  /* receivers with NaN or infinity: black */
     size_t missing;                     /* lookups that met stale samples only: no shadow */
 } fiv_irradiance_stats;
@@ -1684,6 +1693,50 @@ static void fiv__raster_mesh(uint64_t *rows, const fiv__mesh *mesh, const float 
     }
 }
 
+/* 1 when a ray from the origin along d meets the mesh. Seen along the ray a triangle is flat, and the sign of each of its edges
+   is the same number for both of its triangles, so that no ray slips through between them. */
+static int fiv__ray_meets_cluster(const fiv__mesh *mesh, const fiv__cluster *c, const float offset[3], float axes[3][3])
+{
+    float x[3][FIV__CLUSTER_VERTICES + 4];
+    int i, k, t;
+    for (i = 0; i < c->vertices; i++) {
+        float p[3];
+        for (k = 0; k < 3; k++) p[k] = mesh->x[k][c->vertex + (size_t)i] + offset[k];
+        for (k = 0; k < 3; k++) x[k][i] = fiv__dot(p, axes[k]);
+    }
+    for (t = 0; t < c->triangles; t++) {
+        const unsigned char *v = mesh->corner + 3 * (c->triangle + (size_t)t);
+        float e0 = x[0][v[1]] * x[1][v[2]] - x[1][v[1]] * x[0][v[2]];
+        float e1 = x[0][v[2]] * x[1][v[0]] - x[1][v[2]] * x[0][v[0]];
+        float e2 = x[0][v[0]] * x[1][v[1]] - x[1][v[0]] * x[0][v[1]], sum = e0 + e1 + e2;
+        if (!((e0 >= 0 && e1 >= 0 && e2 >= 0) || (e0 <= 0 && e1 <= 0 && e2 <= 0)) || sum == 0) continue;
+        if ((e0 * x[2][v[0]] + e1 * x[2][v[1]] + e2 * x[2][v[2]]) / sum > 0) return 1;
+    }
+    return 0;
+}
+
+static int fiv__ray_meets(const fiv__mesh *mesh, const float offset[3], const float d[3])
+{
+    float axes[3][3];
+    size_t i;
+    int k, least = fabsf(d[0]) < fabsf(d[1]) ? (fabsf(d[0]) < fabsf(d[2]) ? 0 : 2) : (fabsf(d[1]) < fabsf(d[2]) ? 1 : 2);
+    for (k = 0; k < 3; k++) axes[0][k] = (k == least ? 1.0f : 0.0f) - d[k] * d[least];
+    fiv__normalise(axes[0], axes[0]);
+    for (k = 0; k < 3; k++) axes[1][k] = d[(k + 1) % 3] * axes[0][(k + 2) % 3] - d[(k + 2) % 3] * axes[0][(k + 1) % 3];
+    memcpy(axes[2], d, sizeof axes[2]);
+    for (i = 0; i < mesh->cluster_count; i++) {
+        const fiv__cluster *c = &mesh->clusters[i];
+        float to[3], along, across, up;
+        for (k = 0; k < 3; k++) to[k] = c->centre[k] + offset[k];
+        along = fiv__dot(to, d);
+        across = fiv__dot(to, axes[0]);
+        up = fiv__dot(to, axes[1]);
+        if (along < -c->radius || across * across + up * up > c->radius * c->radius) continue;
+        if (fiv__ray_meets_cluster(mesh, c, offset, axes)) return 1;
+    }
+    return 0;
+}
+
 /* ---- spans: a mask as 16-bit words: first texel (6 bits), length - 1 (6), rows to go down (4). 15 rows: the other bits are
    the number of the row, and a span follows. */
 
@@ -1916,7 +1969,7 @@ struct fiv_occluder {
     size_t block_size, mesh_size, words_size;
     int share;             /* masks belong to another occluder */
     fiv__grid grid;
-    int face, keep_masks, lazy, max_lights, half_floats;
+    int face, keep_masks, keep_mesh, lazy, max_lights, half_floats;
     float centre[3], radius;
     fiv_occluder_stats stats;
     const fiv_environment *environment; /* that lit it; NULL: none yet */
@@ -1981,6 +2034,7 @@ static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
     o->half_floats = g->octahedral;
     o->face = options->face;
     o->keep_masks = options->keep_masks != 0;
+    o->keep_mesh = options->keep_mesh != 0;
     o->lazy = options->lazy != 0;
     o->max_lights = options->max_lights;
 }
@@ -2266,8 +2320,8 @@ FIV_DEF sat_result fiv_occluder_create(fiv_occluder **out, const float *position
     if (!result) result = fiv__take_positions(made, positions);
     memset(made->state, FIV__STALE, made->stats.samples);
 #ifndef FIV_NO_MASKS
-    if (!result && made->keep_masks) {
-        result = fiv__precompute(made, &o);
+    if (!result && made->keep_masks) result = fiv__precompute(made, &o);
+    if (!result && made->keep_masks && !made->keep_mesh) {
         sat__release(&made->allocator, made->mesh_block, made->mesh_size);
         made->mesh_block = NULL;
         made->mesh_size = 0;
@@ -2292,6 +2346,8 @@ FIV_DEF sat_result fiv_occluder_share(fiv_occluder **out, const fiv_occluder *ma
     if (!masks_of || !masks_of->keep_masks) return SAT_ERR_ARGUMENT;
     from = *masks_of;
     from.share = 1;
+    from.mesh_block = NULL; /* the triangles stay the other's */
+    from.mesh_size = 0;
     from.environment = NULL;
     result = fiv__allocate_occluder(out, &from);
     if (!result) fiv__count_bytes(*out);
@@ -2537,6 +2593,7 @@ FIV_DEF fiv_irradiance_options fiv_irradiance_defaults(void)
     o.partial = 1;
     o.overlap = 1;
     o.cutoff = 0.001f;
+    o.own_masks = 64;
     return o;
 }
 
@@ -2676,6 +2733,57 @@ static void fiv__lookup_lights(float covered[FIV_MAX_LIGHTS], const fiv_occluder
     }
 }
 
+/* ---- near contact: samples inside the mesh are left out, and those that are left see light that the receiver does not. Such a
+   receiver gets a mask of its own; suns, whose edges no interpolated distance keeps, get a ray. */
+
+#define FIV__CONTACT 2.0f /* sr */
+
+static int fiv__is_contact(const fiv_occluder *o, const fiv__cell *cell, const float offset[3])
+{
+    float limit = FIV__CONTACT * fiv__dot(offset, offset);
+    int q;
+    for (q = 0; q < 8; q++)
+        if (o->state[cell->index[q]] == FIV__INSIDE || fiv__sample_angle(o, cell->index[q]) > limit) return 1;
+    return 0;
+}
+
+/* Irradiance that the texels above the horizon give; returns their solid angle. */
+static float fiv__integrate_rows(float rgb[3], const uint64_t *rows, const double *sums, const float normal[3], int size)
+{
+    double sum[FIV__TERMS];
+    int row, c, k, low, high;
+    memset(sum, 0, sizeof sum);
+    for (row = 0; row < 6 * size; row++) {
+        uint64_t m = rows[row];
+        if (!m) continue;
+        fiv__half_space(&low, &high, normal, row, size);
+        if (low >= high) continue;
+        m &= fiv__bits(low, high);
+        while (m) {
+            int begin = fiv__first_bit(m), end;
+            uint64_t carry = m + ((uint64_t)1 << begin);
+            end = carry ? fiv__first_bit(carry) : 64;
+            fiv__add_span(sum, sums + (size_t)row * (size_t)(size + 1) * FIV__TERMS, begin, end);
+            m = end == 64 ? 0 : m & ~(((uint64_t)1 << end) - 1);
+        }
+    }
+    for (c = 0; c < 3; c++) {
+        double v = 0;
+        for (k = 0; k < 3; k++) v += sum[3 * c + k] * (double)normal[k];
+        rgb[c] = v > 0 ? (float)v : 0;
+    }
+    return (float)sum[9];
+}
+
+/* 1 where no sample of the cell has a silhouette within six texels of light i, and all say the same. */
+static int fiv__agree(const fiv_occluder *o, const fiv__cell *cell, int i)
+{
+    int q, first = o->distance[cell->index[0] * (size_t)o->max_lights + (size_t)i];
+    for (q = 0; q < 8; q++)
+        if (o->state[cell->index[q]] != FIV__VALID || o->distance[cell->index[q] * (size_t)o->max_lights + (size_t)i] != first) return 0;
+    return first == 126 || first == -126;
+}
+
 /* ---- one occluder above the horizon of one receiver */
 
 /* A disc of uniform light with this axis and half angle, cut by the horizon: its irradiance over that of the whole disc
@@ -2704,6 +2812,7 @@ typedef struct fiv__receiver {
     float light_cosine[FIV_MAX_LIGHTS];  /* over the horizon */
     float light_direction[FIV_MAX_LIGHTS][3];
     float total[3];
+    int own_left;                        /* receivers of this tile that may still have own masks */
 } fiv__receiver;
 
 typedef struct fiv__shadow {
@@ -2782,12 +2891,34 @@ static void fiv__shade_masks(float rgb[3], const fiv_occluder *o, const fiv__cel
 }
 #endif
 
+/* A mask of the receiver's own; returns the solid angle above the horizon. */
+static float fiv__shade_own(float rgb[3], const fiv_occluder *o, const float offset[3], const float normal[3])
+{
+    uint64_t rows[FIV__MAX_ROWS];
+    fiv__raster_mesh(rows, &o->mesh, offset, o->face);
+    return fiv__integrate_rows(rgb, rows, o->sums, normal, o->face);
+}
+
+/* The lights near whose direction an occluder that keeps its mesh has an edge, or all of them near contact. */
+static void fiv__cast_rays(float covered[FIV_MAX_LIGHTS], const fiv__receiver *r, const fiv_occluder *o, const fiv__cell *cell,
+                           const float offset[3], int contact)
+{
+    int i;
+    for (i = 0; i < o->light_count; i++) {
+        float d[3];
+        if (!(r->light_cosine[i] > 0) || (!contact && fiv__agree(o, cell, i))) continue;
+        fiv__turn_back(d, o->rotation, r->light_direction[i]);
+        covered[i] = fiv__ray_meets(&o->mesh, offset, d) ? 1.0f : 0.0f;
+        r->stats->rays++;
+    }
+}
+
 /* Fills in a shadow; 0 when the occluder takes nothing. */
 static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], const fiv__receiver *r, const fiv_instance *instance)
 {
     const fiv_occluder *o = instance->occluder;
     float offset[3], world[3], distance, height, normal[3], v[FIV__TERMS], below = 1, above = 1, cut = 0, back[3];
-    int k, published = r->options->accuracy <= FIV_TRILINEAR, masks = 0;
+    int k, published = r->options->accuracy <= FIV_TRILINEAR, masks = 0, contact = 0, own = 0;
     fiv__cell cell;
     if (!fiv__place(offset, world, &distance, instance, r->point)) return 0;
     height = fiv__dot(world, r->normal);
@@ -2817,13 +2948,22 @@ static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], const f
     if (published) {
         fiv__lookup_published(v, o, &cell);
         for (k = 0; k < 9 && cut > 0 && r->options->partial; k++) v[k] *= 1 - cut; /* (d + R) / 2R */
-    } else if (fiv__lookup_scaled(v, o, &cell) == 0 && o->state[cell.index[0]] == FIV__STALE) r->stats->missing++;
+    } else {
+        contact = o->keep_mesh && fiv__is_contact(o, &cell, offset);
+        own = contact && r->own_left > 0;
+        if (fiv__lookup_scaled(v, o, &cell) == 0 && o->state[cell.index[0]] == FIV__STALE) r->stats->missing++;
+    }
+    if (own) {
+        v[9] = fiv__shade_own(shadow->rgb, o, offset, normal);
+        r->stats->own_masks++;
+    }
 #ifndef FIV_NO_MASKS
-    masks = r->options->accuracy == FIV_MASK && cut > 0 && o->keep_masks;
+    masks = r->options->accuracy == FIV_MASK && cut > 0 && o->keep_masks && !own;
     if (masks) fiv__shade_masks(shadow->rgb, o, &cell, normal, &r->stats->masks);
 #endif
-    if (!masks) fiv__shade(shadow->rgb, v, normal, published || !r->options->partial ? 0 : cut);
+    if (!masks && !own) fiv__shade(shadow->rgb, v, normal, published || !r->options->partial ? 0 : cut);
     fiv__lookup_lights(covered, o, &cell);
+    if (o->keep_mesh && !published) fiv__cast_rays(covered, r, o, &cell, offset, contact);
     shadow->occluder = o;
     shadow->radius = distance > 1 ? 1 / distance : 1;
     shadow->disc = published ? shadow->radius : sqrtf(v[9] * 0.318309886f);
@@ -2928,34 +3068,6 @@ static void fiv__world_mask(uint64_t *rows, const fiv_occluder *o, size_t sample
     }
 }
 
-/* Irradiance that the texels above the horizon give. */
-static void fiv__integrate_rows(float rgb[3], const uint64_t *rows, const fiv__receiver *r)
-{
-    const fiv_environment *e = r->environment;
-    double sum[FIV__TERMS];
-    int row, c, k, low, high;
-    memset(sum, 0, sizeof sum);
-    for (row = 0; row < 6 * e->face; row++) {
-        uint64_t m = rows[row];
-        if (!m) continue;
-        fiv__half_space(&low, &high, r->normal, row, e->face);
-        if (low >= high) continue;
-        m &= fiv__bits(low, high);
-        while (m) {
-            int begin = fiv__first_bit(m), end;
-            uint64_t carry = m + ((uint64_t)1 << begin);
-            end = carry ? fiv__first_bit(carry) : 64;
-            fiv__add_span(sum, e->sums + (size_t)row * (size_t)(e->face + 1) * FIV__TERMS, begin, end);
-            m = end == 64 ? 0 : m & ~(((uint64_t)1 << end) - 1);
-        }
-    }
-    for (c = 0; c < 3; c++) {
-        double v = 0;
-        for (k = 0; k < 3; k++) v += sum[3 * c + k] * (double)r->normal[k];
-        rgb[c] = v > 0 ? (float)v : 0;
-    }
-}
-
 static int fiv__balls_overlap(const fiv__shadow *a, const fiv__shadow *b)
 {
     float cosine = sqrtf(1 - a->radius * a->radius) * sqrtf(1 - b->radius * b->radius) - a->radius * b->radius;
@@ -2982,7 +3094,7 @@ static void fiv__unite_masks(int64_t taken[3], const fiv__receiver *r, const fiv
             twice |= all[row] & one[row];
             all[row] |= one[row];
         }
-        fiv__integrate_rows(rgb, one, r);
+        fiv__integrate_rows(rgb, one, r->environment->sums, r->normal, r->environment->face);
         members++;
         for (k = 0; k < 3; k++) {
             alone[k] += fiv__fixed(rgb[k], r->diffuse[k]);
@@ -2992,7 +3104,7 @@ static void fiv__unite_masks(int64_t taken[3], const fiv__receiver *r, const fiv
     r->stats->masks += (size_t)members;
     if (!twice) return;
     r->stats->overlaps++;
-    fiv__integrate_rows(rgb, all, r);
+    fiv__integrate_rows(rgb, all, r->environment->sums, r->normal, r->environment->face);
     for (k = 0; k < 3; k++) {
         int64_t together = fiv__fixed(rgb[k], r->diffuse[k]);
         if (alone[k] <= 0 || together >= alone[k]) continue;
@@ -3104,13 +3216,15 @@ static void fiv__run_tiles(int begin, int end, int worker, void *context)
     r.stats = &job->stats[worker];
     memset(r.light_cosine, 0, sizeof r.light_cosine);
     for (i = (size_t)begin * FIV__TILE; i < last; i++) {
+        size_t made = r.stats->own_masks;
+        if (i % FIV__TILE == 0) r.own_left = r.options->own_masks;
 #ifndef FIV_NO_SELF
-        if (job->self) {
+        if (job->self)
             fiv__receive_self(job->rgb + 3 * i, &r, job->self, job->points + 3 * i, job->normals + 3 * i);
-            continue;
-        }
+        else
 #endif
-        fiv__receive(job->rgb + 3 * i, &r, job->points + 3 * i, job->normals + 3 * i);
+            fiv__receive(job->rgb + 3 * i, &r, job->points + 3 * i, job->normals + 3 * i);
+        r.own_left -= r.stats->own_masks > made;
     }
 }
 
@@ -3133,6 +3247,8 @@ static void fiv__add_stats(fiv_irradiance_stats *sum, const fiv_irradiance_stats
     sum->clipped += s->clipped;
     sum->overlaps += s->overlaps;
     sum->masks += s->masks;
+    sum->own_masks += s->own_masks;
+    sum->rays += s->rays;
     sum->non_finite += s->non_finite;
     sum->missing += s->missing;
 }
@@ -3146,7 +3262,7 @@ static sat_result fiv__run(fiv__job *job, const fiv_irradiance_options *options,
     if (job->count && (!job->rgb || !job->points || !job->normals)) return SAT_ERR_ARGUMENT;
     if (!job->environment || (job->instance_count && !job->instances)) return SAT_ERR_ARGUMENT;
     if ((unsigned)o.accuracy > (unsigned)FIV_MASK || !(o.cutoff >= 0 && o.cutoff <= 1)) return SAT_ERR_ARGUMENT;
-    if (!sat__threads_are_valid(&o.threads)) return SAT_ERR_ARGUMENT;
+    if (o.own_masks < 0 || o.own_masks > FIV__TILE || !sat__threads_are_valid(&o.threads)) return SAT_ERR_ARGUMENT;
     if (job->instance_count > FIV_MAX_INSTANCES) return SAT_ERR_LIMIT;
     for (i = 0; i < job->instance_count; i++)
         if (!fiv__instance_is_valid(&job->instances[i], job->environment, &o)) return SAT_ERR_ARGUMENT;

@@ -495,6 +495,170 @@ TEST(shadow_on_a_plane)
     }
 }
 
+/* Objects that stand on a plane: receivers near contact get masks of their own, suns get rays. The box's plane also at gap 0, where
+   receivers lie in its lowest face. */
+static void test_resting(const reference_mesh *m, float low, float gap, float sun, float width, double bound)
+{
+    static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT];
+    static const float origin[3] = {0, 0, 0};
+    fiv_environment *e = test_environment(sun, 400);
+    fiv_irradiance_options io = fiv_irradiance_defaults();
+    int big;
+    reference_scene scene;
+    double error[2];
+    memset(&scene, 0, sizeof scene);
+    reference_add(&scene, m->positions, m->indices, m->triangles, NULL, origin, 1);
+    reference_build(&scene);
+    test_plane(points, normals, SIDE, width, low);
+    for (big = 0; big < 2; big++) {
+        fiv_occluder_options options = fiv_occluder_defaults();
+        fiv_occluder_stats stats;
+        fiv_irradiance_stats made;
+        fiv_occluder *o;
+        fiv_instance instance;
+        static float rgb[3 * COUNT], none[3 * COUNT];
+        size_t i;
+        if (big) options.theta = 48, options.phi = 25, options.rho = 20;
+        options.keep_mesh = 1;
+        o = test_occluder(m, &options, &stats);
+        EXPECT_EQ(fiv_occluder_light(o, e, NULL), SAT_OK);
+        instance = test_instance(o, 0, 0, 0);
+        if (!big) {
+            for (i = 0; i < COUNT; i++) points[3 * i + 1] = low - gap * stats.radius;
+            test_truth(truth, &scene, e, points, normals, COUNT);
+        }
+        EXPECT_EQ(fiv_irradiance(rgb, points, normals, COUNT, e, &instance, 1, &io, &made), SAT_OK);
+        error[big] = reference_nrmse(truth, rgb, COUNT);
+        EXPECT(made.own_masks > 0 && made.own_masks < COUNT);
+        EXPECT(sun > 0 ? made.rays > 0 : made.rays == 0);
+        REPORT(big ? "resting, 48x25x20" : "resting, 32x17x15", error[big], "NRMSE");
+        io.own_masks = 0;
+        EXPECT_EQ(fiv_irradiance(none, points, normals, COUNT, e, &instance, 1, &io, &made), SAT_OK);
+        EXPECT_EQ(made.own_masks, 0);
+        EXPECT(reference_nrmse(truth, none, COUNT) > 3 * error[big]);
+        io.own_masks = 64;
+        fiv_occluder_destroy(o);
+    }
+    EXPECT(error[0] <= bound);
+    EXPECT(error[1] < error[0]);
+    reference_free(&scene);
+    fiv_environment_destroy(e);
+}
+
+TEST(resting_objects)
+{
+    reference_mesh box = reference_box(0.5f, 0.3f, 0.4f), knot = test_knot();
+    float low = 0;
+    size_t i;
+    for (i = 0; i < knot.vertices; i++) low = knot.positions[3 * i + 1] < low ? knot.positions[3 * i + 1] : low;
+    test_resting(&box, -0.3f, 0, 0, 2, 0.012);
+    test_resting(&box, -0.3f, 0.002f, 2000, 2, 0.012);
+    test_resting(&knot, low, 0, 2000, 4, 0.012);
+    test_resting(&knot, low, 0.002f, 0, 4, 0.012);
+    reference_mesh_free(&box);
+    reference_mesh_free(&knot);
+}
+
+/* A bare sun's edge is that of the rays: at every receiver but those whose ray grazes an edge. */
+TEST(suns_have_edges)
+{
+    static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT], rgb[3 * COUNT], pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    static const float where[3] = {0.1f, 0.7f, -0.2f}, axis[3] = {0.6f, 0, 0.8f};
+    sat_image image = sat_image_f32(pixels, SKY_WIDTH, SKY_HEIGHT, 3);
+    fiv_occluder_options options = test_small_set();
+    fiv_environment *e = NULL;
+    fiv_instance instance;
+    reference_mesh m = test_knot();
+    reference_scene scene;
+    fiv_occluder *o, *shared = NULL;
+    fiv_irradiance_stats stats;
+    float turn[9];
+    int c, i, pass, differ;
+    memset(&scene, 0, sizeof scene);
+    memset(pixels, 0, sizeof pixels);
+    for (c = 0; c < 3; c++) pixels[3 * (12 * SKY_WIDTH + 50) + c] = 1000;
+    EXPECT_EQ(fiv_environment_create(&e, &image, NULL, NULL), SAT_OK);
+    test_rotation(turn, axis, 0.7);
+    options.keep_mesh = 1;
+    o = test_occluder(&m, &options, NULL);
+    EXPECT_EQ(fiv_occluder_share(&shared, o), SAT_OK);
+    EXPECT_EQ(fiv_occluder_light(shared, e, turn), SAT_OK);
+    reference_add(&scene, m.positions, m.indices, m.triangles, turn, where, 0.8f);
+    reference_build(&scene);
+    instance = test_instance(shared, where[0], where[1], where[2]);
+    instance.scale = 0.8f;
+    for (pass = 0; pass < 2; pass++) {
+        test_plane(points, normals, SIDE, 4, pass ? -1 : -0.6f);
+        test_truth(truth, &scene, e, points, normals, COUNT);
+        EXPECT_EQ(fiv_irradiance(rgb, points, normals, COUNT, e, &instance, 1, NULL, &stats), SAT_OK);
+        for (i = 0, differ = 0; i < COUNT; i++) differ += fabsf(rgb[3 * i] - truth[3 * i]) > 1e-3f * truth[3 * i] + 1e-6f;
+        REPORT("receivers of 576 on the wrong side of a sun's edge", differ, "");
+        EXPECT(differ <= 1);
+        EXPECT(stats.rays > COUNT / 10);
+    }
+    fiv_occluder_destroy(shared);
+    fiv_occluder_destroy(o);
+    reference_free(&scene);
+    reference_mesh_free(&m);
+    fiv_environment_destroy(e);
+}
+
+/* own_masks bounds the receivers of each 64 in a row, whatever the order of the instances; published accuracies take none. */
+TEST(own_masks_are_bounded)
+{
+    static float points[3 * COUNT], normals[3 * COUNT], rgb[2][3 * COUNT];
+    reference_mesh m = reference_box(0.5f, 0.3f, 0.4f);
+    fiv_occluder_options options = test_small_set();
+    fiv_irradiance_options io = fiv_irradiance_defaults();
+    fiv_environment *e = test_environment(2000, 400);
+    fiv_instance instances[2], swapped[2];
+    fiv_irradiance_stats stats, last;
+    fiv_occluder *o, *plain;
+    int bound;
+    plain = test_occluder(&m, &options, NULL);
+    EXPECT_EQ(fiv_occluder_light(plain, e, NULL), SAT_OK);
+    options.keep_mesh = 1;
+    o = test_occluder(&m, &options, NULL);
+    EXPECT_EQ(fiv_occluder_light(o, e, NULL), SAT_OK);
+    EXPECT(fiv_occluder_get_stats(o).bytes > fiv_occluder_get_stats(plain).bytes);
+    instances[0] = swapped[1] = test_instance(o, -0.3f, 0.3f, 0);
+    instances[1] = swapped[0] = test_instance(o, 0.4f, 0.35f, 0.2f);
+    test_plane(points, normals, SIDE, 2, 0);
+    memset(&last, 0, sizeof last);
+    for (bound = 0; bound <= 64; bound += 16) {
+        io.own_masks = bound;
+        EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, COUNT, e, instances, 2, &io, &stats), SAT_OK);
+        EXPECT_EQ(fiv_irradiance(rgb[1], points, normals, COUNT, e, swapped, 2, &io, NULL), SAT_OK);
+        EXPECT(test_same(rgb[0], rgb[1], 3 * COUNT));
+        EXPECT(stats.own_masks <= (size_t)(2 * bound * (COUNT / 64)));
+        EXPECT(bound ? stats.own_masks >= last.own_masks : stats.own_masks == 0);
+        last = stats;
+        io.threads = support_threads(3);
+        EXPECT_EQ(fiv_irradiance(rgb[1], points, normals, COUNT, e, instances, 2, &io, &stats), SAT_OK);
+        EXPECT(memcmp(rgb[0], rgb[1], sizeof rgb[0]) == 0);
+        EXPECT_EQ(stats.own_masks, last.own_masks);
+        memset(&io.threads, 0, sizeof io.threads);
+    }
+    EXPECT(last.own_masks > 64);
+    io.accuracy = FIV_TRILINEAR;
+    EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, COUNT, e, instances, 2, &io, &stats), SAT_OK);
+    instances[0].occluder = instances[1].occluder = plain;
+    EXPECT_EQ(fiv_irradiance(rgb[1], points, normals, COUNT, e, instances, 2, &io, NULL), SAT_OK);
+    EXPECT(memcmp(rgb[0], rgb[1], sizeof rgb[0]) == 0);
+    EXPECT(stats.own_masks == 0 && stats.rays == 0);
+    io.accuracy = FIV_MASK;
+    EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, COUNT, e, instances, 2, &io, &stats), SAT_OK);
+    EXPECT(stats.own_masks == 0 && stats.rays == 0); /* no mesh kept */
+    io.own_masks = 65;
+    EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, COUNT, e, instances, 2, &io, NULL), SAT_ERR_ARGUMENT);
+    io.own_masks = -1;
+    EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, COUNT, e, instances, 2, &io, NULL), SAT_ERR_ARGUMENT);
+    fiv_occluder_destroy(o);
+    fiv_occluder_destroy(plain);
+    fiv_environment_destroy(e);
+    reference_mesh_free(&m);
+}
+
 /* One point light: the shadow is a step in space (figure 19, left: 0.1). */
 TEST(point_light)
 {
@@ -1300,10 +1464,11 @@ TEST(no_allocation_per_frame)
     long calls;
     int a;
     options.allocator = eo.allocator = support_allocator(&memory);
+    options.keep_mesh = 1;
     EXPECT_EQ(fiv_environment_create(&e, &sky, &eo, NULL), SAT_OK);
     EXPECT_EQ(memory.calls, 1);
     o = test_occluder(&m, &options, NULL);
-    EXPECT_EQ(memory.live, 3);
+    EXPECT_EQ(memory.live, 4);
     options.keep_masks = 0, options.lazy = 1;
     lazy = test_occluder(&m, &options, NULL);
     calls = memory.calls;
@@ -1457,11 +1622,12 @@ TEST(defaults_are_the_stated_ones)
     EXPECT_EQ(e.face, 32);
     EXPECT_NEAR(e.delta_ratio, 400, 0);
     EXPECT_EQ(e.max_lights, 8);
-    EXPECT(o.theta == 32 && o.phi == 17 && o.rho == 15 && o.face == 32 && o.keep_masks == 1 && o.lazy == 0 && o.max_lights == 8);
+    EXPECT(o.theta == 32 && o.phi == 17 && o.rho == 15 && o.face == 32 && o.keep_masks == 1 && o.lazy == 0 && o.max_lights == 8 && o.keep_mesh == 0);
     EXPECT_NEAR(o.first_shell, 0.3f, 0);
     EXPECT_NEAR(o.last_shell, 6, 0);
     EXPECT(i.accuracy == FIV_SCALED && i.partial == 1 && i.overlap == 1);
     EXPECT_NEAR(i.cutoff, 0.001f, 0);
+    EXPECT_EQ(i.own_masks, 64);
 }
 
 /* The vector loops against their plain twins. */
