@@ -2384,7 +2384,7 @@ SAT_DEF char *sat_explain_image(char *text, size_t size, const sat_image *image)
      above[band][x]   the tile rows up to this one, columns of the tile up to x
      whole[band][tile] both */
 
-enum { SAT__SPIKES = 8, SAT__SUPER = 1024 };
+enum { SAT__SPIKES = 8, SAT__SUPER = 1024, SAT__PANEL = 1024 };
 
 struct sat__spike {
     uint16_t x, y; /* within the tile */
@@ -2397,10 +2397,18 @@ struct sat__giant {
 };
 
 struct sat__tile {
-    double quantum, wide_quantum;
-    int slot;   /* of the pool, from 1; 0: 32-bit cells only */
-    int spikes, wants; /* wants: wide cells would help */
+    double quantum;
+    int slot; /* of the pool, from 1; 0: 32-bit cells only */
+    uint16_t spikes, wants; /* wants: wide cells would help */
 };
+
+/* 31 bits finer, down to what a float can hold. */
+static inline double sat__wide_quantum(const sat__tile *tile)
+{
+    const double least = 1.401298464324817070923729583289917e-45; /* 2^-149 */
+    double q = tile->quantum * (1.0 / 2147483648.0);
+    return q > least || !(tile->quantum > 0) ? q : least;
+}
 
 /* The pool of 64-bit tiles is cut in super tile rows, so that whether a tile gets a slot depends on its own alone. */
 static int sat__supers(const sat_table *t)
@@ -2412,7 +2420,7 @@ static int sat__supers(const sat_table *t)
 static size_t sat__lay_out_tiled(sat_table *t, unsigned char *base)
 {
     sat__arena arena;
-    size_t workers = (size_t)sat__worker_count(&t->options.threads), channels = (size_t)t->channels, tiles, cells, slots;
+    size_t workers = (size_t)sat__worker_count(&t->options.threads), channels = (size_t)t->channels, tiles, cells, pool;
     size_t area = (size_t)1 << 2 * t->shift, width = (size_t)t->width, bands = (size_t)t->tiles_y * channels;
     arena.base = base;
     arena.used = 0;
@@ -2424,7 +2432,7 @@ static size_t sat__lay_out_tiled(sat_table *t, unsigned char *base)
     t->giant_room = sat__clamp_int(t->width, 8, 64);
     if (!sat__multiply_size(&t->plane, t->stride, (size_t)t->rows) || !sat__multiply_size(&cells, t->plane, channels)) return 0;
     if (!sat__multiply_size(&tiles, bands, (size_t)t->tiles_x)) return 0;
-    slots = (size_t)sat__min_int(t->wide_quota, 0x7fffffff / sat__supers(t) / 4) * (size_t)sat__supers(t) * channels;
+    pool = (size_t)sat__min_int(t->wide_quota, 0x7fffffff / sat__supers(t) / 4) * (size_t)sat__supers(t) * channels;
     t->sums = (unsigned char *)sat__carve(&arena, cells, sizeof(uint32_t));
     t->left = (double *)sat__carve(&arena, t->left_plane * channels, sizeof(double));
     t->above = (double *)sat__carve(&arena, bands * width, sizeof(double));
@@ -2432,7 +2440,7 @@ static size_t sat__lay_out_tiled(sat_table *t, unsigned char *base)
     t->tiles = (sat__tile *)sat__carve(&arena, tiles, sizeof(sat__tile));
     t->spikes = (sat__spike *)sat__carve(&arena, tiles * SAT__SPIKES, sizeof(sat__spike));
     t->giants = (sat__giant *)sat__carve(&arena, bands * (size_t)t->giant_room, sizeof(sat__giant));
-    t->wide = (uint64_t *)sat__carve(&arena, slots, (t->wide_stride << t->shift) * sizeof(uint64_t));
+    t->wide = (uint64_t *)sat__carve(&arena, pool, (t->wide_stride << t->shift) * sizeof(uint64_t));
     t->pixels = (float *)sat__carve(&arena, workers * area, sizeof(float));
     t->tile_integers = (uint32_t *)sat__carve(&arena, workers * 2 * SAT__MAX_TILE_SIDE, sizeof(uint32_t));
     t->ring_pixels = t->ring ? (float *)sat__carve(&arena, width * channels << t->shift, sizeof(float)) : NULL;
@@ -2941,7 +2949,7 @@ static double sat__wide_part(const sat_table *t, const sat__tile *tile, int x0, 
     if (x0) d -= high[x0 - 1];
     if (low) d -= low[x1 - 1];
     if (low && x0) d += low[x0 - 1];
-    return (double)(int64_t)d * tile->wide_quantum;
+    return (double)(int64_t)d * sat__wide_quantum(tile);
 }
 
 /* The part of a box inside one tile, in the tile's own coordinates. */
@@ -3064,60 +3072,115 @@ static double sat__giant_sum(const sat_table *t, int channel, int x0, int y0, in
     return sum;
 }
 
-/* The sum over a box that is not empty and inside the table. */
-static double sat__tiled_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+/* The sum over a box that is not empty and inside the table, tile by tile. */
+static double sat__tiles_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
 {
     sat__span x, y;
     double sum = 0;
     int i, j;
-    if ((x0 ^ (x1 - 1)) >> t->shift == 0 && (y0 ^ (y1 - 1)) >> t->shift == 0) { /* most boxes: one tile */
-        int mask = (1 << t->shift) - 1, left = x0 & ~mask, top = y0 & ~mask;
-        sum = sat__tile_part(t, channel, y0 >> t->shift, x0 >> t->shift, x0 - left, y0 - top, x1 - left, y1 - top);
+    sat__span_of(&x, x0, x1, t->shift);
+    sat__span_of(&y, y0, y1, t->shift);
+    for (j = 0; j < y.count; j++)
+        for (i = 0; i < x.count; i++)
+            sum += sat__tile_part(t, channel, y.tile[j], x.tile[i], x.begin[i], y.begin[j], x.end[i], y.end[j]);
+    if (x.run1 > x.run0 || y.run1 > y.run0) sum += sat__run_sum(t, channel, &x, &y);
+    return sum;
+}
+
+/* The same where at most 2 x 2 tiles are touched, as nearly all boxes up to a tile's side: always four tiles, of which those
+   that are not there are masked. Whether a border lies in the box is chance, and a wrong guess costs more than all of this. */
+static inline double sat__tiled_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+{
+    int shift = t->shift, inner = (1 << shift) - 1, xe = x1 - 1, ye = y1 - 1;
+    int tx = x0 >> shift, ty = y0 >> shift, right = (xe >> shift) - tx, below = (ye >> shift) - ty;
+    double sum;
+    const sat__tile *a = t->tiles + ((size_t)channel * (size_t)t->tiles_y + (size_t)ty) * (size_t)t->tiles_x + (size_t)tx;
+    const sat__tile *b = a + (right & 1), *c = a + (below & 1 ? t->tiles_x : 0), *d = c + (right & 1);
+    if ((right | below) > 1 || (a->slot | a->spikes | b->slot | b->spikes | c->slot | c->spikes | d->slot | d->spikes)) {
+        sum = sat__tiles_sum(t, channel, x0, y0, x1, y1);
     } else {
-        sat__span_of(&x, x0, x1, t->shift);
-        sat__span_of(&y, y0, y1, t->shift);
-        for (j = 0; j < y.count; j++)
-            for (i = 0; i < x.count; i++)
-                sum += sat__tile_part(t, channel, y.tile[j], x.tile[i], x.begin[i], y.begin[j], x.end[i], y.end[j]);
-        if (x.run1 > x.run0 || y.run1 > y.run0) sum += sat__run_sum(t, channel, &x, &y);
+        const uint32_t *cells = (const uint32_t *)(const void *)t->sums + (size_t)channel * t->plane;
+        const uint32_t keep_right = 0u - (uint32_t)right, keep_below = 0u - (uint32_t)below;
+        const uint32_t keep_left = 0u - (uint32_t)((x0 & inner) != 0), keep_top = 0u - (uint32_t)((y0 & inner) != 0);
+        const size_t xl = (size_t)(x0 - ((x0 & inner) != 0)), xr = (size_t)xe, xm = (size_t)(right ? x0 | inner : xe);
+        const uint32_t *low = cells + (size_t)ye * t->stride, *middle = cells + (size_t)(below ? y0 | inner : ye) * t->stride;
+        const uint32_t *high = keep_top ? cells + (size_t)(y0 - 1) * t->stride : middle;
+        uint32_t da = (middle[xm] - (middle[xl] & keep_left)) - ((high[xm] - (high[xl] & keep_left)) & keep_top);
+        uint32_t db = (middle[xr] - (high[xr] & keep_top)) & keep_right;
+        uint32_t dc = (low[xm] - (low[xl] & keep_left)) & keep_below, dd = low[xr] & keep_right & keep_below;
+        sum = (double)(int32_t)da * a->quantum + (double)(int32_t)db * b->quantum;
+        sum = sum + (double)(int32_t)dc * c->quantum + (double)(int32_t)dd * d->quantum;
     }
     return t->has_giants ? sum + sat__giant_sum(t, channel, x0, y0, x1, y1) : sum;
 }
 
 /* ---- tables: building tiles */
 
-/* Sum (four lanes, then lane 0 + 1 + 2 + 3) and largest of |pixel| of a tile in scratch memory, whose rows are padded with
-   zeros to a multiple of four. */
+/* Of |pixel| of a tile, in four lanes: pixel i of a row belongs to lane i modulo 4. */
+typedef struct sat__gauge {
+    float sum[4], largest[4], smallest[4];
+} sat__gauge;
+
 typedef struct sat__extent {
-    float sum, largest;
+    float sum, largest, smallest;
 } sat__extent;
 
-static sat__extent sat__extent_of(const float *p, int n)
+static void sat__gauge_clear(sat__gauge *g)
 {
-    sat__extent e;
-    float lane[4] = {0, 0, 0, 0}, top[4] = {0, 0, 0, 0};
-    int i = 0, j;
+    int j;
+    for (j = 0; j < 4; j++) {
+        g->sum[j] = g->largest[j] = 0;
+        g->smallest[j] = 3.4028235e38f;
+    }
+}
+
+/* n pixels more, a multiple of four. NaN and infinity are sure to show in the sum alone. */
+static inline void sat__gauge_row(sat__gauge *g, const float *p, int n)
+{
+    int i, j;
 #ifdef SAT__VECTOR
-    sat__f32x4 sum = sat__f32x4_set1(0), largest = sum;
-    for (; i < n; i += 4) {
+    sat__f32x4 sum = sat__f32x4_load(g->sum), largest = sat__f32x4_load(g->largest), smallest = sat__f32x4_load(g->smallest);
+    (void)j;
+    for (i = 0; i < n; i += 4) {
         sat__f32x4 v = sat__f32x4_abs(sat__f32x4_load(p + i));
         sum = sat__f32x4_add(sum, v);
         largest = sat__f32x4_max(largest, v);
+        smallest = sat__f32x4_min(smallest, v);
     }
-    sat__f32x4_store(lane, sum);
-    sat__f32x4_store(top, largest);
-#endif
-    for (; i < n; i += 4)
+    sat__f32x4_store(g->sum, sum);
+    sat__f32x4_store(g->largest, largest);
+    sat__f32x4_store(g->smallest, smallest);
+#else
+    for (i = 0; i < n; i += 4)
         for (j = 0; j < 4; j++) {
             float v = fabsf(p[i + j]);
-            lane[j] += v;
-            if (v > top[j]) top[j] = v;
+            g->sum[j] += v;
+            if (v > g->largest[j]) g->largest[j] = v;
+            if (v < g->smallest[j]) g->smallest[j] = v;
         }
-    e.sum = lane[0] + lane[1] + lane[2] + lane[3];
-    e.largest = top[0];
-    for (j = 1; j < 4; j++)
-        if (top[j] > e.largest) e.largest = top[j];
+#endif
+}
+
+static sat__extent sat__gauge_extent(const sat__gauge *g)
+{
+    sat__extent e;
+    int j;
+    e.sum = g->sum[0] + g->sum[1] + g->sum[2] + g->sum[3];
+    e.largest = g->largest[0];
+    e.smallest = g->smallest[0];
+    for (j = 1; j < 4; j++) {
+        if (g->largest[j] > e.largest) e.largest = g->largest[j];
+        if (g->smallest[j] < e.smallest) e.smallest = g->smallest[j];
+    }
     return e;
+}
+
+static sat__extent sat__extent_of(const float *p, int n)
+{
+    sat__gauge g;
+    sat__gauge_clear(&g);
+    sat__gauge_row(&g, p, n);
+    return sat__gauge_extent(&g);
 }
 
 /* How many of n pixels, at most `most` + 1, have a magnitude above `threshold`; `at` takes the places of the first. */
@@ -3140,7 +3203,14 @@ static int sat__count_below(const float *p, int n, float threshold, int most)
     int i, j, count = 0;
     for (i = 0; i < n && count < most; i += 4) {
 #ifdef SAT__VECTOR
-        if (!sat__i32x4_any(sat__f32x4_less(sat__f32x4_abs(sat__f32x4_load(p + i)), sat__f32x4_set1(threshold)))) continue;
+        const sat__f32x4 limit = sat__f32x4_set1(threshold);
+        for (; i + 16 <= n; i += 16) {
+            sat__f32x4 a = sat__f32x4_min(sat__f32x4_abs(sat__f32x4_load(p + i)), sat__f32x4_abs(sat__f32x4_load(p + i + 4)));
+            sat__f32x4 b = sat__f32x4_min(sat__f32x4_abs(sat__f32x4_load(p + i + 8)), sat__f32x4_abs(sat__f32x4_load(p + i + 12)));
+            if (sat__i32x4_any(sat__f32x4_less(sat__f32x4_min(a, b), limit))) break;
+        }
+        if (i >= n) break;
+        if (!sat__i32x4_any(sat__f32x4_less(sat__f32x4_abs(sat__f32x4_load(p + i)), limit))) continue;
 #endif
         for (j = 0; j < 4; j++) {
             float v = fabsf(p[i + j]);
@@ -3184,7 +3254,7 @@ static sat__extent sat__take_spikes(const sat_table *t, size_t index, float *p, 
             for (i = 0; i < found; i++) p[at[i]] = s[tile->spikes + i].value;
             break;
         }
-        tile->spikes += found;
+        tile->spikes = (uint16_t)(tile->spikes + found);
         e = rest;
     }
     return e;
@@ -3263,47 +3333,132 @@ static void sat__tile_integers(uint32_t *out, const float *p, int n, double quan
     }
 }
 
-/* Takes a tile apart: scratch memory then holds what its cells sum. */
-static void sat__settle_tile(const sat_table *t, float *p, int n, size_t index, int left, sat__giant *list, sat__tally *tally)
+/* A row of a tile, rounded and summed onto the rows above it; returns the last sum. `integers`: scratch. */
+static inline uint32_t sat__sum_tile_row(uint32_t *out, uint32_t *column, uint32_t *integers, const float *p, int n, double quantum, int stream)
 {
-    sat__tile *tile = &t->tiles[index];
-    float giant = t->limit < 1e20 ? (float)t->limit : 1e20f;
-    sat__extent e;
-    int i, first = tally->giants;
-    if (!sat__is_tame(p, n, giant)) sat__take_giants(t, p, n, left, list, tally);
-    e = sat__extent_of(p, n);
-    tile->spikes = 0;
-    tile->slot = 0;
-    if (e.largest > e.sum / 16) e = sat__take_spikes(t, index, p, n, e);
-    tile->quantum = sat__tile_quantum((double)e.sum, 31);
-    tile->wide_quantum = sat__tile_quantum((double)e.sum, 62);
-    tile->wants = e.sum > 0 && sat__count_below(p, n, e.sum / ((float)n * 1024), 8) >= 8;
-    tally->sum_abs += (double)e.sum;
-    for (i = 0; i < tile->spikes; i++) tally->sum_abs += fabs((double)t->spikes[index * SAT__SPIKES + (size_t)i].value);
-    for (i = first; i < tally->giants; i++) tally->sum_abs += fabs((double)list[i].value);
+    int32_t signs = 0;
+#ifdef SAT__SSE2
+    if (!(n & 7) && (quantum > 1e-37 || !(quantum > 0))) { /* the same in registers */
+        const __m128 scale = _mm_set1_ps(quantum > 0 ? (float)(1 / quantum) : 0);
+        __m128i carry = _mm_setzero_si128(), a, b, c;
+        int i;
+        for (i = 0; i < n; i += 8) {
+            a = _mm_add_epi32(SAT__LOAD_u32(column + i), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(p + i), scale)));
+            b = _mm_add_epi32(SAT__LOAD_u32(column + i + 4), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(p + i + 4), scale)));
+            SAT__STORE_u32(column + i, a);
+            SAT__STORE_u32(column + i + 4, b);
+            a = sat__prefix_u32(a);
+            b = sat__prefix_u32(b);
+            b = _mm_add_epi32(b, SAT__LAST_u32(a));
+            c = SAT__LAST_u32(b);
+            a = _mm_add_epi32(a, carry);
+            b = _mm_add_epi32(b, carry);
+            carry = _mm_add_epi32(carry, c);
+            if (stream) {
+                SAT__STREAM_u32(out + i, a);
+                SAT__STREAM_u32(out + i + 4, b);
+            } else {
+                SAT__STORE_u32(out + i, a);
+                SAT__STORE_u32(out + i + 4, b);
+            }
+        }
+        return (uint32_t)_mm_cvtsi128_si32(carry);
+    }
+#endif
+    sat__tile_integers(integers, p, (n + 3) & ~3, quantum);
+    return sat__sum_row_u32(out, column, integers, n, 0, stream, &signs);
 }
 
-/* Tile row `band` (row y0 of the image on): 32-bit cells, and in `left` what each tile alone adds. */
+/* A tile's pixels: in the image, or taken apart in scratch memory. */
+typedef struct sat__source {
+    const float *p;
+    ptrdiff_t step; /* floats between rows */
+} sat__source;
+
+static int sat__is_direct(const sat_image *image) { return image->format == SAT_F32 && image->channels == 1; }
+
+static float sat__giant_limit(const sat_table *t) { return t->limit < 1e20 ? (float)t->limit : 1e20f; }
+
+/* Quantum and wishes, once spikes and giants are out. */
+static void sat__settle_tile(const sat_table *t, sat__tile *tile, const sat__source *from, int rows, sat__extent e)
+{
+    float threshold = e.sum / ((float)(rows << t->shift) * 1024);
+    int y, count = 0;
+    tile->slot = 0;
+    tile->quantum = sat__tile_quantum((double)e.sum, 31);
+    tile->wants = 0;
+    if (!(e.sum > 0) || !(e.smallest < threshold)) return;
+    for (y = 0; y < rows && count < 8; y++) count += sat__count_below(from->p + y * from->step, t->options.tile, threshold, 8 - count);
+    tile->wants = count >= 8;
+}
+
+/* Takes a tile apart: scratch memory then holds what its cells sum. */
+static sat__extent sat__take_apart(const sat_table *t, float *p, int n, size_t index, int left, sat__giant *list, sat__tally *tally)
+{
+    sat__tile *tile = &t->tiles[index];
+    sat__extent e;
+    int i, first = tally->giants;
+    if (!sat__is_tame(p, n, sat__giant_limit(t))) sat__take_giants(t, p, n, left, list, tally);
+    e = sat__extent_of(p, n);
+    tile->spikes = 0;
+    if (e.largest > e.sum / 16) e = sat__take_spikes(t, index, p, n, e);
+    for (i = 0; i < tile->spikes; i++) tally->sum_abs += fabs((double)t->spikes[index * SAT__SPIKES + (size_t)i].value);
+    for (i = first; i < tally->giants; i++) tally->sum_abs += fabs((double)list[i].value);
+    return e;
+}
+
+/* The cells of a tile, and in `left` what it alone adds. */
+static void sat__sum_tile(const sat_table *t, const sat__source *from, int channel, int band, int tx, int rows, int worker, int stream)
+{
+    uint32_t *integers = t->tile_integers + (size_t)worker * 2 * SAT__MAX_TILE_SIDE, *column = integers + SAT__MAX_TILE_SIDE;
+    size_t index = sat__tile_index(t, channel, band, tx);
+    const sat__tile *tile = &t->tiles[index];
+    int y, side = t->options.tile, x0 = tx << t->shift, w = sat__min_int(side, t->width - x0);
+    uint32_t *cells = sat__cells(t, channel, band, 0) + x0;
+    double *left = sat__left(t, channel, band, 0) + tx, quantum = tile->quantum;
+    memset(column, 0, (size_t)side * sizeof *column);
+    for (y = 0; y < rows; y++) {
+        uint32_t sum = sat__sum_tile_row(cells + (size_t)y * t->stride, column, integers, from->p + y * from->step, w, quantum, stream);
+        left[(size_t)y * (size_t)t->tiles_x] = (double)(int32_t)sum * quantum + (tile->spikes ? sat__spike_sum(t, index, 0, 0, side, y + 1) : 0);
+    }
+}
+
+/* Tile row `band` (row y0 of the image on), a panel of tiles at a time: their pixels are gauged row by row, as memory likes it,
+   and are still in the cache when each tile is summed. */
 static void sat__settle_band(const sat_table *t, const sat_image *image, int channel, int band, int y0, int worker, int stream)
 {
+    sat__gauge gauge[SAT__PANEL / 8];
     float *p = t->pixels + ((size_t)worker << 2 * t->shift);
-    uint32_t *integers = t->tile_integers + (size_t)worker * 2 * SAT__MAX_TILE_SIDE, *column = integers + SAT__MAX_TILE_SIDE;
     size_t at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
     sat__tally *tally = &t->tallies[at];
-    int tx, y, side = t->options.tile, rows = sat__min_int(side, image->height - y0);
+    int panel, tx, y, side = t->options.tile, rows = sat__min_int(side, image->height - y0), step = SAT__PANEL >> t->shift;
     memset(tally, 0, sizeof *tally);
-    for (tx = 0; tx < t->tiles_x; tx++) {
-        size_t index = sat__tile_index(t, channel, band, tx);
-        int x0 = tx << t->shift, w = sat__min_int(side, t->width - x0), n = sat__gather(t, image, channel, y0, x0, p);
-        const sat__tile *tile = &t->tiles[index];
-        sat__settle_tile(t, p, n, index, x0, t->giants + at * (size_t)t->giant_room, tally);
-        memset(column, 0, (size_t)side * sizeof *column);
+    for (panel = 0; panel < t->tiles_x; panel += step) {
+        int stop = sat__min_int(panel + step, t->tiles_x), direct = sat__is_direct(image) ? sat__min_int(stop, t->width >> t->shift) : 0;
+        for (tx = panel; tx < direct; tx++) sat__gauge_clear(&gauge[tx - panel]);
         for (y = 0; y < rows; y++) {
-            int32_t signs = 0;
-            uint32_t sum;
-            sat__tile_integers(integers, p + (y << t->shift), side, tile->quantum);
-            sum = sat__sum_row_u32(sat__cells(t, channel, band, y) + x0, column, integers, w, 0, stream, &signs);
-            sat__left(t, channel, band, y)[tx] = (double)(int32_t)sum * tile->quantum + (tile->spikes ? sat__spike_sum(t, index, 0, 0, side, y + 1) : 0);
+            const float *row = (const float *)sat__image_row(image, y0 + y);
+            for (tx = panel; tx < direct; tx++) sat__gauge_row(&gauge[tx - panel], row + ((size_t)tx << t->shift), side);
+        }
+        for (tx = panel; tx < stop; tx++) {
+            size_t index = sat__tile_index(t, channel, band, tx);
+            sat__extent e;
+            sat__source from;
+            e.sum = e.largest = e.smallest = 0;
+            if (tx < direct) e = sat__gauge_extent(&gauge[tx - panel]);
+            if (tx < direct && e.sum <= 3.4028235e38f && e.largest <= sat__giant_limit(t) && e.largest <= e.sum / 16) {
+                from.p = (const float *)sat__image_row(image, y0) + ((size_t)tx << t->shift);
+                from.step = image->stride / (ptrdiff_t)sizeof(float);
+                t->tiles[index].spikes = 0;
+            } else {
+                int n = sat__gather(t, image, channel, y0, tx << t->shift, p);
+                e = sat__take_apart(t, p, n, index, tx << t->shift, t->giants + at * (size_t)t->giant_room, tally);
+                from.p = p;
+                from.step = side;
+            }
+            sat__settle_tile(t, &t->tiles[index], &from, rows, e);
+            tally->sum_abs += (double)e.sum;
+            sat__sum_tile(t, &from, channel, band, tx, rows, worker, stream);
         }
     }
     tally->negative = 1;
@@ -3325,9 +3480,9 @@ static void sat__wide_tile(const sat_table *t, const sat_image *image, int chann
     size_t index = sat__tile_index(t, channel, band, tx), at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
     sat__tile *tile = &t->tiles[index];
     uint64_t *cells = sat__wide_cells(t, tile->slot);
-    double inverse = 1 / tile->wide_quantum;
+    double inverse = 1 / sat__wide_quantum(tile);
     int side = t->options.tile, n = sat__gather(t, image, channel, y0, tx << t->shift, p), x, y, i;
-    if (!sat__is_tame(p, n, t->limit < 1e20 ? (float)t->limit : 1e20f)) { /* the giants of this tile stand in the list; others were clamped */
+    if (!sat__is_tame(p, n, sat__giant_limit(t))) { /* the giants of this tile stand in the list; others were clamped */
         sat__tally again = t->tallies[at];
         const sat__giant *list = t->giants + at * (size_t)t->giant_room;
         int first = 0;
@@ -3354,7 +3509,7 @@ static void sat__finish_band(const sat_table *t, const sat_image *image, int cha
     tally->tile_largest = tally->tile_squares = 0;
     for (tx = 0; tx < t->tiles_x; tx++) {
         const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
-        double quantum = tile->slot ? tile->wide_quantum : tile->quantum;
+        double quantum = tile->slot ? sat__wide_quantum(tile) : tile->quantum;
         if (tile->slot) sat__wide_tile(t, image, channel, band, tx, y0, worker);
         if (quantum > tally->tile_largest) tally->tile_largest = quantum;
         tally->tile_squares += quantum * quantum;
@@ -3697,7 +3852,7 @@ static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_b
     b.care = sat__first_care(t);
     b.first_band = first_band;
     b.bands = last_band - first_band;
-    b.stream = t->plane * t->element > (size_t)4 << 20;
+    b.stream = t->plane * t->element > (size_t)4 << 20 && t->stride % 4 == 0;
     if (t->options.kind == SAT_KIND_TILED) {
         sat__build_tiled(&b);
         sat__total(t);
