@@ -24,6 +24,11 @@ static char message[400];
 static unsigned char *rgba;
 
 int web_create(int width, int height, int hour);
+int web_prepare(void);
+int web_photo_open(const char *path);
+int web_photo_size(int side);
+int web_photo_set(const char *name, double value);
+const unsigned char *web_photo(void);
 int web_set(const char *name, double value);
 int web_use_gl(int on);
 int web_open(const char *path);
@@ -38,10 +43,24 @@ EMSCRIPTEN_KEEPALIVE int web_create(int width, int height, int hour)
     wanted.environment = light;
     wanted.width = width, wanted.height = height, wanted.samples = 1;
     wanted.hour = (scene_hour)(hour % 3);
+    wanted.shadows = 0; /* until web_prepare */
     rgba = (unsigned char *)malloc((size_t)width * (size_t)height * 4);
     if (rgba && pipeline_create(&web, &wanted)) return 1;
     snprintf(message, sizeof message, "%s", rgba ? web.message : "not enough memory");
     return 0;
+}
+
+/* The masks of one more sculpture: how many are left, -1 when something failed. With the last one shadows begin. */
+EMSCRIPTEN_KEEPALIVE int web_prepare(void)
+{
+    int i, left = 0;
+    if (!pipeline_next_mask(&web)) {
+        snprintf(message, sizeof message, "%s", web.message);
+        return -1;
+    }
+    for (i = 0; i < SCENE_OBJECTS; ++i) left += !web.occluders[i];
+    if (left == 0) wanted.shadows = 1;
+    return left;
 }
 
 /* 0: there is no such option. */
@@ -133,6 +152,62 @@ EMSCRIPTEN_KEEPALIVE const unsigned char *web_frame(double dt)
     return rgba;
 }
 
+/* ---- a photograph, tone-mapped ---- */
+
+static image photo;
+static tonemap_options photo_options;
+static unsigned char *photo_rgba;
+
+/* Any picture that web_formats names. */
+EMSCRIPTEN_KEEPALIVE int web_photo_open(const char *path)
+{
+    image next;
+    if (!image_load(&next, path)) {
+        snprintf(message, sizeof message, "%s", next.message);
+        return 0;
+    }
+    if (!photo.pixels) photo_options = tonemap_defaults();
+    image_free(&photo);
+    free(photo_rgba);
+    photo = next;
+    photo_rgba = (unsigned char *)malloc((size_t)photo.width * (size_t)photo.height * 4);
+    snprintf(message, sizeof message, "%.180s, %d x %d", path, photo.width, photo.height);
+    return photo_rgba != NULL;
+}
+
+/* 0: width; 1: height. */
+EMSCRIPTEN_KEEPALIVE int web_photo_size(int side) { return side ? photo.height : photo.width; }
+
+/* 0: there is no such option. */
+EMSCRIPTEN_KEEPALIVE int web_photo_set(const char *name, double value)
+{
+    if (strcmp(name, "operator") == 0) photo_options.operation = (tonemap_operator)(int)value;
+    else if (strcmp(name, "mesopic") == 0) photo_options.mesopic = (tonemap_mesopic)(int)value;
+    else if (strcmp(name, "key") == 0) photo_options.key = value;
+    else if (strcmp(name, "burn") == 0) photo_options.white = value > 0 ? value : (double)INFINITY;
+    else if (strcmp(name, "gamut") == 0) photo_options.gamut = value;
+    else if (strcmp(name, "scales") == 0) photo_options.scales = (int)value;
+    else return 0;
+    return 1;
+}
+
+/* The photograph for the screen, RGBA; NULL when something failed. */
+EMSCRIPTEN_KEEPALIVE const unsigned char *web_photo(void)
+{
+    size_t i, pixels = (size_t)photo.width * (size_t)photo.height;
+    if (!photo.pixels || tonemap_once_u8(photo_rgba, photo.pixels, photo.width, photo.height, 3, &photo_options) != SAT_OK) {
+        if (photo.pixels) tonemap_explain(message, sizeof message, photo.width, photo.height, &photo_options);
+        return NULL;
+    }
+    for (i = pixels; i-- > 0;) { /* three bytes become four, from behind */
+        photo_rgba[4 * i + 3] = 255;
+        photo_rgba[4 * i + 2] = photo_rgba[3 * i + 2];
+        photo_rgba[4 * i + 1] = photo_rgba[3 * i + 1];
+        photo_rgba[4 * i] = photo_rgba[3 * i];
+    }
+    return photo_rgba;
+}
+
 /* Why a call returned 0 or NULL; after web_open what it read. */
 EMSCRIPTEN_KEEPALIVE const char *web_message(void) { return message; }
 
@@ -144,11 +219,12 @@ int main(int argc, char **argv)
     const common_option options[] = {{"env", 'P', (void *)&light, 0, 0, "equirectangular picture of the light; without it a sky of our own"}};
     common_settings common;
     common_parse(&common, argc, argv, "demo_web", ".png", options, 1);
-    ok = ((!light || web_open(light)) && web_create(640, 360, SCENE_DUSK) && web_frame(0)) || common_say(&common, message);
+    ok = ((!light || web_open(light)) && web_create(640, 360, SCENE_DUSK) && web_prepare() == 1 && web_prepare() == 0 && web_frame(0)) || common_say(&common, message);
     ok = ok && common_save_u8(&common, common.out, rgba, 640, 360, 4);
     pipeline_destroy(&web);
     image_free(&dropped[0]), image_free(&dropped[1]), image_free(&dropped[2]);
-    free(rgba);
+    free(rgba), free(photo_rgba);
+    image_free(&photo);
     common_close(&common);
     return !ok;
 }

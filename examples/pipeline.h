@@ -161,25 +161,33 @@ static inline int pipeline_tell(float done, void *user)
     return 0;
 }
 
-static inline int pipeline_masks(pipeline *p)
+/* Of the next sculpture without any: 1, or 0 with a message. */
+static inline int pipeline_next_mask(pipeline *p)
 {
     double start = common_clock();
     common_progress progress = {0, 0};
-    int i;
-    if (!p->options.shadows || p->occluders[SCENE_OBJECTS - 1]) return 1;
-    for (i = 0; i < SCENE_OBJECTS; ++i) {
-        const scene_object *o = &p->scene.objects[i];
-        fiv_occluder_options fo = fiv_occluder_defaults();
-        fo.first_shell = 0.15f;
-        fo.rho = 17;
-        fo.progress = pipeline_tell;
-        fo.progress_user = &progress;
-        fo.threads = p->options.threads;
-        if (!pipeline_check(p, "fiv_occluder_create", fiv_occluder_create(&p->occluders[i], o->positions, o->vertices, o->indices, o->triangles,
-                                                                         &fo, &p->mask_stats[i]))) return 0;
-        if (p->light && !pipeline_check(p, "fiv_occluder_light", fiv_occluder_light(p->occluders[i], p->light, NULL))) return 0;
-    }
-    p->seconds[PIPELINE_MASKS] = common_clock() - start;
+    fiv_occluder_options fo = fiv_occluder_defaults();
+    const scene_object *o;
+    int i = 0;
+    while (i < SCENE_OBJECTS - 1 && p->occluders[i]) ++i;
+    if (p->occluders[i]) return 1;
+    o = &p->scene.objects[i];
+    fo.first_shell = 0.15f;
+    fo.rho = 17;
+    fo.progress = pipeline_tell;
+    fo.progress_user = &progress;
+    fo.threads = p->options.threads;
+    if (!pipeline_check(p, "fiv_occluder_create", fiv_occluder_create(&p->occluders[i], o->positions, o->vertices, o->indices, o->triangles,
+                                                                     &fo, &p->mask_stats[i]))) return 0;
+    if (p->light && !pipeline_check(p, "fiv_occluder_light", fiv_occluder_light(p->occluders[i], p->light, NULL))) return 0;
+    p->seconds[PIPELINE_MASKS] += common_clock() - start;
+    return 1;
+}
+
+static inline int pipeline_masks(pipeline *p)
+{
+    while (p->options.shadows && !p->occluders[SCENE_OBJECTS - 1])
+        if (!pipeline_next_mask(p)) return 0;
     return 1;
 }
 
