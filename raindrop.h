@@ -283,7 +283,8 @@ typedef struct raindrop_drop { float position[3], radius, velocity[3], axis_rati
 
 #ifndef RAINDROP_NO_RAIN
 /* One step of any length dt >= 0 under gravity and drag towards the terminal velocity in a steady wind (see NUMERICS);
-   dt = 0 changes nothing. SAT_ERR_ARGUMENT for what is not finite, radius <= 0 or dt < 0. */
+   dt = 0 changes nothing. SAT_ERR_ARGUMENT, and the drop as it was, for what is not finite, radius <= 0, dt < 0, or a dt
+   after which its place is no float. */
 RAINDROP_DEF sat_result raindrop_fall(raindrop_drop *drop, const float wind[3], double dt);
 #endif
 
@@ -468,7 +469,7 @@ extern "C" {
 
 RAINDROP_DEF int raindrop_version(void) { return RAINDROP_VERSION; }
 
-/* ---- small things */
+/* ---- vectors and clamps */
 
 static inline float raindrop__dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -625,6 +626,7 @@ RAINDROP_DEF void raindrop_trace(raindrop_ray *out, const float direction[3], co
                                  float one_minus_b2, float n)
 {
     raindrop__optics o = raindrop__refract(one_minus_b2, n);
+    if (!out || !direction || !centre_offset) return;
     raindrop__combine(out->reflect, 2 * o.b2 - 1, direction, 2 * o.ci, centre_offset);
     if (o.total) raindrop__set(out->refract, out->reflect[0], out->reflect[1], out->reflect[2]);
     else raindrop__combine(out->refract, 1 - 2 * o.b2 * o.sd * o.sd, direction, -2 * o.sd * o.cd, centre_offset);
@@ -740,7 +742,10 @@ static inline void raindrop__trace_one(const raindrop_ray_outputs *out, const ra
 
 RAINDROP_DEF void raindrop_trace_n(const raindrop_ray_outputs *out, const raindrop_ray_inputs *in, int count, float n)
 {
-    int at = 0;
+    int at = 0, i;
+    if (!out || !in || !in->one_minus_b2) return;
+    for (i = 0; i < 3; i++)
+        if (!in->direction[i] || !in->centre_offset[i]) return;
     for (; at + RAINDROP__LANES <= count; at += RAINDROP__LANES) raindrop__trace_block(out, in, at, n);
     for (; at < count; at++) raindrop__trace_one(out, in, at, n);
 }
@@ -755,6 +760,7 @@ RAINDROP_DEF void raindrop_trace_order(raindrop_order *out, const float directio
     float re = 1 - 2 * o.b2 * o.sd * o.sd, im = 2 * o.sd * o.cd;
     float turn_re = 2 * o.b2 / (n * n) - 1, turn_im = 2 * o.cr / n, power_s = 1, power_p = 1;
     int i;
+    if (!out || !direction || !centre_offset) return;
     if (k < 0) k = 0;
     for (i = 0; i < k; i++) {
         float next = re * turn_re - o.b2 * im * turn_im;
@@ -775,6 +781,7 @@ RAINDROP_DEF void raindrop_sprite_ray(float direction[3], float centre_offset[3]
                                       float distance)
 {
     double away = (double)distance, scale = 1 / sqrt((away - 1) * (away + 1)), x = (double)s, y = (double)t, rho2 = x * x + y * y, cos2;
+    if (!direction || !centre_offset || !one_minus_b2) return;
     if (rho2 > 1) {
         scale /= sqrt(rho2);
         rho2 = 1;
@@ -813,6 +820,7 @@ RAINDROP_DEF int raindrop_trace_spheroid(raindrop_ray *out, const float directio
                                          float axis_ratio, float n)
 {
     float stretch = 1 / axis_ratio, d2, along, half, ci, q[3], hit[3], normal[3], inner[3], leave[3], unit[3];
+    if (!out || !direction || !centre_offset) return 0;
     /* in the stretched space: ray q + t unit, sphere of radius 1 */
     raindrop__set(unit, direction[0], direction[1] * stretch, direction[2]);
     d2 = raindrop__dot(unit, unit);
@@ -1022,6 +1030,12 @@ static inline void raindrop__map_trilinear(float out[8], const raindrop_map *map
 
 RAINDROP_DEF void raindrop_map_sample(float out[8], const raindrop_map *map, float s, float t, float distance)
 {
+    int i;
+    if (!out) return;
+    if (!map) {
+        for (i = 0; i < 8; i++) out[i] = 0;
+        return;
+    }
     raindrop__map_trilinear(out, map, raindrop__clamp(s, -1, 1), raindrop__clamp(t, -1, 1), raindrop__map_lod(distance * distance));
 }
 #endif
@@ -1237,8 +1251,9 @@ static inline void raindrop__sample(float out[4], const raindrop_environment *en
 RAINDROP_DEF void raindrop_environment_sample(float rgb[3], const raindrop_environment *environment,
                                               const float direction[3], float footprint)
 {
-    float v[4];
-    raindrop__sample(v, environment, direction, footprint);
+    float v[4] = {0, 0, 0, 0};
+    if (!rgb) return;
+    if (environment && direction) raindrop__sample(v, environment, direction, footprint);
     raindrop__set(rgb, v[0], v[1], v[2]);
 }
 
@@ -1251,8 +1266,9 @@ static inline void raindrop__far(float out[4], const raindrop_environment *envir
 
 RAINDROP_DEF void raindrop_environment_far(float rgb[3], const raindrop_environment *environment, const float direction[3])
 {
-    float v[4];
-    raindrop__far(v, environment, direction);
+    float v[4] = {0, 0, 0, 0};
+    if (!rgb) return;
+    if (environment && direction) raindrop__far(v, environment, direction);
     raindrop__set(rgb, v[0], v[1], v[2]);
 }
 
@@ -1392,7 +1408,7 @@ static inline void raindrop__perpendicular(float u[3], float v[3], const float n
     raindrop__set(v, b, sign + n[1] * n[1] * a, -n[1]);
 }
 
-/* Colour of one ray from all its orders up to `orders`; pixel: radius of the drop over the width of the ray. */
+/* Colour of one ray from all its orders up to `orders`; width: radius of the drop over the width of the ray. */
 static inline void raindrop__ray_colour(float rgb[3], const raindrop_environment *environment, const float d[3],
                                         const float p[3], float one_minus_b2, int orders, float width)
 {
@@ -1689,6 +1705,7 @@ RAINDROP_DEF sat_result raindrop_bow_profile(float *rgb, int count)
    Rain
    ------------------------------------------------------------------------------------------------ */
 
+enum { RAINDROP__TURN = 0x2545f491 }; /* from one crossing of the box to the next in the streams of random numbers */
 enum { RAINDROP__CHUNK = 4096 }; /* drops that are culled together; fixes the order of everything, whatever the workers */
 
 /* A drop in the picture. `rows`: first row and row behind the last, packed, of those it may touch. */
@@ -1879,8 +1896,12 @@ RAINDROP_DEF sat_result raindrop_fall(raindrop_drop *drop, const float wind[3], 
     for (i = 0; i < 3; i++) velocity[i] = (double)drop->velocity[i];
     raindrop__step(velocity, way, (double)drop->radius, wind, dt);
     for (i = 0; i < 3; i++) {
+        way[i] += (double)drop->position[i];
+        if (!(fabs(way[i]) < 3e38) || !(fabs(velocity[i]) < 3e38)) return SAT_ERR_ARGUMENT;
+    }
+    for (i = 0; i < 3; i++) {
         drop->velocity[i] = (float)velocity[i];
-        drop->position[i] = (float)((double)drop->position[i] + way[i]);
+        drop->position[i] = (float)way[i];
     }
     return SAT_OK;
 }
@@ -1939,18 +1960,37 @@ static inline float raindrop__wrap(double position, double low, double size)
     return (float)(inside < low + size ? inside : low);
 }
 
-/* Out below: another drop comes in on top, after what is left of the time. */
+/* Seconds after which a drop that crosses the box again and again has forgotten where it began: 64 crossings of the
+   fastest. */
+static inline double raindrop__forgets(const raindrop_rain_options *o, double fastest) { return 64 * (double)o->box_size[1] / fastest; }
+
+/* Out below since `left` seconds: another drop comes in on top, one more for each crossing of the box that the time
+   allows. After many crossings the box is again what it was in the beginning: any size of a volume at any height. */
 static inline void raindrop__reenter(raindrop_drop *drop, double at[3], const raindrop_rain *rain, double below, uint32_t i)
 {
     const raindrop_rain_options *o = &rain->options;
     double size = (double)o->box_size[1], top = (double)o->centre[1] + size / 2, old = -(double)drop->velocity[1];
-    if (!(o->diameter_mm > 0)) {
-        uint32_t stream = rain->step * 512u;
-        raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 1));
-        at[0] = (double)raindrop__place(o, 0, raindrop__hash(o->seed, stream, i));
-        at[2] = (double)raindrop__place(o, 2, raindrop__hash(o->seed, stream + 2, i));
-        if (old > 0) below *= raindrop_terminal_velocity((double)drop->radius * 2e3) / old;
+    double left = old > 0 ? below / old : 0, speed = old;
+    uint32_t stream = rain->step * 512u;
+    int turn;
+    if (o->diameter_mm > 0) {
+        at[1] = top - fmod(below, size);
+        return;
     }
+    if (left > raindrop__forgets(o, o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(o->diameter_max_mm))) {
+        raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 0));
+        below = (double)raindrop__uniform(raindrop__hash(o->seed, stream + 1, i)) * size;
+    } else {
+        for (turn = 0;; turn++, stream += RAINDROP__TURN) {
+            raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 1));
+            speed = -(double)drop->velocity[1];
+            if (!(left * speed >= size) || turn == 255) break;
+            left -= size / speed;
+        }
+        below = speed > 0 ? left * speed : 0;
+    }
+    at[0] = (double)raindrop__place(o, 0, raindrop__hash(o->seed, stream, i));
+    at[2] = (double)raindrop__place(o, 2, raindrop__hash(o->seed, stream + 2, i));
     at[1] = top - fmod(below, size);
 }
 
@@ -2052,7 +2092,7 @@ static inline int raindrop__rain_is_valid(const raindrop_rain_options *o)
     if (o->drops) return o->count >= 0 && o->count <= RAINDROP__MAX_DROPS && sat__threads_are_valid(&o->threads);
 #ifdef RAINDROP_NO_RAIN
     return 0;
-#endif
+#else
     if (!(o->rate_mm_h >= 0.01 && o->rate_mm_h <= 500) || o->count < 0 || o->count > RAINDROP__MAX_DROPS) return 0;
     if (!(o->diameter_mm == 0 || (o->diameter_mm >= 0.001 && o->diameter_mm <= 6))) return 0;
     if (!(o->diameter_min_mm >= 0.001 && o->diameter_min_mm < o->diameter_max_mm && o->diameter_max_mm <= 6)) return 0;
@@ -2060,14 +2100,24 @@ static inline int raindrop__rain_is_valid(const raindrop_rain_options *o)
         if (!sat__is_finite(o->box_size[axis]) || !(o->box_size[axis] > 0)) return 0;
     if (!raindrop__finite3(o->centre) || !raindrop__finite3(o->wind) || !sat__is_finite(o->speed) || o->speed < 0) return 0;
     return sat__threads_are_valid(&o->threads);
+#endif
 }
 
-/* The rate's number of drops in the box: the integral of N(D). */
+/* Drops in the box, so that their volumes times their speeds make the rate asked for. The sizes are Marshall-Palmer's;
+   their own number with today's speeds would carry 11 (at 5 mm/h) to 14 % (at 1) more than the rate they are named after. */
 static inline double raindrop__expected_count(const raindrop_rain_options *o)
 {
-    double lambda = raindrop__lambda(o->rate_mm_h);
-    double density = 8000 / lambda * (exp(-lambda * o->diameter_min_mm) - exp(-lambda * o->diameter_max_mm));
-    return density * (double)o->box_size[0] * (double)o->box_size[1] * (double)o->box_size[2];
+    enum { STEPS = 256 };
+    double lambda = raindrop__lambda(o->rate_mm_h), span = o->diameter_max_mm - o->diameter_min_mm, drops = 0, water = 0;
+    double rate = o->rate_mm_h * (1e-3 / 3600), volume = (double)o->box_size[0] * (double)o->box_size[1] * (double)o->box_size[2];
+    int i;
+    for (i = 0; i < STEPS; i++) {
+        double d = o->diameter_mm > 0 ? o->diameter_mm : o->diameter_min_mm + span * (i + 0.5) / STEPS;
+        double share = o->diameter_mm > 0 ? 1 : exp(-lambda * (d - o->diameter_min_mm));
+        drops += share;
+        water += share * RAINDROP__PI / 6 * d * d * d * 1e-9 * (o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(d));
+    }
+    return rate * volume * drops / water;
 }
 
 /* Lays the object and its arrays out; called once to measure and once on the block. */
@@ -2172,6 +2222,7 @@ RAINDROP_DEF raindrop_camera raindrop_camera_look(const float position[3], const
 {
     raindrop_camera camera = raindrop_camera_defaults();
     float side[3], along;
+    if (!position || !target || !up) return camera;
     raindrop__set(camera.position, position[0], position[1], position[2]);
     raindrop__combine(camera.back, 1, position, -1, target);
     raindrop__normalise(camera.back);
@@ -2846,9 +2897,9 @@ static inline void raindrop__draw_far_soft(raindrop__batch *batch, const raindro
 /* Area that discs of radii r and c share, their centres `apart`: how much of a lens sees the drop. */
 static inline float raindrop__lens(float r, float c, float apart)
 {
-    float small = r < c ? r : c, x, y, k;
+    float less = r < c ? r : c, x, y, k;
     if (apart >= r + c) return 0;
-    if (apart <= fabsf(r - c)) return (float)RAINDROP__PI * small * small;
+    if (apart <= fabsf(r - c)) return (float)RAINDROP__PI * less * less;
     x = raindrop__clamp((apart * apart + r * r - c * c) / (2 * apart * r), -1, 1);
     y = raindrop__clamp((apart * apart + c * c - r * r) / (2 * apart * c), -1, 1);
     k = (r + c - apart) * (apart + r - c) * (apart - r + c) * (apart + r + c);
@@ -3639,6 +3690,7 @@ static const char raindrop__glsl_advance[] =
     "uniform vec4 step_and;\n"   /* dt, settled, own drops, published speed */
     "uniform vec2 fastest;\n"    /* terminal velocity of the largest, oblate */
     "uniform uint seed, stream;\n"
+    "const uint TURN = 0x2545f491u;\n" /* RAINDROP__TURN */
     "out vec4 next_drop, next_motion;\n"
     "uint mix_bits(uint v) {\n"
     "    v = (v ^ (v >> 16)) * 0x7feb352du;\n"
@@ -3647,12 +3699,12 @@ static const char raindrop__glsl_advance[] =
     "}\n"
     "uint hash(uint s, uint i) { return mix_bits(i ^ mix_bits(s ^ mix_bits(seed ^ 0x9e3779b9u))); }\n"
     "float uniform_of(uint bits) { return (float(bits >> 9) + 0.5) / 8388608.0; }\n"
-    "float diameter(uint i) {\n"
+    "float diameter(uint stream, uint i, bool at_plane) {\n"
     "    float span = sizes.z - sizes.y, all = 1.0 - exp(-sizes.x * span), d = sizes.y;\n"
     "    for (uint attempt = 0u; attempt < 256u; attempt++) {\n"
     "        uint bits = hash(stream + 16u + attempt, i);\n"
     "        d = sizes.y - log_1p(-uniform_of(bits) * all) / sizes.x;\n"
-    "        if (step_and.w > 0.0 || uniform_of(mix_bits(bits)) * fastest.x < terminal(d)) break;\n"
+    "        if (!at_plane || step_and.w > 0.0 || uniform_of(mix_bits(bits)) * fastest.x < terminal(d)) break;\n"
     "    }\n"
     "    return d;\n"
     "}\n"
@@ -3667,13 +3719,25 @@ static const char raindrop__glsl_advance[] =
     "        bool leaves = way.y < 0.0 && below > 0.0;\n"
     "        if (leaves && sizes.w <= 0.0) {\n"
     "            uint i = uint(gl_VertexID);\n"
-    "            float mm = diameter(i), vt = terminal(mm);\n"
-    "            if (velocity.y < 0.0) below *= vt / -velocity.y;\n"
+    "            uint s = stream;\n"
+    "            float mm, speed, left = velocity.y < 0.0 ? below / -velocity.y : 0.0;\n"
+    "            if (left > 64.0 * box.y / (step_and.w > 0.0 ? step_and.w : fastest.x)) {\n" /* raindrop__forgets */
+    "                mm = diameter(s, i, false);\n"
+    "                below = uniform_of(hash(s + 1u, i)) * box.y;\n"
+    "            } else {\n"
+    "                for (int turn = 0; turn < 256; turn++, s += TURN) {\n"
+    "                    mm = diameter(s, i, true);\n"
+    "                    speed = (step_and.w > 0.0 ? step_and.w : terminal(mm)) - wind.y;\n"
+    "                    if (!(left * speed >= box.y) || turn == 255) break;\n"
+    "                    left -= box.y / speed;\n"
+    "                }\n"
+    "                below = max(left * speed, 0.0);\n"
+    "            }\n"
     "            radius = 0.5e-3 * mm;\n"
     "            ratio = fastest.y > 0.5 ? oblateness(mm) : 1.0;\n"
-    "            velocity = wind - vec3(0.0, step_and.w > 0.0 ? step_and.w : vt, 0.0);\n"
-    "            at.x = centre.x + (uniform_of(hash(stream, i)) - 0.5) * box.x;\n"
-    "            at.z = centre.z + (uniform_of(hash(stream + 2u, i)) - 0.5) * box.z;\n"
+    "            velocity = wind - vec3(0.0, step_and.w > 0.0 ? step_and.w : terminal(mm), 0.0);\n"
+    "            at.x = centre.x + (uniform_of(hash(s, i)) - 0.5) * box.x;\n"
+    "            at.z = centre.z + (uniform_of(hash(s + 2u, i)) - 0.5) * box.z;\n"
     "        }\n"
     "        if (leaves) at.y = low.y + box.y - mod(below, box.y);\n"
     "        vec3 turns = floor((at - low) / box);\n"
