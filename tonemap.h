@@ -16,7 +16,7 @@
 
    WHAT IT DOES
 
-     photographic   Reinhard 2002 as in Slomp 2012, appendix A: the log-average luminance becomes the key (eq A.1, A.2), and
+     photographic   Reinhard 2002 as in Slomp 2012, appendix A: the metered luminance becomes the key (eq A.1, A.2), and
                     each pixel is compressed by the mean of the largest even neighbourhood around it (eq A.4 to A.9) or by
                     itself (eq A.3). Optional: burn-out above a white; key and white estimated (Reinhard 2003)
      mesopic        reds fade in dim light, by the whole picture or by each neighbourhood (eq A.10 to A.14)
@@ -24,7 +24,9 @@
      colours        those beyond the display come back along their hue, dimmed and faded (gamut); nothing turns cyan
      leaving out    searches that cannot change what is seen (tolerance_codes), with a proven bound; searches away from
                     edges (selective; Michael 2010, section 4.4), without one
-     adaptation     log-average, key, white and range approach those of the picture with a time constant in seconds
+     metering       as a camera: between percentiles, in steps, within limits; or eq A.1's log-average; or a fixed exposure
+     adaptation     the metered light, key, white and range approach those of the picture with a time constant in seconds,
+                    one for brighter and one for darker; what wavers by less than 1/64 octave moves nothing
 
    WHAT IT DOES NOT
 
@@ -54,10 +56,12 @@
      Against OpenGL at most 1 code differs, in 2 % of codes (on a software renderer). 8-bit codes are at most one from the
      rounded value, and that in 2 % of cases, within 0.1 of a step.
      Luminances below 2^-100 are black, those above 2^100 count as 2^100. NaN and negative luminances count as 0, infinity
-     is white; none of them enters the log-average, and none changes a pixel outside the 41 x 41 around it. A pixel of
+     is white; none of them enters the log-average, and none changes a pixel outside the 41 x 41 around it (1e30 does not
+     either, but where the meter is within a hair of a step). A pixel of
      NaN or negative luminance (ringing beside lamps) shows the mean of what the usable ones around it show, up to 3
      pixels away. A negative component of a positive luminance is kept until the display cuts it. Output lies in [0, 1] for any input bits.
-     Black pictures stay black and leave the adaptation alone; constant ones get the key.
+     Black pictures stay black and leave the adaptation alone; constant ones get the key (to half of the meter's step of
+     1/64 octave).
      Deviations from the sources: eq A.1 averages positive luminances only and has no delta, which would depend on the unit;
      s in eq A.5 is the length in pixels; eq A.7 takes the centre of the first step that fails; the Lab of eq A.12 has the
      pixel's own luminance as white, so that the filter does not depend on exposure; Ashikhmin's range is between the
@@ -130,16 +134,16 @@ typedef enum tonemap_mesopic {
     TONEMAP_MESOPIC_LOCAL    /* the level around each pixel: a red lamp in the night stays red */
 } tonemap_mesopic;
 
-/* Which log-average becomes the key. */
+/* Which luminance becomes the key. */
 typedef enum tonemap_metering {
-    TONEMAP_METERING_LOG_AVERAGE, /* of every positive luminance, eq A.1 */
-    TONEMAP_METERING_PERCENTILES  /* between meter_low and meter_high; what is 10 to 14 octaves below the bright end counts
+    TONEMAP_METERING_PERCENTILES, /* between meter_low and meter_high; what is 18 to 24 octaves below the bright end counts
                                      less and less; in steps of 1/64 octave: a bad texel, a lamp or residue moves nothing */
+    TONEMAP_METERING_LOG_AVERAGE  /* of every positive luminance, eq A.1 */
 } tonemap_metering;
 
 typedef struct tonemap_options {
     tonemap_operator operation; /* TONEMAP_PHOTOGRAPHIC_LOCAL */
-    double key;                 /* 0.18; -1e6..10; the display value of the log-average luminance before compression;
+    double key;                 /* 0.18; -1e6..10; the display value of the metered luminance before compression;
                                    <= 0: estimated from the log-average's place between dark and bright (Reinhard 2003) */
     double white;               /* INFINITY; 0..1e12 or infinity (no burn-out); the smallest luminance shown as white, in
                                    units in which the log-average is the key; 0: estimated, at least 1 */
@@ -150,7 +154,7 @@ typedef struct tonemap_options {
                                    epsilon; 0: the paper's hard choice, which flickers (and the default with TONEMAP_NO_SOFT) */
     double gamut;               /* 0.5; 0..1 or negative; how colours beyond the display come back: 0 keeps their luminance
                                    and fades them, 1 dims them and keeps their saturation; negative: each channel is clipped */
-    tonemap_metering metering;  /* TONEMAP_METERING_LOG_AVERAGE */
+    tonemap_metering metering;  /* TONEMAP_METERING_PERCENTILES */
     double meter_low;           /* 0.02; 0..0.5; share of the darkest that percentile metering leaves out */
     double meter_high;          /* 0.98; 0.5..1; where it stops */
     tonemap_mesopic mesopic;    /* TONEMAP_MESOPIC_OFF */
@@ -161,6 +165,11 @@ typedef struct tonemap_options {
     double selective;           /* 0; 0..1e30; 0: off; else only pixels whose Sobel gradient of the scaled luminance
                                    exceeds this are searched (Michael 2010, section 4.4) */
     double adapt_seconds;       /* 0; 0..1e30; time constant of the eye's adaptation; 0: each picture for itself */
+    double darker_seconds;      /* 0; 0..1e30; the same while it grows darker; 0: as adapt_seconds */
+    double adapt_low;           /* 0; 0..1e30; the metered luminance counts as at least this: nights stay dark */
+    double adapt_high;          /* INFINITY; 1e-30..1e30 or infinity; and as at most this, or as adapt_low if that is more */
+    double exposure;            /* 0; 0..1e30; 0: metered; else the key is at the luminance key / exposure, at once: what a
+                                   camera model gives, as 1 / (1.2 exp2(EV100)) for luminances in cd/m2 */
     sat_allocator allocator;    /* malloc; used by create and destroy only */
     sat_threads threads;        /* serial; same bits for any worker count */
 } tonemap_options;
@@ -171,7 +180,7 @@ TONEMAP_DEF tonemap_options tonemap_defaults(void);
 typedef struct tonemap_stats {
     double log_average, mean;      /* of the positive luminances; of all; measured */
     double low, high;              /* 1 % and 99 % quantiles of the positive luminances */
-    double adapted, key, white;    /* log-average, key and white that were used, after adaptation */
+    double adapted, key, white;    /* metered luminance, key and white that were used, after adaptation */
     size_t positive;               /* pixels with a finite luminance > 0: those that log_average, low and high are of */
     size_t nan, infinite, negative; /* pixels that are no measurement: nan and negative show their neighbours */
     size_t clamped;                /* pixels with a display component above 1 */
@@ -227,9 +236,9 @@ extern "C" {
 
 /* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL state
    as it was (but for pending errors, which are lost). Nothing waits for the GPU: the log-average and the adaptation stay
-   there. All options but threads and tolerance_codes work; metering by percentiles, an estimated key or white, and
-   Ashikhmin's range take a
-   histogram that draws one point a pixel (on ES they need EXT_float_blend). */
+   there. All options but threads and tolerance_codes work. Metering by percentiles (the default), an estimated key or
+   white, and Ashikhmin's range take a histogram that draws one point a pixel, and on ES EXT_float_blend;
+   TONEMAP_METERING_LOG_AVERAGE does without. */
 typedef struct tonemap_gl tonemap_gl;
 
 /* On an OpenGL error *out only answers tonemap_gl_message, and is to be destroyed; on the others it is NULL. */
@@ -343,7 +352,7 @@ static const sat__field tonemap__fields[] = {
     SAT__FIELD(tonemap_options, 'i', scales, 8, 1, 8, ' '),
     SAT__FIELD(tonemap_options, 'd', soft, 1, 0, 1, ' '),
     SAT__FIELD(tonemap_options, 'd', gamut, 0.5, 0, 1, '-'),
-    SAT__FIELD(tonemap_options, 'i', metering, 0, 0, TONEMAP_METERING_PERCENTILES, ' '),
+    SAT__FIELD(tonemap_options, 'i', metering, 0, 0, TONEMAP_METERING_LOG_AVERAGE, ' '),
     SAT__FIELD(tonemap_options, 'd', meter_low, 0.02, 0, 0.5, ' '),
     SAT__FIELD(tonemap_options, 'd', meter_high, 0.98, 0.5, 1, ' '),
     SAT__FIELD(tonemap_options, 'i', mesopic, 0, 0, TONEMAP_MESOPIC_LOCAL, ' '),
@@ -352,6 +361,10 @@ static const sat__field tonemap__fields[] = {
     SAT__FIELD(tonemap_options, 'd', tolerance_codes, 0, 0, 255, ' '),
     SAT__FIELD(tonemap_options, 'd', selective, 0, 0, 1e30, ' '),
     SAT__FIELD(tonemap_options, 'd', adapt_seconds, 0, 0, 1e30, ' '),
+    SAT__FIELD(tonemap_options, 'd', darker_seconds, 0, 0, 1e30, ' '),
+    SAT__FIELD(tonemap_options, 'd', adapt_low, 0, 0, 1e30, ' '),
+    SAT__FIELD(tonemap_options, 'd', adapt_high, (double)INFINITY, 1e-30, 1e30, 'I'),
+    SAT__FIELD(tonemap_options, 'd', exposure, 0, 0, 1e30, ' '),
     SAT__FIELD(tonemap_options, 'a', allocator, 0, 0, 0, ' '),
     SAT__FIELD(tonemap_options, 't', threads, 0, 0, 0, ' '),
 };
@@ -424,7 +437,7 @@ typedef struct tonemap__worker {
 } tonemap__worker;
 
 /* What adapts over time, all as base-2 logarithms. */
-enum { TONEMAP__AVERAGE, TONEMAP__KEY, TONEMAP__WHITE, TONEMAP__LOW, TONEMAP__HIGH, TONEMAP__STATES };
+enum { TONEMAP__AVERAGE, TONEMAP__KEY, TONEMAP__WHITE, TONEMAP__LOW, TONEMAP__HIGH, TONEMAP__STATES, TONEMAP__HELD = TONEMAP__STATES };
 
 /* The numbers of one picture that every pixel needs. */
 typedef struct tonemap__frame {
@@ -448,6 +461,7 @@ struct tonemap {
     size_t block_size;
     int width, height, row, ring_row, workers, tiles_x, tiles_y, started, skipping;
     unsigned known;         /* bit i: state[i] was measured, not only set */
+    double held;            /* what percentile metering said, until it moves by more than a step; see tonemap__metered */
     float *luminance;       /* the picture, rows `row` floats apart */
     float *row_sum;         /* of each row */
     unsigned char *row_unusable; /* some pixel of the row shows its neighbours */
@@ -759,21 +773,21 @@ static inline double tonemap__log_average(int64_t log_sum, size_t positive)
 }
 
 /* Percentile metering: how far the mean between the percentiles is from that of all, in bins of the histogram, so that
-   a flat picture has exactly its log-average; then rounded to 1/64 octave. */
+   a flat picture has exactly its log-average. */
 static inline double tonemap__metered(const uint32_t *histogram, size_t positive, double average, const tonemap_options *o)
 {
     double top = tonemap__quantile(histogram, positive, 0.99), all = 0, whole = 0, inner = 0, sum = 0, seen = 0, octave[16], low, high;
     int bin, i;
     for (i = 0; i < 16; i++) octave[i] = log2(1 + (i + 0.5) / 16);
     for (bin = 0; bin < TONEMAP__BINS; bin++) {
-        double v = bin / 16 - 100 + octave[bin % 16], w = (v - (top - 14)) / 4;
+        double v = bin / 16 - 100 + octave[bin % 16], w = (v - (top - 24)) / 6;
         whole += (double)histogram[bin] * v;
         all += (double)histogram[bin] * (w < 0 ? 0 : w > 1 ? 1 : w);
     }
     low = o->meter_low * all;
     high = o->meter_high * all;
     for (bin = 0; bin < TONEMAP__BINS; bin++) {
-        double v = bin / 16 - 100 + octave[bin % 16], w = (v - (top - 14)) / 4, next = seen + (double)histogram[bin] * (w < 0 ? 0 : w > 1 ? 1 : w);
+        double v = bin / 16 - 100 + octave[bin % 16], w = (v - (top - 24)) / 6, next = seen + (double)histogram[bin] * (w < 0 ? 0 : w > 1 ? 1 : w);
         double n = (next < high ? next : high) - (seen > low ? seen : low);
         if (n > 0) {
             inner += n;
@@ -782,7 +796,23 @@ static inline double tonemap__metered(const uint32_t *histogram, size_t positive
         seen = next;
     }
     if (inner > 0) average += sum / inner - whole / (double)positive;
-    return floor(average * 64 + 0.5) / 64;
+    return average;
+}
+
+/* In steps of 1/64 octave; while the eye adapts, what was held stays until the new value is more than a step away. */
+static inline double tonemap__hold(tonemap *map, double average)
+{
+    int holds = map->options.adapt_seconds > 0 && map->started && map->known & 1u << TONEMAP__HELD;
+    if (!holds || fabs(average - map->held) > 1 / 64.0) map->held = floor(average * 64 + 0.5) / 64;
+    return map->held;
+}
+
+/* Limits of adaptation, as log2. */
+static inline double tonemap__limited(double average, const tonemap_options *o)
+{
+    if (!tonemap__is_infinite(o->adapt_high) && average > log2(o->adapt_high)) average = log2(o->adapt_high);
+    if (o->adapt_low > 0 && average < log2(o->adapt_low)) average = log2(o->adapt_low);
+    return average;
 }
 
 static inline void tonemap__collect(tonemap *map, int64_t *log_sum)
@@ -823,9 +853,9 @@ static inline int tonemap__measured_state(tonemap *map, double *state)
     map->stats.log_average = exp2(average);
     if (o->metering == TONEMAP_METERING_PERCENTILES) {
         if (map->started && map->stats.positive * 1000 < (size_t)map->width * (size_t)map->height) return 0; /* as good as black */
-        average = tonemap__metered(histogram, map->stats.positive, average, o);
+        average = tonemap__hold(map, tonemap__metered(histogram, map->stats.positive, average, o));
     }
-    state[TONEMAP__AVERAGE] = average;
+    state[TONEMAP__AVERAGE] = average = tonemap__limited(average, o);
     state[TONEMAP__KEY] = o->key > 0 ? log2(o->key) : tonemap__estimated_key(average, low, high);
     state[TONEMAP__WHITE] = o->white > 0 ? 0 : tonemap__estimated_white(low, high);
     state[TONEMAP__LOW] = ashikhmin ? tonemap__quantile(histogram, map->stats.positive, 0.0005) : 0;
@@ -835,13 +865,21 @@ static inline int tonemap__measured_state(tonemap *map, double *state)
     return 1;
 }
 
+/* Share of the way that the state goes in a time; all of it without adaptation. */
+static inline double tonemap__share(const tonemap_options *o, int darker, double dt_seconds)
+{
+    double tau = darker && o->darker_seconds > 0 ? o->darker_seconds : o->adapt_seconds;
+    return o->adapt_seconds > 0 ? -expm1(-dt_seconds / tau) : 1;
+}
+
 /* Exponential approach with a time constant, exact for any step: two steps of dt / 2 are one of dt. */
 static inline void tonemap__adapt(tonemap *map, const double *measured, double dt_seconds)
 {
     const tonemap_options *o = &map->options;
-    double tau = o->adapt_seconds, weight = tau > 0 ? -expm1(-dt_seconds / tau) : 1;
+    double weight = tonemap__share(o, measured[TONEMAP__AVERAGE] < map->state[TONEMAP__AVERAGE], dt_seconds);
     unsigned used = 1u << TONEMAP__AVERAGE | 1u << TONEMAP__KEY;
     int i;
+    if (o->metering == TONEMAP_METERING_PERCENTILES) used |= 1u << TONEMAP__HELD;
     if (!(o->white > 0)) used |= 1u << TONEMAP__WHITE;
     if (tonemap__is_ashikhmin(o)) used |= 1u << TONEMAP__LOW | 1u << TONEMAP__HIGH;
     for (i = 0; i < TONEMAP__STATES; i++) {
@@ -911,9 +949,11 @@ static inline void tonemap__prepare_frame(tonemap *map)
     tonemap__frame *f = &map->frame;
     double average = map->started ? map->state[TONEMAP__AVERAGE] : 0, key = map->started ? exp2(map->state[TONEMAP__KEY]) : 0.18;
     double white = o->white > 0 ? o->white : exp2(map->state[TONEMAP__WHITE]);
-    double cd = o->cd_per_unit > 0 ? o->cd_per_unit : 10 / exp2(average);
+    double cd;
     memset(f, 0, sizeof *f);
-    f->scale = (float)(key * exp2(-average));
+    if (o->exposure > 0) average = log2(key / o->exposure);
+    cd = o->cd_per_unit > 0 ? o->cd_per_unit : 10 / exp2(average);
+    f->scale = (float)(o->exposure > 0 ? o->exposure : key * exp2(-average));
     f->cap = TONEMAP__LOCAL_CAP;
     f->quantum = TONEMAP__QUANTUM;
     f->inverse_white2 = !TONEMAP__HAS_WHITE || tonemap__is_infinite(white) ? 0 : (float)(1 / (white * white));
@@ -2475,12 +2515,12 @@ static const char tonemap__glsl_count[] =
     "out float value;\n"
     "void main() { value = 1.0; }\n";
 
-/* The state, two texels: log2 of average, key and white, and 1; log2 of low and high, the mean, 0. An empty picture
-   keeps the old one. */
+/* The state, two texels: log2 of average, key and white, and 1; log2 of low and high, the mean, and what the meter holds.
+   An empty picture keeps the old one. */
 static const char tonemap__glsl_state[] =
     "uniform highp isampler2D sums;\n"
     "uniform sampler2D old, histogram;\n"
-    "uniform float weight, key, white, pixels;\n" /* key and white as log2, or NaN bits: estimated */
+    "uniform float weight, weight_darker, key, white, pixels, exposure, lowest, highest, dead_band;\n" /* key and white as log2, or NaN bits: estimated */
     "out vec4 value;\n"
     "float tonemap_quantile(float share, float positive) {\n"
     "    float wanted = share * positive, seen = 0.0;\n"
@@ -2499,32 +2539,36 @@ static const char tonemap__glsl_state[] =
     "    for (int bin = 0; bin < TONEMAP_BINS; bin++) {\n"
     "        float n = tonemap_count(bin), v = tonemap_value(bin) - top;\n"
     "        whole += n * v;\n"
-    "        all += n * clamp((v + 14.0) / 4.0, 0.0, 1.0);\n"
+    "        all += n * clamp((v + 24.0) / 6.0, 0.0, 1.0);\n"
     "    }\n"
     "    for (int bin = 0; bin < TONEMAP_BINS; bin++) {\n"
-    "        float v = tonemap_value(bin) - top, next = seen + tonemap_count(bin) * clamp((v + 14.0) / 4.0, 0.0, 1.0);\n"
+    "        float v = tonemap_value(bin) - top, next = seen + tonemap_count(bin) * clamp((v + 24.0) / 6.0, 0.0, 1.0);\n"
     "        float n = max(min(next, TONEMAP_METER_HIGH * all) - max(seen, TONEMAP_METER_LOW * all), 0.0);\n"
     "        inner += n;\n"
     "        sum += n * v;\n"
     "        seen = next;\n"
     "    }\n"
     "    if (inner > 0.0) average += sum / inner - whole / positive;\n"
-    "    return floor(average * 64.0 + 0.5) / 64.0;\n"
+    "    return average;\n"
     "}\n"
     "void main() {\n"
     "    ivec4 sum = texelFetch(sums, ivec2(0), 0);\n"
     "    vec4 first = texelFetch(old, ivec2(0), 0), second = texelFetch(old, ivec2(1, 0), 0);\n"
     "    bool lit = sum.z > 0;\n"
-    "#if TONEMAP_METERING == 1\n"
+    "#if TONEMAP_METERING == 0\n"
     "    lit = lit && (first.w <= 0.0 || float(sum.z) * 1000.0 >= pixels);\n"
     "#endif\n"
     "    if (lit) {\n"
     "        int whole = sum.x / sum.z;\n"
     "        float positive = float(sum.z), average = float(whole) + (float(sum.x - whole * sum.z) + float(sum.y) / 65536.0) / positive;\n"
     "        vec4 range = vec4(0.0);\n"
-    "#if TONEMAP_METERING == 1\n"
+    "#if TONEMAP_METERING == 0\n"
     "        average = tonemap_metered(average, positive);\n"
+    "        if (first.w <= 0.0 || abs(average - second.w) > dead_band) second.w = floor(average * 64.0 + 0.5) / 64.0;\n"
+    "        average = second.w;\n"
     "#endif\n"
+    "        average = max(min(average, highest), lowest);\n"
+    "        range.w = second.w;\n"
     "        vec4 now = vec4(average, key, white, 1.0);\n"
     "#if TONEMAP_HISTOGRAM\n"
     "        float low = tonemap_quantile(0.01, positive), high = tonemap_quantile(0.99, positive);\n"
@@ -2533,11 +2577,12 @@ static const char tonemap__glsl_state[] =
     "        if (TONEMAP_HISTOGRAM % 8 / 4 == 1) now.z = max(log2(1.5) + high - low - 5.0, 0.0);\n"
     "        range.xy = vec2(tonemap_quantile(0.0005, positive), tonemap_quantile(0.9995, positive));\n"
     "#endif\n"
-    "        float share = first.w > 0.0 ? weight : 1.0;\n"
+    "        float share = first.w > 0.0 ? average < first.x ? weight_darker : weight : 1.0;\n"
     "        first = share < 1.0 ? mix(first, now, share) : now;\n"
     "        second = share < 1.0 ? mix(second, range, share) : range;\n"
     "        first.w = 1.0;\n"
     "    }\n"
+    "    if (exposure > 0.0) first.x = first.y - log2(exposure);\n"
     "    second.z = intBitsToFloat(sum.w) / pixels;\n"
     "    value = gl_FragCoord.x < 1.0 ? first : second;\n"
     "}\n";
@@ -2884,14 +2929,18 @@ static inline void tonemap__gl_adapt(tonemap_gl *g, double dt_seconds)
 {
     sat__gl *gl = &g->gl;
     const tonemap_options *o = &g->options;
-    double weight = o->adapt_seconds > 0 ? -expm1(-dt_seconds / o->adapt_seconds) : 1;
     unsigned program = g->state_program;
     g->current = !g->current;
     sat__gl_pass(gl, program, g->state_target[g->current], 2, 1);
     sat__gl_set_texture(gl, program, "sums", 0, g->level[g->levels - 1]);
     sat__gl_set_texture(gl, program, "old", 1, g->state[!g->current]);
     sat__gl_set_texture(gl, program, "histogram", 2, g->bins);
-    sat__gl_set_float(gl, program, "weight", (float)weight);
+    sat__gl_set_float(gl, program, "weight", (float)tonemap__share(o, 0, dt_seconds));
+    sat__gl_set_float(gl, program, "weight_darker", (float)tonemap__share(o, 1, dt_seconds));
+    sat__gl_set_float(gl, program, "exposure", (float)o->exposure);
+    sat__gl_set_float(gl, program, "lowest", (float)tonemap__limited(-200, o));
+    sat__gl_set_float(gl, program, "highest", (float)tonemap__limited(200, o));
+    sat__gl_set_float(gl, program, "dead_band", o->adapt_seconds > 0 ? 1 / 64.0f : -1.0f);
     sat__gl_set_float(gl, program, "key", o->key > 0 ? (float)log2(o->key) : 0);
     sat__gl_set_float(gl, program, "white", o->white > 0 && !tonemap__is_infinite(o->white) ? (float)log2(o->white) : 0);
     sat__gl_set_float(gl, program, "pixels", (float)((double)g->width * g->height));

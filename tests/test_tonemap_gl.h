@@ -125,8 +125,12 @@ TEST(gl_gives_the_cpus_picture)
     compare(&s, &o, 100, 90, 0, 0.001, "estimated key and white");
     o = tonemap_defaults(), o.soft = 0.8;
     compare(&s, &o, 100, 90, 0, 0, "soft scales");
-    o = tonemap_defaults(), o.metering = TONEMAP_METERING_PERCENTILES;
-    compare(&s, &o, 100, 90, 1, 0.001, "percentile metering");
+    o = tonemap_defaults(), o.metering = TONEMAP_METERING_LOG_AVERAGE;
+    compare(&s, &o, 100, 90, 1, 0.001, "metering by the log-average");
+    o = tonemap_defaults(), o.exposure = 0.3;
+    compare(&s, &o, 100, 90, 0, 0.001, "fixed exposure");
+    o = tonemap_defaults(), o.adapt_high = 0.01;
+    compare(&s, &o, 100, 90, 0, 0.001, "limits of adaptation");
     o = tonemap_defaults(), o.selective = 0.1;
     compare(&s, &o, 100, 90, 0, 0.001, "selective");
     o = tonemap_defaults(), o.mesopic = TONEMAP_MESOPIC_LOCAL, o.cd_per_unit = 2;
@@ -298,7 +302,7 @@ TEST(gl_state_comes_back)
 TEST(gl_adapts_as_the_cpu_does)
 {
     enum { W = 24, H = 18 };
-    const double dt[5] = {0, 0.1, 0.3, 0, 2}, light[5] = {1, 100, 100, 0, 0.1};
+    const double dt[6] = {0, 0.1, 0.3, 0, 2, 1}, light[6] = {1, 100, 100, 0, 0.1, 0.1005};
     screen s;
     float *pixels = lit_pixels(W, H, 0), *scaled = (float *)malloc(W * H * 16);
     unsigned char cpu[W * H * 4], gpu[W * H * 4];
@@ -309,11 +313,12 @@ TEST(gl_adapts_as_the_cpu_does)
     unsigned hdr;
     int i, k, worst = 0;
     o.adapt_seconds = 0.5;
+    o.darker_seconds = 1.5;
     if (!screen_open(&s)) { free(pixels); free(scaled); return; }
     hdr = screen_texture(&s, SAT__GL_RGBA32F, W, H, pixels);
     EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
     EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
-    for (k = 0; k < 5; ++k) {
+    for (k = 0; k < 6; ++k) {
         sat__gl_state state;
         for (i = 0; i < W * H * 4; ++i) scaled[i] = (float)((double)pixels[i] * light[k]);
         sat__gl_begin(&s.gl, &state, 1);
