@@ -339,6 +339,62 @@ TEST(gl_adapts_as_the_cpu_does)
     free(scaled);
 }
 
+/* What is a uniform changes between two pictures, as on the CPU; what is compiled is refused and changes nothing. */
+TEST(gl_options_change_between_pictures)
+{
+    enum { W = 40, H = 30 };
+    screen s;
+    float *pixels = lit_pixels(W, H, 0);
+    unsigned char cpu[W * H * 4], gpu[W * H * 4];
+    sat_image view = sat_image_f32(pixels, W, H, 4);
+    tonemap_options o = tonemap_defaults(), other;
+    tonemap *map = NULL;
+    tonemap_gl *gl = NULL;
+    unsigned hdr;
+    int i, k, worst = 0;
+    EXPECT_EQ(tonemap_gl_set_options(NULL, &o), SAT_ERR_ARGUMENT);
+    if (!screen_open(&s)) { free(pixels); return; }
+    hdr = screen_texture(&s, SAT__GL_RGBA32F, W, H, pixels);
+    o.white = 5;
+    o.adapt_seconds = 1;
+    EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
+    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
+    EXPECT_EQ(tonemap_gl_set_options(gl, NULL), SAT_ERR_ARGUMENT); /* the default's white is infinite */
+    for (k = 0; k < 9; ++k) {
+        other = o;
+        if (k == 0) other.operation = TONEMAP_LINEAR;
+        if (k == 1) other.scales = 3;
+        if (k == 2) other.phi = 2;
+        if (k == 3) other.epsilon = 1;
+        if (k == 4) other.soft = 0.5;
+        if (k == 5) other.gamut = 1;
+        if (k == 6) other.metering = TONEMAP_METERING_LOG_AVERAGE;
+        if (k == 7) other.key = 0;
+        if (k == 8) other.adapt_seconds = -1;
+        EXPECT_EQ(tonemap_gl_set_options(gl, &other), SAT_ERR_ARGUMENT);
+    }
+    for (k = 0; k < 6; ++k) {
+        if (k == 1) o.key = 0.4;
+        if (k == 2) o.white = 2;
+        if (k == 3) o.exposure = 0.1;
+        if (k == 4) o.exposure = 0, o.adapt_high = 0.02;
+        if (k == 5) o.darker_seconds = 0.3;
+        EXPECT_EQ(tonemap_set_options(map, &o), SAT_OK);
+        EXPECT_EQ(tonemap_gl_set_options(gl, &o), SAT_OK);
+        EXPECT_EQ(tonemap_apply_u8(map, cpu, W * 4, &view, 0.2, NULL), SAT_OK);
+        EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, 0.2), SAT_OK);
+        screen_read(&s, gpu, tonemap_gl_texture(gl), W, H);
+        for (i = 0; i < W * H * 4; ++i)
+            if (i % 4 != 3 && abs((int)cpu[i] - (int)gpu[i]) > worst) worst = abs((int)cpu[i] - (int)gpu[i]);
+    }
+    EXPECT(worst <= 1);
+    tonemap_destroy(map);
+    tonemap_gl_destroy(gl);
+    s.gl.DeleteTextures(1, &hdr);
+    screen_close(&s);
+    free(pixels);
+}
+
 static sat_gl_proc no_proc(const char *name)
 {
     (void)name;
