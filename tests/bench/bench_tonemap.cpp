@@ -232,7 +232,8 @@ static void times(scene *still)
     o.mesopic = TONEMAP_MESOPIC_LOCAL, add("local + local mesopic");
     o.mesopic = TONEMAP_MESOPIC_UNIFORM, add("local + uniform mesopic");
     o.key = o.white = 0, add("local, estimated key and white");
-    o.soft = 1, add("local, soft scales");
+    o.soft = 0, add("local, hard scales");
+    o.metering = TONEMAP_METERING_LOG_AVERAGE, add("local, metered by the log-average");
     o.tolerance_codes = 2, add("local, tolerance 2");
     o.selective = 0.1, add("local, selective 0.1");
     o.operation = TONEMAP_ASHIKHMIN, add("Ashikhmin");
