@@ -511,6 +511,42 @@ static inline ref_picture ref_draw(const ref_scene *scene, int width, int height
     return ref_draw_radii(scene, width, height, orthographic, rays, moved, workers, 0.25f);
 }
 
+/* A picture of a scene that a file in build/ keeps from one run to the next: `reading` or writing it; 0 when that fails. */
+static inline int ref_keep(ref_picture *p, const char *path, int reading)
+{
+    FILE *f = fopen(path, reading ? "rb" : "wb");
+    size_t n = (size_t)p->width * (size_t)p->height, done = 0;
+    int r;
+    if (!f) return 0;
+    if (reading) {
+        done += fread(p->z, 4, n, f) + fread(p->normals, 4, 3 * n, f);
+        for (r = 0; r < REF_RADII; r++) done += fread(p->ao[r], 4, n, f) + fread(p->bent[r], 4, 3 * n, f);
+    } else {
+        done += fwrite(p->z, 4, n, f) + fwrite(p->normals, 4, 3 * n, f);
+        for (r = 0; r < REF_RADII; r++) done += fwrite(p->ao[r], 4, n, f) + fwrite(p->bent[r], 4, 3 * n, f);
+    }
+    r = fclose(f) == 0 && done == n * 4 * (1 + REF_RADII);
+    if (!r && !reading) remove(path);
+    return r;
+}
+
+static inline ref_picture ref_draw_kept(int scene, int side, int rays)
+{
+    ref_scene s;
+    ref_picture p;
+    char path[64];
+    snprintf(path, sizeof path, "build/ssao_%d_%d_%d.ref", scene, side, rays);
+    ref_open(&s, scene);
+    p = ref_draw(&s, side, side, 0, 0, ref_make(0, 0, 0), 2);
+    if (!ref_keep(&p, path, 1)) {
+        ref_free(&p);
+        p = ref_draw(&s, side, side, 0, rays, ref_make(0, 0, 0), 2);
+        ref_keep(&p, path, 0);
+    }
+    ref_close(&s);
+    return p;
+}
+
 /* ---- measures, over what is not sky ---- */
 
 static inline double ref_rmse(const ref_picture *p, const float *a, const float *b)

@@ -18,43 +18,10 @@ static float *out, *other;
 
 /* ---- pictures ---- */
 
-static void keep(ref_picture *p, const char *path, int reading)
-{
-    FILE *f = fopen(path, reading ? "rb" : "wb");
-    size_t n = pixels, want = n * 4 * (1 + REF_RADII), done = 0;
-    int r;
-    if (!f) return;
-    if (reading) {
-        done += fread(p->z, 4, n, f) + fread(p->normals, 4, 3 * n, f);
-        for (r = 0; r < REF_RADII; r++) done += fread(p->ao[r], 4, n, f) + fread(p->bent[r], 4, 3 * n, f);
-        p->width = done == want ? side : 0;
-    } else {
-        done += fwrite(p->z, 4, n, f) + fwrite(p->normals, 4, 3 * n, f);
-        for (r = 0; r < REF_RADII; r++) done += fwrite(p->ao[r], 4, n, f) + fwrite(p->bent[r], 4, 3 * n, f);
-    }
-    if (fclose(f) != 0 || (!reading && done != want)) remove(path);
-}
-
 static void draw_pictures(int rays)
 {
     int i;
-    for (i = 0; i < REF_SCENES; i++) {
-        ref_scene s;
-        ref_picture p;
-        char path[64];
-        snprintf(path, sizeof path, "build/ssao_%d_%d_%d.ref", i, side, rays);
-        ref_open(&s, i);
-        p = ref_draw(&s, side, side, 0, 0, ref_make(0, 0, 0), 2);
-        p.width = 0;
-        keep(&p, path, 1);
-        if (!p.width) {
-            ref_free(&p);
-            p = ref_draw(&s, side, side, 0, rays, ref_make(0, 0, 0), 2);
-            keep(&p, path, 0);
-        }
-        ref_close(&s);
-        pictures[i] = p;
-    }
+    for (i = 0; i < REF_SCENES; i++) pictures[i] = ref_draw_kept(i, side, rays);
 }
 
 /* ---- methods ---- */
