@@ -16,10 +16,21 @@
 
    Needs sat.h beside it and -lm. examples/photomosaic.c is the whole use.
 
+   A tracker's gate: a track (row) takes a detection (column), or none (-1) where all are too far or taken:
+
+       float distance[TRACKS][DETECTIONS];
+       int detection_of_track[TRACKS];
+       softassign_problem p = {0};
+       p.rows = TRACKS, p.columns = DETECTIONS;
+       p.cost = &distance[0][0], p.stride = DETECTIONS;
+       p.unassigned_cost = 30;
+       softassign_solve(detection_of_track, &p, NULL, NULL);
+
    WHAT IT DOES
      * the optimum (AUTO, EXACT), or an answer certified to a gap (FAST), from a matrix, a function or features
      * a lower bound with every answer of every method: cost, lower_bound, gap (Slomp 2012, eq 3.2 to 3.5)
      * capacities, forbidden pairs, minimum use, minimum distance of repeats, a bonus for staying (video)
+     * rows left out at a price, the largest instead of the least, the dual prices of the optimum
      * a solver that goes on from its prices, stops at any time and then still has a valid answer
      * the methods of Slomp 2012, chapter 3: greedy, annealing, softassign as published, ants; GPU passes (section 3.7)
      * features of eq 3.1 from pictures, and the drawing of the mosaic
@@ -56,8 +67,8 @@
      Column prices v <= 0 give the bound sum_i min_j (c_ij - v_j) + sum_j v_j. A list holds the columns of smallest
      c_ij - v_j of a row and a limit for all others. Since prices only fall in the path search, the limit stays true, and a
      list that runs out is not lengthened but made anew at the prices of the moment: short lists are enough. Making one
-     costs 16 numbers a column: projections on the main directions bound the distance from below, and 3 to 9 % of the
-     distances are computed. Sparse softassign with inequality columns finds the prices, shortest augmenting paths the
+     costs 16 numbers a column: projections on the main directions bound the distance from below, and the
+     others are never computed (report.distances_computed). Sparse softassign with inequality columns finds the prices, shortest augmenting paths the
      assignment, and columns that were left with a price below 0 are raised back along a reverse path (finish).
      Given matrices, and all problems up to 100 000 cells, go to a dense solver without lists: column reduction (square),
      augmenting row reduction, shortest paths with vector scans; AUTO leaves it for lists where a wide matrix competes.
@@ -150,6 +161,9 @@ typedef struct softassign_problem {
     const int *minimum_use;                /* per column, 0..capacity: so many rows must get it; NULL: 0. AUTO, EXACT and FAST
                                               of softassign_solve */
     const int *previous;                   /* per row, the column of the last frame or -1; NULL: none. See options.switching */
+    int maximise;                          /* 1: the largest total; -infinity forbids a pair, report.lower_bound is an upper one */
+    float unassigned_cost;                 /* > 0: a row may stay without a column (-1) at this price, and never takes a dearer one
+                                              (maximise: at this gain); 0: every row gets a column. These two: as minimum_use */
 } softassign_problem;
 
 /* What a call found out. gap = (cost - lower_bound) / cost holds at any moment: no assignment costs less than lower_bound. */
@@ -181,33 +195,38 @@ typedef struct softassign_report {
 typedef int softassign_progress_fn(const softassign_report *report, const int *column_of_row, void *user);
 
 typedef struct softassign_options {
-    softassign_method method;  /* SOFTASSIGN_AUTO */
-    double gap;                /* 0.001; >= 0: FAST ends when its certified gap is not larger */
-    int capacity_default;      /* 1; 0..: uses of a column where problem.capacity is NULL */
-    int neighbours;            /* 160; 4..256: length of a row's list. 64 is a third faster where few rows want the same
+    softassign_method method;  /* SOFTASSIGN_AUTO; SOFTASSIGN_AUTO..SOFTASSIGN_ANTS */
+    double gap;                /* 0.001; 0..1e300 or infinity; FAST ends when its certified gap is not larger */
+    int capacity_default;      /* 1; 0..2147483647; uses of a column where problem.capacity is NULL */
+    int neighbours;            /* 160; 4..256; length of a row's list. 64 is a third faster where few rows want the same
                                   columns, and five times slower where many do */
-    int certify;               /* 1: GREEDY to ANTS and PUBLISHED buy their bound from the auction; 0: from row minima */
-    uint64_t seed;             /* 1: ANNEALING, ANTS, PUBLISHED */
+    int certify;               /* 1; 0..1; GREEDY to ANTS and PUBLISHED buy their bound from the auction; 0: from row minima */
+    uint64_t seed;             /* 1; any; ANNEALING, ANTS, PUBLISHED */
 
-    /* schedules: softassign_method_defaults() has those of each method */
-    double temperature;        /* ENTROPIC, ANNEALING: first one, times the mean row minimum; PUBLISHED: times the largest cost */
-    double cooling;            /* 0..1: factor from one temperature to the next */
-    int iterations[3];         /* ENTROPIC: temperatures, sweeps at each; PUBLISHED: temperatures, stabilisations, Sinkhorn
-                                  iterations; ANNEALING: temperatures, moves a row; ANTS: iterations; 2OPT: passes */
-    double alpha;              /* PUBLISHED: bias of eq 3.9, times the largest cost */
-    double outlier;            /* PUBLISHED: element of the outlier row, >= 0 */
-    int outlier_evolves;       /* PUBLISHED: 0 constant in the Sinkhorn loop, as printed; 1 normalised as a row of M */
-    int gold;                  /* PUBLISHED: 0; 1: M = exp(-(D - alpha) / t), the update of Gold et al. 1997 */
-    int double_precision;      /* PUBLISHED: 0 float, exponents clamped to +-70; 1 double, +-650 */
-    int gather;                /* 4; 2..64: values a reduction step sums */
-    int ants;                  /* 30 */
-    double evaporation;        /* ANTS: 0.1, 0..1: pheromone lost in an iteration */
-    double noise;              /* ANTS: 1, 0..1: share of replaced tiles at the start; falls to 0 */
+    /* schedules: defaults of AUTO; softassign_method_defaults() has those of each method */
+    double temperature;        /* 0.3; 0..1e30; ENTROPIC, ANNEALING: the first, times the mean row minimum; PUBLISHED: times the
+                                  largest cost */
+    double cooling;            /* 0.5; 0..1; factor from one temperature to the next */
+    int iterations[3];         /* 6, 10, 10; 0..2147483647; ENTROPIC: temperatures, sweeps at each; PUBLISHED: temperatures,
+                                  stabilisations, Sinkhorn iterations; ANNEALING: temperatures, moves a row; ANTS: iterations;
+                                  2OPT: passes */
+    double alpha;              /* 1; -1e30..1e30; PUBLISHED: bias of eq 3.9, times the largest cost */
+    double outlier;            /* 1e6; 0..1e30; PUBLISHED: element of the outlier row */
+    int outlier_evolves;       /* 0; 0..1; PUBLISHED: 0 constant in the Sinkhorn loop, as printed; 1 normalised as a row of M */
+    int gold;                  /* 0; 0..1; PUBLISHED: 1: M = exp(-(D - alpha) / t), the update of Gold et al. 1997 */
+    int double_precision;      /* 0; 0..1; PUBLISHED: 0 float, exponents clamped to +-70; 1 double, +-650 */
+    int gather;                /* 4; 2..64; values a reduction step sums */
+    int ants;                  /* 30; 1..2147483647 */
+    double evaporation;        /* 0.1; 0..1; ANTS: pheromone lost in an iteration */
+    double noise;              /* 1; 0..1; ANTS: share of replaced tiles at the start; falls to 0 */
 
-    double switching;          /* 0; >= 0: staying with problem.previous is worth this times the mean cost */
-    int grid_width;            /* 0; rows are cells of a grid so wide, for min_distance */
-    double min_distance;       /* 0; smallest distance of two cells with the same column, in cells */
+    double switching;          /* 0; 0..1e6; staying with problem.previous is worth this times the mean cost */
+    int grid_width;            /* 0; 0..2147483647; rows are cells of a grid so wide, for min_distance */
+    double min_distance;       /* 0; 0..1e9; smallest distance of two cells with the same column, in cells */
 
+    double *row_price;         /* NULL; AUTO, EXACT: receive the dual prices u, v of the optimum: u_i + v_j <= cost_ij (less */
+    double *column_price;      /* NULL; the bonus), equal where i got j; v_j <= 0, and 0 where j has room, unless rows = columns.
+                                  cost_ij - u_i - v_j bounds what forcing the pair would add. Not with minimum_use */
     float *soft;               /* NULL; ENTROPIC, PUBLISHED: receives the soft matrix, rows x columns */
     ptrdiff_t soft_stride;     /* in floats */
     sat_allocator allocator;   /* malloc */
@@ -257,6 +276,14 @@ SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row
 SOFTASSIGN_DEF void softassign_next_frame(softassign *solver);
 SOFTASSIGN_DEF void softassign_destroy(softassign *solver); /* NULL is fine */
 
+/* One sentence that names what is refused with SAT_ERR_ARGUMENT, and its range; "" when nothing is. Written into text (cut
+   to size, always ended); returns text. The first: options of softassign_solve, softassign_create and
+   softassign_gl_create; the second: a problem with the options it is solved with (NULL: the defaults) by softassign_solve.
+   Costs and features are not read; the report names their row. */
+SOFTASSIGN_DEF char *softassign_explain(char *text, size_t size, const softassign_options *options);
+SOFTASSIGN_DEF char *softassign_explain_problem(char *text, size_t size, const softassign_problem *problem,
+                                                const softassign_options *options);
+
 #ifdef __cplusplus
 }
 #endif
@@ -283,10 +310,11 @@ typedef struct softassign_gl softassign_gl;
    softassign_defaults(), the published schedule is softassign_method_defaults(SOFTASSIGN_PUBLISHED). */
 SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc, const softassign_options *options);
 SOFTASSIGN_DEF void softassign_gl_destroy(softassign_gl *gl); /* NULL is fine */
-/* What the last SAT_ERR_GL_... was about; never NULL. */
+/* What the last SAT_ERR_GL_... or SAT_ERR_ARGUMENT of set_costs was about; never NULL. */
 SOFTASSIGN_DEF const char *softassign_gl_message(const softassign_gl *gl);
 
-/* The distance matrix: uploaded, or by a pass from features (eq 3.1). Costs must be finite or +infinity, |cost| <= 1e30. */
+/* The distance matrix: uploaded, or by a pass from features (eq 3.1). Costs must be finite or +infinity, |cost| <= 1e30.
+   capacity, minimum_use, previous, maximise and unassigned_cost are refused; the message names them. */
 SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softassign_problem *problem);
 
 /* Slomp 2012, section 3.7: the whole schedule of the options, as SOFTASSIGN_PUBLISHED in float. soft: rows x columns
@@ -415,7 +443,7 @@ struct softassign {
     int all_open;          /* no slot has a capacity of 0 */
 
     softassign_problem problem;
-    int slots, dims;
+    int slot_count, dims;
     float shrink, slack;   /* bound = distance of the projections * shrink - slack */
     float *matrix;         /* dense: rows x columns costs, the bonus included */
     float *coarse;         /* per 16 slots: dims x 16 projected coordinates */
@@ -567,11 +595,11 @@ static void softassign__project_keys(const softassign *s, int row, softassign__s
 static void softassign__dense_keys(const softassign *s, int row, softassign__scratch *w)
 {
     int j, l;
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         float cost = softassign__cost(s, row, j), price = s->price_f[j];
         w->keys[j] = cost < SOFTASSIGN__INFINITY && s->capacity[j] > 0 ? (cost - price) - (fabsf(cost) + fabsf(price)) * 3e-7f : SOFTASSIGN__INFINITY;
     }
-    w->distances += (size_t)s->slots;
+    w->distances += (size_t)s->slot_count;
     for (; j < s->padded; j++) w->keys[j] = SOFTASSIGN__INFINITY;
     for (j = 0; j < s->padded; j += SOFTASSIGN__BLOCK) {
         float least = SOFTASSIGN__INFINITY;
@@ -584,10 +612,10 @@ static void softassign__dense_keys(const softassign *s, int row, softassign__scr
 static void softassign__hide_closed(const softassign *s, softassign__scratch *w)
 {
     int b, j;
-    for (b = s->all_open ? s->slots / SOFTASSIGN__BLOCK * SOFTASSIGN__BLOCK : 0; b < s->padded; b += SOFTASSIGN__BLOCK) {
+    for (b = s->all_open ? s->slot_count / SOFTASSIGN__BLOCK * SOFTASSIGN__BLOCK : 0; b < s->padded; b += SOFTASSIGN__BLOCK) {
         float least = SOFTASSIGN__INFINITY;
         for (j = b; j < b + SOFTASSIGN__BLOCK; j++) {
-            if (j >= s->slots || s->capacity[j] == 0) w->keys[j] = SOFTASSIGN__INFINITY;
+            if (j >= s->slot_count || s->capacity[j] == 0) w->keys[j] = SOFTASSIGN__INFINITY;
             least = w->keys[j] < least ? w->keys[j] : least;
         }
         w->block_min[b / SOFTASSIGN__BLOCK] = least;
@@ -604,7 +632,7 @@ static void softassign__keys(const softassign *s, int row, softassign__scratch *
     softassign__project_keys(s, row, w);
     softassign__hide_closed(s, w);
     if (!s->problem.previous || (stay = s->problem.previous[row]) < 0) return;
-    for (j = stay; j < s->slots; j = j < s->columns ? s->columns : j + 1)
+    for (j = stay; j < s->slot_count; j = j < s->columns ? s->columns : j + 1)
         if (softassign__column(s, j) == stay && s->capacity[j] > 0) {
             w->keys[j] -= s->bonus * 1.000001f;
             if (w->keys[j] < w->block_min[j / SOFTASSIGN__BLOCK]) w->block_min[j / SOFTASSIGN__BLOCK] = w->keys[j];
@@ -699,7 +727,7 @@ static void softassign__project_range(int begin, int end, int worker, void *cont
     int i, d = s->dims, wide = s->problem.feature_count;
     for (i = begin; i < end; i++) {
         double norm;
-        int is_row = i >= s->slots, j = i - s->slots;
+        int is_row = i >= s->slot_count, j = i - s->slot_count;
         if (is_row)
             norm = softassign__project(s, s->problem.row_features + (size_t)j * (size_t)wide, p->features, p->directions,
                                        s->row_coarse + (size_t)j * (size_t)d, 1);
@@ -726,14 +754,14 @@ static void softassign__start_bound(softassign *s)
     else
         for (a = 0; a < (n + 1) * n; a++) s->basis[a] = a < n * n && a % (n + 1) == 0 ? 1 : 0;
     for (w = 0; w < 2 * workers; w++) p.norm[w] = 0;
-    sat__parallel_for(&s->options.threads, s->slots + s->rows, softassign__project_range, &p);
+    sat__parallel_for(&s->options.threads, s->slot_count + s->rows, softassign__project_range, &p);
     for (w = 1; w < workers; w++)
         for (a = 0; a < 2; a++)
             if (p.norm[2 * w + a] > p.norm[a]) p.norm[a] = p.norm[2 * w + a];
     s->shrink = 1 - 1.2e-7f * (float)(s->problem.feature_count + 32);
     if (s->shrink < 0) s->shrink = 0;
     s->slack = (float)((p.norm[0] + p.norm[1]) * 4.8e-7 + 1e-18 * sqrt((double)s->problem.feature_count + 4));
-    for (a = s->slots; a < s->padded; a++) /* the last block reads as zeros behind the slots */
+    for (a = s->slot_count; a < s->padded; a++) /* the last block reads as zeros behind the slots */
         for (w = 0; w < s->dims; w++)
             s->coarse[(a / SOFTASSIGN__BLOCK) * s->dims * SOFTASSIGN__BLOCK + w * SOFTASSIGN__BLOCK + a % SOFTASSIGN__BLOCK] = 0;
 }
@@ -814,7 +842,7 @@ static int softassign__gather(const softassign *s, int row, softassign__scratch 
         if (!(w->block_min[b] <= high)) continue;
         for (j = b * SOFTASSIGN__BLOCK; j < (b + 1) * SOFTASSIGN__BLOCK; j++) {
             softassign__candidate *c = &w->candidates[count];
-            if (!(w->keys[j] <= high) || w->keys[j] <= low || j >= s->slots || s->capacity[j] == 0) continue;
+            if (!(w->keys[j] <= high) || w->keys[j] <= low || j >= s->slot_count || s->capacity[j] == 0) continue;
             c->cost = softassign__cost(s, row, j);
             if (!s->problem.cost && !s->problem.cost_fn) w->distances++;
             if (!(c->cost < SOFTASSIGN__INFINITY)) continue;
@@ -973,7 +1001,7 @@ static float softassign__price_sweep(softassign *s, float eps)
 {
     float worst = 0, *e = s->soft_row;
     int i, j, q;
-    for (j = 0; j < s->slots; j++) s->column_sum[j] = 0;
+    for (j = 0; j < s->slot_count; j++) s->column_sum[j] = 0;
     for (i = 0; i < s->rows; i++) {
         size_t at = (size_t)i * (size_t)s->list;
         float least = SOFTASSIGN__INFINITY, sum;
@@ -991,7 +1019,7 @@ static float softassign__price_sweep(softassign *s, float eps)
         sum = 1 / softassign__weights(e, s->list_length[i], least, softassign__inverse(eps));
         for (q = 0; q < s->list_length[i]; q++) s->column_sum[s->list_slot[at + (size_t)q]] += e[q] * sum;
     }
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         double limit = s->top[j], price, fill;
         if (s->capacity[j] == 0) continue;
         fill = (double)s->column_sum[j] / s->capacity[j];
@@ -1041,7 +1069,7 @@ static void softassign__assign(softassign *s, int row, int slot, float cost)
 
 static inline double softassign__node_key(const softassign *s, int node)
 {
-    return node < s->slots ? s->distance[node] : s->row_distance[node - s->slots];
+    return node < s->slot_count ? s->distance[node] : s->row_distance[node - s->slot_count];
 }
 
 /* Order of the heap: distance, then free slots, full slots, lists; then the index. */
@@ -1051,8 +1079,8 @@ static inline int softassign__node_before(const softassign *s, int a, int b)
     int class_a, class_b;
     if (x < y) return 1;
     if (y < x) return 0;
-    class_a = a >= s->slots ? 2 : !softassign__is_free(s, a);
-    class_b = b >= s->slots ? 2 : !softassign__is_free(s, b);
+    class_a = a >= s->slot_count ? 2 : !softassign__is_free(s, a);
+    class_b = b >= s->slot_count ? 2 : !softassign__is_free(s, b);
     return class_a < class_b || (class_a == class_b && a < b);
 }
 
@@ -1147,7 +1175,7 @@ static void softassign__relax_list(softassign *s, softassign__search *q, int row
     beyond -= (fabs(s->list_limit[row]) + fabs(shift)) * 4e-16;
     if (beyond >= q->nearest) return;
     s->row_distance[row] = beyond < base ? base : beyond;
-    softassign__heap_push(s, s->slots + row);
+    softassign__heap_push(s, s->slot_count + row);
 }
 
 /* Relaxes every slot of the row. */
@@ -1163,7 +1191,7 @@ static void softassign__relax_row(softassign *s, softassign__search *q, int row,
     shift = base - (own_cost - own_price);
     softassign__keys(s, row, w);
     s->report.rows_expanded++;
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         int known = s->stamp[j] - 4 * s->epoch;
         double least = (double)w->keys[j] + shift;
         float cost;
@@ -1216,8 +1244,8 @@ static int softassign__augment(softassign *s, int root)
     while (s->heap_size > 0) {
         int node = softassign__heap_pop(s);
         s->report.work++;
-        if (node >= s->slots) {
-            softassign__open_list(s, &q, node - s->slots);
+        if (node >= s->slot_count) {
+            softassign__open_list(s, &q, node - s->slot_count);
             continue;
         }
         if (softassign__is_free(s, node)) {
@@ -1323,7 +1351,9 @@ static void softassign__finish(softassign *s, int slot)
 #ifdef SAT__SSE2
 static inline __m128d softassign__load_two(const float *p)
 {
-    return _mm_cvtps_pd(_mm_castpd_ps(_mm_load_sd((const double *)(const void *)p)));
+    double two; /* floats at any address */
+    memcpy(&two, p, sizeof two);
+    return _mm_cvtps_pd(_mm_castpd_ps(_mm_set_sd(two)));
 }
 #endif
 
@@ -1395,7 +1425,7 @@ static void softassign__certify(softassign *s)
     double *least = s->row_distance;
     int i, j;
     for (i = 0; i < s->rows; i++) least[i] = softassign__row_bound(s, i);
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         if (s->price[j] != 0 && s->capacity[j] > 0) softassign__add(&bound, s->price[j] * s->capacity[j]);
         if (!s->raised[j] || s->capacity[j] == 0 || s->dense_paths) continue;
         s->scratch[0].distances += (size_t)s->rows;
@@ -1521,8 +1551,8 @@ static int softassign__reduce_rows(softassign *s, int *rows, int count)
         int row = rows[next++], best, other = -1, out;
         const float *cost = s->matrix + (size_t)row * (size_t)s->columns;
         double m1, m2;
-        best = softassign__two_smallest(cost, s->price, s->slots, &m1, &m2);
-        for (j = 0; m2 <= m1 && other < 0 && j < s->slots; j++) /* a tie: another slot of that value */
+        best = softassign__two_smallest(cost, s->price, s->slot_count, &m1, &m2);
+        for (j = 0; m2 <= m1 && other < 0 && j < s->slot_count; j++) /* a tie: another slot of that value */
             if (j != best && (double)cost[j] - s->price[j] <= m1) other = j;
         if (best < 0) {
             rows[left++] = row;
@@ -1608,7 +1638,7 @@ static int softassign__augment_dense(softassign *s, int root)
     double *d = s->distance, *open_price = s->dense_price, own_cost = 0, own_price = 0, base = 0, least = (double)SOFTASSIGN__INFINITY;
     int *pred = s->parent, closed = 0, row = root, j, k, end;
     s->report.paths++;
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         double value = (double)cost[j] - s->price[j];
         d[j] = (double)SOFTASSIGN__INFINITY;
         open_price[j] = s->price[j];
@@ -1620,7 +1650,7 @@ static int softassign__augment_dense(softassign *s, int root)
     }
     for (;;) {
         s->report.work++;
-        end = softassign__relax_dense(cost, s->slots, base, own_cost, own_price, open_price, d, pred, s->first_row, row);
+        end = softassign__relax_dense(cost, s->slot_count, base, own_cost, own_price, open_price, d, pred, s->first_row, row);
         if (end < 0) return 0;
         if (d[end] > base) base = d[end]; /* else rounding */
         if (s->first_row[end] < 0) break;
@@ -1649,7 +1679,7 @@ static int softassign__augment_dense(softassign *s, int root)
 static void softassign__dense_publish(softassign *s)
 {
     int i, j;
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         s->used[j] = s->first_row[j] >= 0;
         s->price_f[j] = (float)s->price[j];
     }
@@ -1756,7 +1786,7 @@ static int softassign__is_dissatisfied(const softassign *s, int row)
 {
     softassign__fixed own = softassign__fixed_value(s, (double)s->cost_of_row[row], s->slot_of_row[row]), other;
     int j;
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         float cost;
         if (s->capacity[j] == 0 || !((cost = softassign__cost(s, row, j)) < SOFTASSIGN__INFINITY)) continue;
         other = softassign__fixed_value(s, (double)cost, j);
@@ -1775,13 +1805,13 @@ static void softassign__start_repair(softassign *s)
         s->list_length[i] = 0;
         s->list_limit[i] = -(double)SOFTASSIGN__INFINITY;
     }
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         softassign__fixed top = softassign__fixed_top(s, j);
         s->exact_price[j] = softassign__fixed_from(s->price[j]);
         if (softassign__fixed_less(&top, &s->exact_price[j])) s->exact_price[j] = top;
     }
     while (changed) {
-        for (j = 0; j < s->slots; j++)
+        for (j = 0; j < s->slot_count; j++)
             if (softassign__is_free(s, j)) s->exact_price[j] = softassign__fixed_top(s, j);
         for (changed = i = 0; i < s->rows; i++)
             if (s->slot_of_row[i] >= 0 && softassign__is_dissatisfied(s, i)) {
@@ -1802,7 +1832,7 @@ static void softassign__relax_exact(softassign *s, int row, const softassign__fi
         softassign__fixed own = softassign__fixed_value(s, (double)s->cost_of_row[row], slot);
         shift = softassign__fixed_difference(base, &own);
     }
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         int known = s->stamp[j] - 4 * s->epoch;
         softassign__fixed w;
         float cost;
@@ -1821,7 +1851,7 @@ static void softassign__relax_exact(softassign *s, int row, const softassign__fi
 static int softassign__nearest_exact(const softassign *s)
 {
     int j, best = -1;
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         if (s->stamp[j] != 4 * s->epoch + SOFTASSIGN__OPEN) continue;
         if (best >= 0 && softassign__fixed_less(&s->exact_distance[best], &s->exact_distance[j])) continue;
         if (best >= 0 && !softassign__fixed_less(&s->exact_distance[j], &s->exact_distance[best]) &&
@@ -1869,7 +1899,7 @@ static sat_result softassign__repair_phase(softassign *s)
         s->report.row_error = s->next;
         return SAT_ERR_LIMIT;
     }
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         double price = softassign__fixed_to(&s->exact_price[j]);
         if (j >= s->columns && softassign__is_free(s, j)) { /* forbidden pairs keep a column below its minimum use */
             s->report.column_error = softassign__column(s, j);
@@ -1907,7 +1937,7 @@ static double softassign__row_excess(const softassign *s, int row)
 {
     double own_cost = (double)s->cost_of_row[row], own_price = s->price[s->slot_of_row[row]], least = 0;
     int j;
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         float cost;
         double w, error;
         if (s->capacity[j] == 0 || !((cost = softassign__cost(s, row, j)) < SOFTASSIGN__INFINITY)) continue;
@@ -1960,7 +1990,7 @@ static void softassign__reset_assignment(softassign *s)
 static void softassign__reset_prices(softassign *s)
 {
     int j;
-    for (j = 0; j < s->max_slots; j++) softassign__set_price(s, j, j < s->slots ? s->top[j] : 0);
+    for (j = 0; j < s->max_slots; j++) softassign__set_price(s, j, j < s->slot_count ? s->top[j] : 0);
     for (; j < s->padded; j++) s->price_f[j] = 0;
 }
 
@@ -2094,7 +2124,7 @@ static sat_result softassign__path_phase(softassign *s)
 
 static sat_result softassign__finish_phase(softassign *s)
 {
-    while (s->next < s->slots) {
+    while (s->next < s->slot_count) {
         int j = s->next;
         if (softassign__is_free(s, j) && s->price[j] < s->top[j]) {
             softassign__finish(s, j);
@@ -2103,7 +2133,7 @@ static sat_result softassign__finish_phase(softassign *s)
         if (j >= s->columns && softassign__is_free(s, j)) break;
         s->next++;
     }
-    if (s->next < s->slots || !(s->phase = SOFTASSIGN__DONE, softassign__prove(s))) {
+    if (s->next < s->slot_count || !(s->phase = SOFTASSIGN__DONE, softassign__prove(s))) {
         s->excess = -1;
         softassign__start_repair(s);
         s->phase = SOFTASSIGN__REPAIR;
@@ -2134,17 +2164,17 @@ static sat_result softassign__advance(softassign *s, size_t budget)
 
 static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
 {
-    size_t rows = (size_t)s->rows, cells = 0, slots = (size_t)s->max_slots, padded = (size_t)s->padded, list = rows * (size_t)s->list;
-    size_t shared = slots * (sizeof(softassign__fixed) / sizeof(float));
+    size_t rows = (size_t)s->rows, cells = 0, seats = (size_t)s->max_slots, padded = (size_t)s->padded, list = rows * (size_t)s->list;
+    size_t shared = seats * (sizeof(softassign__fixed) / sizeof(float));
     int workers = sat__worker_count(&s->options.threads), w;
     if (s->dense && !sat__multiply_size(&cells, rows, (size_t)s->columns)) a->overflow = 1;
     s->matrix = (float *)sat__carve(a, cells, sizeof(float));
-    s->price = (double *)sat__carve(a, slots, sizeof(double));
-    s->top = (double *)sat__carve(a, slots, sizeof(double));
-    s->distance = (double *)sat__carve(a, slots > 2 * (size_t)workers ? slots : 2 * (size_t)workers, sizeof(double));
+    s->price = (double *)sat__carve(a, seats, sizeof(double));
+    s->top = (double *)sat__carve(a, seats, sizeof(double));
+    s->distance = (double *)sat__carve(a, seats > 2 * (size_t)workers ? seats : 2 * (size_t)workers, sizeof(double));
     s->row_distance = (double *)sat__carve(a, rows, sizeof(double));
-    s->dense_price = (double *)sat__carve(a, s->dense ? slots : 0, sizeof(double));
-    s->closed_distance = (double *)sat__carve(a, s->dense ? slots : 0, sizeof(double));
+    s->dense_price = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
+    s->closed_distance = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
     s->list_limit = (double *)sat__carve(a, rows, sizeof(double));
     s->basis = (double *)sat__carve(a, (size_t)(2 * SOFTASSIGN__DIMS + 1) * (size_t)features, sizeof(double));
     s->price_f = (float *)sat__carve(a, padded, sizeof(float));
@@ -2155,29 +2185,29 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->exact_distance = (softassign__fixed *)sat__carve(a, list > shared ? list : shared, sizeof(float));
     s->list_cost = (float *)(void *)s->exact_price;
     s->list_value = (float *)(void *)s->exact_distance;
-    s->parent_cost = (float *)sat__carve(a, slots, sizeof(float));
-    s->column_sum = (float *)sat__carve(a, slots, sizeof(float));
+    s->parent_cost = (float *)sat__carve(a, seats, sizeof(float));
+    s->column_sum = (float *)sat__carve(a, seats, sizeof(float));
     s->soft_row = (float *)sat__carve(a, padded, sizeof(float));
-    s->slot_column = (int *)sat__carve(a, slots, sizeof(int));
-    s->capacity = (int *)sat__carve(a, slots, sizeof(int));
-    s->used = (int *)sat__carve(a, slots, sizeof(int));
-    s->first_row = (int *)sat__carve(a, slots, sizeof(int));
+    s->slot_column = (int *)sat__carve(a, seats, sizeof(int));
+    s->capacity = (int *)sat__carve(a, seats, sizeof(int));
+    s->used = (int *)sat__carve(a, seats, sizeof(int));
+    s->first_row = (int *)sat__carve(a, seats, sizeof(int));
     s->slot_of_row = (int *)sat__carve(a, rows, sizeof(int));
     s->next_row = (int *)sat__carve(a, rows, sizeof(int));
     s->list_slot = (int *)sat__carve(a, list, sizeof(int));
     s->list_length = (int *)sat__carve(a, rows, sizeof(int));
-    s->parent = (int *)sat__carve(a, slots, sizeof(int));
-    s->stamp = (int *)sat__carve(a, slots, sizeof(int));
+    s->parent = (int *)sat__carve(a, seats, sizeof(int));
+    s->stamp = (int *)sat__carve(a, seats, sizeof(int));
     s->row_stamp = (int *)sat__carve(a, rows, sizeof(int));
-    s->touched = (int *)sat__carve(a, slots, sizeof(int));
+    s->touched = (int *)sat__carve(a, seats, sizeof(int));
     s->kept = (int *)sat__carve(a, rows, sizeof(int));
     s->leader = (int *)sat__carve(a, rows, sizeof(int));
     s->shown = (int *)sat__carve(a, rows, sizeof(int));
     s->shown_column = (int *)sat__carve(a, rows, sizeof(int));
-    s->closed = (int *)sat__carve(a, slots + rows, sizeof(int));
-    s->heap = (int *)sat__carve(a, slots + rows, sizeof(int));
-    s->heap_at = (int *)sat__carve(a, slots + rows, sizeof(int));
-    s->raised = (unsigned char *)sat__carve(a, slots, 1);
+    s->closed = (int *)sat__carve(a, seats + rows, sizeof(int));
+    s->heap = (int *)sat__carve(a, seats + rows, sizeof(int));
+    s->heap_at = (int *)sat__carve(a, seats + rows, sizeof(int));
+    s->raised = (unsigned char *)sat__carve(a, seats, 1);
     s->stale = (unsigned char *)sat__carve(a, rows, 1);
     s->scratch = (softassign__scratch *)sat__carve(a, (size_t)workers, sizeof *s->scratch);
     for (w = 0; w < workers; w++) {
@@ -2194,7 +2224,7 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     }
 }
 
-static int softassign__progress(softassign *s, const int *slots);
+static int softassign__progress(softassign *s, const int *seats);
 
 /* ------------------------------------------------------------------------------------------------
    Greedy search (Slomp 2012, section 3.4.2), and moves and swaps while they help
@@ -2235,7 +2265,7 @@ static void softassign__greedy_take(softassign *s, int row, int slot, float cost
 static int softassign__greedy(softassign *s)
 {
     int *wanted = s->touched, *best = s->heap, i, j, lost = 0;
-    for (j = 0; j < s->slots; j++) wanted[j] = 0;
+    for (j = 0; j < s->slot_count; j++) wanted[j] = 0;
     for (i = 0; i < s->rows; i++) {
         best[i] = s->list_length[i] ? s->list_slot[(size_t)i * (size_t)s->list] : -1;
         if (best[i] >= 0) wanted[best[i]]++;
@@ -2296,7 +2326,7 @@ static int softassign__conflicts(const softassign *s, int row, int slot, int wit
 {
     int column = softassign__column(s, slot), count = 0, j, k;
     if (s->options.grid_width < 1 || !(s->options.min_distance > 0)) return 0;
-    for (j = column; j < s->slots; j = j < s->columns ? s->columns : j + 1) {
+    for (j = column; j < s->slot_count; j = j < s->columns ? s->columns : j + 1) {
         if (softassign__column(s, j) != column) continue;
         for (k = s->first_row[j]; k >= 0; k = s->next_row[k])
             count += k != row && k != without && softassign__too_close(s, row, k);
@@ -2312,7 +2342,7 @@ static int softassign__improve_row(softassign *s, int row)
     int j, to = -1, partner = -1;
     float to_cost = 0, partner_cost = 0;
     softassign__keys(s, row, w);
-    for (j = 0; j < s->slots; j++) {
+    for (j = 0; j < s->slot_count; j++) {
         float cost, back = 0;
         int other;
         double gain;
@@ -2340,7 +2370,7 @@ static int softassign__improve_row(softassign *s, int row)
 static void softassign__two_opt(softassign *s, int passes)
 {
     int pass, i, changed = 1, j;
-    for (j = 0; j < s->slots; j++) softassign__set_price(s, j, 0);
+    for (j = 0; j < s->slot_count; j++) softassign__set_price(s, j, 0);
     for (pass = 0; pass < passes && changed; pass++) {
         for (changed = i = 0; i < s->rows; i++) changed += softassign__improve_row(s, i);
         if (changed && softassign__progress(s, s->slot_of_row)) break;
@@ -2387,7 +2417,7 @@ static void softassign__anneal(softassign *s, int *best)
     softassign__keep_best(s, best);
     for (step = 0; step < o->iterations[0]; step++, temperature *= o->cooling) {
         for (n = 0; n < count; n++) {
-            int row = (int)(softassign__uniform(&seed) * s->rows), slot = (int)(softassign__uniform(&seed) * s->slots), other;
+            int row = (int)(softassign__uniform(&seed) * s->rows), slot = (int)(softassign__uniform(&seed) * s->slot_count), other;
             float here, back = 0;
             double change;
             s->report.iterations++;
@@ -2443,9 +2473,9 @@ static int softassign__ant_choice(softassign *s, int row, uint64_t *seed, float 
         }
     }
     for (tries = 0; tries < 64 || slot < 0; tries++) {
-        int j = (int)(softassign__uniform(seed) * s->slots), n;
+        int j = (int)(softassign__uniform(seed) * s->slot_count), n;
         float c;
-        for (n = 0; n < s->slots && !softassign__is_free(s, j); n++) j = j + 1 < s->slots ? j + 1 : 0;
+        for (n = 0; n < s->slot_count && !softassign__is_free(s, j); n++) j = j + 1 < s->slot_count ? j + 1 : 0;
         c = softassign__cost(s, row, j);
         s->scratch[0].distances++;
         if (slot >= 0 && !(c < *cost)) continue;
@@ -2472,13 +2502,13 @@ static double softassign__ant(softassign *s, uint64_t *seed, int *order)
     return softassign__cost_now(s);
 }
 
-static void softassign__deposit(softassign *s, const int *slots, float amount)
+static void softassign__deposit(softassign *s, const int *seats, float amount)
 {
     int i, q;
     for (i = 0; i < s->rows; i++)
         for (q = 0; q < s->list_length[i]; q++) {
             size_t at = (size_t)i * (size_t)s->list + (size_t)q;
-            if (s->list_slot[at] == slots[i]) s->list_value[at] += amount;
+            if (s->list_slot[at] == seats[i]) s->list_value[at] += amount;
         }
 }
 
@@ -2486,11 +2516,11 @@ static void softassign__deposit(softassign *s, const int *slots, float amount)
 static void softassign__add_noise(softassign *s, int *shown, int count, uint64_t *seed)
 {
     int n, j, i;
-    for (j = 0; j < s->slots; j++) s->touched[j] = 0;
+    for (j = 0; j < s->slot_count; j++) s->touched[j] = 0;
     for (i = 0; i < s->rows; i++) s->touched[shown[i]]++;
     for (n = 0; n < count; n++) {
         i = (int)(softassign__uniform(seed) * s->rows);
-        j = (int)(softassign__uniform(seed) * s->slots);
+        j = (int)(softassign__uniform(seed) * s->slot_count);
         if (s->touched[j] >= s->capacity[j] || !(softassign__cost(s, i, j) < SOFTASSIGN__INFINITY)) continue;
         s->touched[shown[i]]--;
         s->touched[j]++;
@@ -2872,13 +2902,13 @@ static int softassign__extract(softassign *s, const int *wanted)
    ------------------------------------------------------------------------------------------------ */
 
 /* Fills cost, bound, gap and counts for an assignment given by slots. */
-static void softassign__report_slots(softassign *s, const int *slots)
+static void softassign__report_slots(softassign *s, const int *seats)
 {
     softassign__sum cost = {0, 0, 0};
     int i, workers = sat__worker_count(&s->options.threads);
     s->report.switched = 0;
     for (i = 0; i < s->rows; i++) {
-        int column = softassign__column(s, slots[i]);
+        int column = softassign__column(s, seats[i]);
         softassign__add(&cost, (double)softassign__pair(&s->problem, i, column));
         s->report.switched += s->problem.previous && s->problem.previous[i] >= 0 && s->problem.previous[i] != column;
     }
@@ -2896,35 +2926,70 @@ static void softassign__report_slots(softassign *s, const int *slots)
     }
 }
 
-/* 1 when the caller wants to stop. slots: NULL while there is no assignment to show. */
-static int softassign__progress(softassign *s, const int *slots)
+/* The column for the caller: -1 for the one that stands for none. */
+static inline int softassign__shown_column(const softassign *s, int slot)
 {
+    int column = softassign__column(s, slot);
+    return s->problem.unassigned_cost > 0 && column == s->columns - 1 ? -1 : column;
+}
+
+/* The report for the caller: gains where the negative costs were minimised. */
+static softassign_report softassign__outward(const softassign *s)
+{
+    softassign_report report = s->report;
+    if (s->problem.maximise) {
+        report.cost = -report.cost;
+        report.lower_bound = -report.lower_bound;
+    }
+    return report;
+}
+
+/* The dual prices of the optimum, as options.row_price describes them. */
+static void softassign__tell_prices(const softassign *s)
+{
+    const softassign_options *o = &s->options;
+    double sign = s->problem.maximise ? -1 : 1;
+    int i, j, columns = s->columns - (s->problem.unassigned_cost > 0), nobody = columns < s->columns && s->used[columns] == s->rows;
+    if (s->report.complete && (o->row_price || o->column_price) && s->slot_count == s->columns) {
+        for (j = 0; o->column_price && j < columns; j++) o->column_price[j] = nobody ? 0 : sign * s->price[j];
+        for (i = 0; o->row_price && i < s->rows; i++) {
+            int slot = s->slot_of_row[i];
+            o->row_price[i] = sign * ((double)s->cost_of_row[i] - (nobody ? 0 : s->price[slot]));
+        }
+    }
+}
+
+/* 1 when the caller wants to stop. slots: NULL while there is no assignment to show. */
+static int softassign__progress(softassign *s, const int *seats)
+{
+    softassign_report shown;
     int i;
     if (!s->options.progress) return 0;
-    if (!slots) return s->stopped = s->options.progress(&s->report, NULL, s->options.progress_user) != 0;
-    softassign__report_slots(s, slots);
-    for (i = 0; i < s->rows; i++) s->shown_column[i] = softassign__column(s, slots[i]);
-    return s->stopped = s->options.progress(&s->report, s->shown_column, s->options.progress_user) != 0;
+    if (!seats) return s->stopped = s->options.progress(&s->report, NULL, s->options.progress_user) != 0;
+    softassign__report_slots(s, seats);
+    for (i = 0; i < s->rows; i++) s->shown_column[i] = softassign__shown_column(s, seats[i]);
+    shown = softassign__outward(s);
+    return s->stopped = s->options.progress(&shown, s->shown_column, s->options.progress_user) != 0;
 }
 
 /* Completes the solver's assignment for the eye: rows without a slot get the nearest listed free one, else the first
    free one. 0 when a row finds none. */
-static int softassign__fill(softassign *s, int *slots)
+static int softassign__fill(softassign *s, int *seats)
 {
     int *used = s->touched, i, j, q, next = 0;
-    for (j = 0; j < s->slots; j++) used[j] = s->used[j];
-    for (i = 0; i < s->rows; i++) slots[i] = s->slot_of_row[i];
+    for (j = 0; j < s->slot_count; j++) used[j] = s->used[j];
+    for (i = 0; i < s->rows; i++) seats[i] = s->slot_of_row[i];
     for (i = 0; i < s->rows; i++) {
-        if (slots[i] >= 0) continue;
-        for (q = 0; s->has_lists && q < s->list_length[i] && slots[i] < 0; q++) {
+        if (seats[i] >= 0) continue;
+        for (q = 0; s->has_lists && q < s->list_length[i] && seats[i] < 0; q++) {
             j = s->list_slot[(size_t)i * (size_t)s->list + (size_t)q];
-            if (used[j] < s->capacity[j]) slots[i] = j;
+            if (used[j] < s->capacity[j]) seats[i] = j;
         }
-        while (next < s->slots && used[next] >= s->capacity[next]) next++;
-        for (j = next; j < s->slots && slots[i] < 0; j++)
-            if (used[j] < s->capacity[j] && softassign__cost(s, i, j) < SOFTASSIGN__INFINITY) slots[i] = j;
-        if (slots[i] < 0) return 0;
-        used[slots[i]]++;
+        while (next < s->slot_count && used[next] >= s->capacity[next]) next++;
+        for (j = next; j < s->slot_count && seats[i] < 0; j++)
+            if (used[j] < s->capacity[j] && softassign__cost(s, i, j) < SOFTASSIGN__INFINITY) seats[i] = j;
+        if (seats[i] < 0) return 0;
+        used[seats[i]]++;
     }
     return 1;
 }
@@ -2933,35 +2998,124 @@ static int softassign__fill(softassign *s, int *slots)
    Checks
    ------------------------------------------------------------------------------------------------ */
 
+static const sat__field softassign__fields[] = {
+    SAT__FIELD(softassign_options, 'i', method, SOFTASSIGN_AUTO, SOFTASSIGN_AUTO, SOFTASSIGN_ANTS, ' '),
+    SAT__FIELD(softassign_options, 'd', gap, 0.001, 0, 1e300, 'I'),
+    SAT__FIELD(softassign_options, 'i', capacity_default, 1, 0, 2147483647, ' '),
+    SAT__FIELD(softassign_options, 'i', neighbours, 160, 4, 256, ' '),
+    SAT__FIELD(softassign_options, 'i', certify, 1, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'd', temperature, 0.3, 0, 1e30, ' '),
+    SAT__FIELD(softassign_options, 'd', cooling, 0.5, 0, 1, ' '),
+    {"iterations[0]", offsetof(softassign_options, iterations), 'i', ' ', 6, 0, 2147483647, NULL},
+    {"iterations[1]", offsetof(softassign_options, iterations) + sizeof(int), 'i', ' ', 10, 0, 2147483647, NULL},
+    {"iterations[2]", offsetof(softassign_options, iterations) + 2 * sizeof(int), 'i', ' ', 10, 0, 2147483647, NULL},
+    SAT__FIELD(softassign_options, 'd', alpha, 1, -1e30, 1e30, ' '),
+    SAT__FIELD(softassign_options, 'd', outlier, 1e6, 0, 1e30, ' '),
+    SAT__FIELD(softassign_options, 'i', outlier_evolves, 0, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'i', gold, 0, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'i', double_precision, 0, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'i', gather, 4, 2, 64, ' '),
+    SAT__FIELD(softassign_options, 'i', ants, 30, 1, 2147483647, ' '),
+    SAT__FIELD(softassign_options, 'd', evaporation, 0.1, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'd', noise, 1, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'd', switching, 0, 0, 1e6, ' '),
+    SAT__FIELD(softassign_options, 'i', grid_width, 0, 0, 2147483647, ' '),
+    SAT__FIELD(softassign_options, 'd', min_distance, 0, 0, 1e9, ' '),
+    SAT__FIELD(softassign_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(softassign_options, 't', threads, 0, 0, 0, ' '),
+};
+
+/* The table, and what one field asks of another. 1 when all is well. */
+static int softassign__explain_options(sat__text *t, const softassign_options *o)
+{
+    const sat__field *wrong = sat__fields_check(o, softassign__fields, SAT__COUNT(softassign__fields));
+    if (wrong) sat__text_field(t, wrong, o);
+    else if (o->min_distance > 0 && o->grid_width < 1) sat__text_add(t, "grid_width is 0; min_distance above 0 needs the grid");
+    else if ((o->row_price || o->column_price) && (int)o->method > (int)SOFTASSIGN_EXACT)
+        sat__text_add(t, "row_price or column_price is given; only AUTO and EXACT have them");
+    else return 1;
+    return 0;
+}
+
 static int softassign__options_are_valid(const softassign_options *o)
 {
+    sat__text ignored = sat__text_begin(NULL, 0);
+    return softassign__explain_options(&ignored, o);
+}
+
+SOFTASSIGN_DEF char *softassign_explain(char *text, size_t size, const softassign_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (options) softassign__explain_options(&t, options);
+    return text;
+}
+
+static int softassign__explain_element(sat__text *t, const char *name, int index, int value, int low, int high)
+{
+    if (value >= low && value <= high) return 1;
+    sat__text_add(t, name);
+    sat__text_add(t, "[");
+    sat__text_number(t, index);
+    sat__text_range(t, "]", value, low, high, ' ');
+    return 0;
+}
+
+/* Where the costs come from, and the lists that go with columns and rows. */
+static int softassign__explain_costs(sat__text *t, const softassign_problem *p)
+{
     int i;
-    if ((unsigned)o->method > (unsigned)SOFTASSIGN_ANTS || !(o->gap >= 0) || o->capacity_default < 0) return 0;
-    if (o->neighbours < 4 || o->neighbours > 256 || o->gather < 2 || o->gather > 64 || o->ants < 1) return 0;
-    for (i = 0; i < 3; i++)
-        if (o->iterations[i] < 0) return 0;
-    if (!(o->temperature >= 0 && o->temperature < 1e30) || !(o->cooling >= 0 && o->cooling <= 1)) return 0;
-    if (!(fabs(o->alpha) < 1e30) || !(o->outlier >= 0 && o->outlier < 1e30)) return 0;
-    if (!(o->evaporation >= 0 && o->evaporation <= 1) || !(o->noise >= 0 && o->noise <= 1)) return 0;
-    if (!(o->switching >= 0 && o->switching < 1e6) || o->grid_width < 0) return 0;
-    if (!(o->min_distance >= 0 && o->min_distance < 1e9) || (o->min_distance > 0 && o->grid_width < 1)) return 0;
-    return sat__threads_are_valid(&o->threads);
+    if (!p) sat__text_add(t, "problem is NULL");
+    else if (p->rows < 1) sat__text_range(t, "rows", p->rows, 1, 2147483647, ' ');
+    else if (p->columns < 1) sat__text_range(t, "columns", p->columns, 1, 2147483647, ' ');
+    else if (p->cost && p->stride < p->columns && p->stride > -(ptrdiff_t)p->columns && p->rows > 1)
+        sat__text_add(t, "stride is shorter than a row of the matrix");
+    else if (!p->cost && !p->cost_fn && !p->row_features) sat__text_add(t, "cost, cost_fn and row_features are NULL");
+    else if (!p->cost && !p->cost_fn && !p->column_features) sat__text_add(t, "column_features is NULL");
+    else if (!p->cost && !p->cost_fn && p->feature_count < 1) sat__text_range(t, "feature_count", p->feature_count, 1, 2147483647, ' ');
+    else if (p->maximise < 0 || p->maximise > 1) sat__text_range(t, "maximise", p->maximise, 0, 1, ' ');
+    else if (!(p->unassigned_cost >= 0 && p->unassigned_cost <= SOFTASSIGN__LARGEST_COST))
+        sat__text_range(t, "unassigned_cost", (double)p->unassigned_cost, 0, 1e30, ' ');
+    else {
+        for (i = 0; p->capacity && i < p->columns; i++)
+            if (!softassign__explain_element(t, "capacity", i, p->capacity[i], 0, 2147483647)) return 0;
+        for (i = 0; p->minimum_use && i < p->columns; i++)
+            if (!softassign__explain_element(t, "minimum_use", i, p->minimum_use[i], 0, 2147483647)) return 0;
+        for (i = 0; p->previous && i < p->rows; i++)
+            if (!softassign__explain_element(t, "previous", i, p->previous[i], -1, p->columns - 1)) return 0;
+        return 1;
+    }
+    return 0;
+}
+
+/* What not every method can do. */
+static int softassign__explain_problem(sat__text *t, const softassign_problem *p, const softassign_options *o)
+{
+    int j, exact = (int)o->method <= (int)SOFTASSIGN_FAST;
+    if (!softassign__explain_costs(t, p)) return 0;
+    for (j = 0; p->minimum_use && j < p->columns; j++)
+        if (!softassign__explain_element(t, "minimum_use", j, p->minimum_use[j], 0, p->capacity ? p->capacity[j] : o->capacity_default)) return 0;
+    if (p->minimum_use && !exact) sat__text_add(t, "minimum_use is given; only AUTO, EXACT and FAST take it");
+    else if (p->minimum_use && (o->row_price || o->column_price)) sat__text_add(t, "minimum_use is given; row_price and column_price do not go with it");
+    else if (p->maximise && !exact) sat__text_add(t, "maximise is 1; only AUTO, EXACT and FAST take it");
+    else if (p->unassigned_cost > 0 && !exact) sat__text_add(t, "unassigned_cost is above 0; only AUTO, EXACT and FAST take it");
+    else if (p->unassigned_cost > 0 && o->min_distance > 0) sat__text_add(t, "unassigned_cost is above 0; min_distance does not go with it");
+    else return 1;
+    return 0;
 }
 
 static int softassign__problem_is_valid(const softassign_problem *p)
 {
-    int i;
-    if (!p || p->rows < 1 || p->columns < 1) return 0;
-    if (p->cost) {
-        if (p->stride < p->columns && p->stride > -(ptrdiff_t)p->columns && p->rows > 1) return 0;
-    } else if (!p->cost_fn && (!p->row_features || !p->column_features || p->feature_count < 1)) return 0;
-    for (i = 0; p->capacity && i < p->columns; i++)
-        if (p->capacity[i] < 0) return 0;
-    for (i = 0; p->minimum_use && i < p->columns; i++)
-        if (p->minimum_use[i] < 0) return 0;
-    for (i = 0; p->previous && i < p->rows; i++)
-        if (p->previous[i] < -1 || p->previous[i] >= p->columns) return 0;
-    return 1;
+    sat__text ignored = sat__text_begin(NULL, 0);
+    return softassign__explain_costs(&ignored, p);
+}
+
+SOFTASSIGN_DEF char *softassign_explain_problem(char *text, size_t size, const softassign_problem *problem,
+                                                const softassign_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    softassign_options o = options ? *options : softassign_defaults();
+    if (softassign__explain_options(&t, &o)) softassign__explain_problem(&t, problem, &o);
+    return text;
 }
 
 /* What is wrong with a row of costs; also the copy into the matrix. Costs that are finite and small enough pass a
@@ -3073,7 +3227,7 @@ static sat_result softassign__make_slots(softassign *s)
     const softassign_problem *p = &s->problem;
     int64_t room = 0, needed = 0;
     int j, units = 1;
-    s->slots = s->columns;
+    s->slot_count = s->columns;
     s->all_open = 1;
     for (j = 0; j < s->columns; j++) {
         int capacity = p->capacity ? p->capacity[j] : s->options.capacity_default, least = p->minimum_use ? p->minimum_use[j] : 0;
@@ -3088,9 +3242,9 @@ static sat_result softassign__make_slots(softassign *s)
         s->capacity[j] = sat__min_int(capacity - least, s->rows);
         s->all_open &= s->capacity[j] > 0;
         if (least == 0) continue;
-        if (s->slots == s->max_slots) return needed > s->rows ? SAT_ERR_LIMIT : SAT_ERR_ARGUMENT;
-        s->slot_column[s->slots] = j;
-        s->capacity[s->slots++] = least;
+        if (s->slot_count == s->max_slots) return needed > s->rows ? SAT_ERR_LIMIT : SAT_ERR_ARGUMENT;
+        s->slot_column[s->slot_count] = j;
+        s->capacity[s->slot_count++] = least;
     }
     s->unit_capacities = units;
     if (room >= s->rows && needed <= s->rows) return SAT_OK;
@@ -3132,9 +3286,9 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     for (j = 0; j < s->max_slots; j++) s->top[j] = 0;
     s->dims = 0;
     if (from_features && !s->dense) softassign__start_bound(s);
-    if (s->slots > s->columns) {
+    if (s->slot_count > s->columns) {
         double high = softassign__mandatory_price(s);
-        for (j = s->columns; j < s->slots; j++) s->top[j] = high;
+        for (j = s->columns; j < s->slot_count; j++) s->top[j] = high;
     }
     if (!known) softassign__reset_prices(s);
     softassign__reset_assignment(s);
@@ -3145,7 +3299,7 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     s->next = 0;
     s->dense_paths = s->dense && s->unit_capacities && s->options.method == SOFTASSIGN_AUTO;
     s->phase = s->dense_paths ? SOFTASSIGN__PATHS : SOFTASSIGN__LISTS;
-    for (j = 0; known && !(s->dense_paths && s->rows == s->columns) && j < s->slots; j++) /* a square matrix lets prices rise above 0 */
+    for (j = 0; known && !(s->dense_paths && s->rows == s->columns) && j < s->slot_count; j++) /* a square matrix lets prices rise above 0 */
         if (s->price[j] > s->top[j]) softassign__set_price(s, j, s->top[j]);
     return SAT_OK;
 }
@@ -3159,25 +3313,25 @@ SOFTASSIGN_DEF int softassign_version(void) { return SOFTASSIGN_VERSION; }
 SOFTASSIGN_DEF softassign_options softassign_method_defaults(softassign_method method)
 {
     softassign_options o;
-    memset(&o, 0, sizeof o);
+    sat__fields_default(&o, sizeof o, softassign__fields, SAT__COUNT(softassign__fields));
     o.method = method;
-    o.gap = 0.001;
-    o.capacity_default = 1;
-    o.neighbours = method == SOFTASSIGN_ANTS ? 192 : 160;
-    o.certify = 1;
     o.seed = 1;
-    o.temperature = method == SOFTASSIGN_PUBLISHED ? 0.1 : method == SOFTASSIGN_ANNEALING ? 0.5 : 0.3;
-    o.cooling = method == SOFTASSIGN_PUBLISHED ? 0.9 : method == SOFTASSIGN_ANNEALING ? 0.95 : 0.5;
-    o.iterations[0] = method == SOFTASSIGN_PUBLISHED ? 50 : method == SOFTASSIGN_ANNEALING ? 120
-                    : method == SOFTASSIGN_ANTS ? 200 : method == SOFTASSIGN_GREEDY_2OPT ? 20 : 6;
-    o.iterations[1] = method == SOFTASSIGN_ANNEALING ? 400 : 10;
-    o.iterations[2] = 10;
-    o.alpha = 1;
-    o.outlier = 1e6;
-    o.gather = 4;
-    o.ants = 30;
-    o.evaporation = 0.1;
-    o.noise = 1;
+    if (method == SOFTASSIGN_PUBLISHED) {
+        o.temperature = 0.1;
+        o.cooling = 0.9;
+        o.iterations[0] = 50;
+    }
+    if (method == SOFTASSIGN_ANNEALING) {
+        o.temperature = 0.5;
+        o.cooling = 0.95;
+        o.iterations[0] = 120;
+        o.iterations[1] = 400;
+    }
+    if (method == SOFTASSIGN_ANTS) {
+        o.neighbours = 192;
+        o.iterations[0] = 200;
+    }
+    if (method == SOFTASSIGN_GREEDY_2OPT) o.iterations[0] = 20;
     return o;
 }
 
@@ -3261,17 +3415,17 @@ static void softassign__update_bound(softassign *s)
     if (before > s->bound) s->bound = before;
 }
 
-static sat_result softassign__step_slots(softassign *s, size_t budget, int *slots)
+static sat_result softassign__step_slots(softassign *s, size_t budget, int *seats)
 {
     sat_result result = softassign__advance(s, budget);
     for (;;) {
         if (s->dense_paths && s->phase == SOFTASSIGN__PATHS) softassign__dense_publish(s);
-        if (result != SAT_OK || softassign__fill(s, slots)) break;
+        if (result != SAT_OK || softassign__fill(s, seats)) break;
         result = softassign__advance(s, 1); /* forbidden pairs: the paths must decide */
     }
     if (result != SAT_OK) return result;
     softassign__update_bound(s);
-    softassign__report_slots(s, slots);
+    softassign__report_slots(s, seats);
     s->report.complete = s->phase == SOFTASSIGN__DONE;
     s->report.method = s->dense_paths ? SOFTASSIGN_AUTO : SOFTASSIGN_EXACT;
     return SAT_OK;
@@ -3285,7 +3439,7 @@ SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row
     int i;
     if (!s || !column_of_row || !softassign__problem_is_valid(problem)) return SAT_ERR_ARGUMENT;
     if (problem->rows != s->rows || problem->columns != s->columns) return SAT_ERR_MISMATCH;
-    if (problem->minimum_use) return SAT_ERR_ARGUMENT;
+    if (problem->minimum_use || problem->maximise || problem->unassigned_cost > 0) return SAT_ERR_ARGUMENT;
     if (s->phase == SOFTASSIGN__START) result = softassign__start(s, problem);
     else s->problem = *problem;
     if (result == SAT_OK) result = softassign__step_slots(s, work_budget, s->shown);
@@ -3296,6 +3450,7 @@ SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row
         return result;
     }
     for (i = 0; i < s->rows; i++) column_of_row[i] = softassign__column(s, s->shown[i]);
+    softassign__tell_prices(s);
     return SAT_OK;
 }
 
@@ -3337,7 +3492,7 @@ static sat_result softassign__solve_fast(softassign *s)
     if (!s->unit_capacities) return softassign__solve_exact(s);
     softassign__list_all(s);
     scale = softassign__mean_least(s);
-    eps = 1.6 * s->options.gap * scale; /* measured: the certified gap is 0.37 to 0.6 eps */
+    eps = 1.6 * fmin(s->options.gap, 1) * scale; /* measured: the certified gap is 0.37 to 0.6 eps */
     for (turn = 0; eps > 0 && turn < 2000; turn++) {
         if ((done = softassign__auction(s, eps, (size_t)s->rows)) != 0 || !s->options.progress) {
             if (done) break;
@@ -3491,14 +3646,14 @@ static sat_result softassign__buy_bound(softassign *s)
 static void softassign__separate(softassign *s)
 {
     int i, j, round;
-    for (j = 0; j < s->slots; j++) softassign__set_price(s, j, 0);
+    for (j = 0; j < s->slot_count; j++) softassign__set_price(s, j, 0);
     for (i = 0; i < s->rows; i++) {
         softassign__scratch *w = &s->scratch[0];
         float best = SOFTASSIGN__INFINITY;
         int to = -1;
         if (s->slot_of_row[i] >= s->columns || !softassign__conflicts(s, i, s->slot_of_row[i], -1)) continue; /* mandatory ones stay */
         softassign__keys(s, i, w);
-        for (j = 0; j < s->slots; j++) {
+        for (j = 0; j < s->slot_count; j++) {
             float cost;
             if (!(w->keys[j] < best) || !softassign__is_free(s, j) || softassign__conflicts(s, i, j, -1)) continue;
             cost = softassign__cost(s, i, j);
@@ -3614,22 +3769,31 @@ static int softassign__mandatory_count(const softassign_problem *p)
     return count;
 }
 
-SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_problem *problem,
-                                           const softassign_options *options, softassign_report *report)
+/* The problem as stated behind one that is minimised and complete: costs negated, and a last column for no column. */
+static float softassign__wrapped_cost(int row, int column, void *user)
 {
-    softassign_options o = options ? *options : softassign_defaults();
+    const softassign_problem *p = (const softassign_problem *)user;
+    float cost = column == p->columns ? p->unassigned_cost : softassign__pair(p, row, column);
+    return p->maximise ? -cost : cost;
+}
+
+/* The first column whose minimum use is above its capacity, or -1. */
+static int softassign__over_used(const softassign_problem *p, const softassign_options *o)
+{
+    int j;
+    for (j = 0; p->minimum_use && j < p->columns; j++)
+        if (p->minimum_use[j] > (p->capacity ? p->capacity[j] : o->capacity_default)) return j;
+    return -1;
+}
+
+static sat_result softassign__solve_plain(int *column_of_row, const softassign_problem *problem, const softassign_options *options,
+                                          int matrix, softassign_report *report)
+{
     softassign__matrix_work work;
     softassign *s;
     sat_result result;
-    int i, features;
-    if (report) {
-        memset(report, 0, sizeof *report);
-        report->row_error = report->column_error = -1;
-    }
-    if (!column_of_row || !softassign__problem_is_valid(problem) || !softassign__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
-    if (problem->minimum_use && (int)o.method > SOFTASSIGN_FAST) return SAT_ERR_ARGUMENT;
-    features = problem->cost || problem->cost_fn ? 0 : sat__min_int(problem->feature_count, SOFTASSIGN__BOUND_FEATURES);
-    result = softassign__allocate(&s, problem->rows, problem->columns, softassign__mandatory_count(problem), features, problem->cost != NULL, &o);
+    int i, features = problem->cost || problem->cost_fn ? 0 : sat__min_int(problem->feature_count, SOFTASSIGN__BOUND_FEATURES);
+    result = softassign__allocate(&s, problem->rows, problem->columns, softassign__mandatory_count(problem), features, matrix, options);
     if (result != SAT_OK) return result;
     memset(&work, 0, sizeof work);
 #ifndef SOFTASSIGN_NO_MATRIX
@@ -3637,12 +3801,59 @@ SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_
 #endif
     if (result == SAT_OK) result = softassign__start(s, problem);
     if (result == SAT_OK) result = softassign__run(s, &work);
-    if (report) *report = s->report;
-    for (i = 0; result == SAT_OK && i < s->rows; i++) column_of_row[i] = softassign__column(s, s->shown[i]);
+    if (report) *report = softassign__outward(s);
+    for (i = 0; result == SAT_OK && i < s->rows; i++) column_of_row[i] = softassign__shown_column(s, s->shown[i]);
+    if (result == SAT_OK) softassign__tell_prices(s);
     s->bytes -= work.bytes;
     if (work.block) sat__release(&s->allocator, work.block, work.bytes);
     softassign_destroy(s);
     return result;
+}
+
+static sat_result softassign__solve_wrapped(int *column_of_row, const softassign_problem *problem, const softassign_options *options,
+                                            softassign_report *report)
+{
+    softassign_problem stated = *problem, p = *problem;
+    sat_allocator allocator;
+    sat_result result;
+    int j, *capacity, optional = problem->unassigned_cost > 0;
+    size_t size;
+    if (problem->columns > 2147483647 / 2 - 65 || !sat__multiply_size(&size, (size_t)problem->columns + 1, 2 * sizeof(int))) return SAT_ERR_SIZE;
+    if (!sat__resolve_allocator(&allocator, &options->allocator)) return SAT_ERR_ARGUMENT;
+    capacity = (int *)sat__alloc(&allocator, size);
+    if (!capacity) return SAT_ERR_MEMORY;
+    p.cost = NULL;
+    p.cost_fn = softassign__wrapped_cost;
+    p.cost_user = &stated;
+    p.columns += optional;
+    for (j = 0; j < p.columns; j++) {
+        capacity[j] = j == problem->columns ? problem->rows : problem->capacity ? problem->capacity[j] : options->capacity_default;
+        capacity[p.columns + j] = problem->minimum_use && j < problem->columns ? problem->minimum_use[j] : 0;
+    }
+    p.capacity = capacity;
+    if (p.minimum_use) p.minimum_use = capacity + p.columns;
+    result = softassign__solve_plain(column_of_row, &p, options, problem->cost != NULL, report);
+    sat__release(&allocator, capacity, size);
+    return result;
+}
+
+SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_problem *problem,
+                                           const softassign_options *options, softassign_report *report)
+{
+    softassign_options o = options ? *options : softassign_defaults();
+    sat__text ignored = sat__text_begin(NULL, 0);
+    if (report) {
+        memset(report, 0, sizeof *report);
+        report->row_error = report->column_error = -1;
+    }
+    if (!column_of_row || !softassign__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    if (!softassign__problem_is_valid(problem)) return SAT_ERR_ARGUMENT;
+    if (!softassign__explain_problem(&ignored, problem, &o)) {
+        if (report) report->column_error = softassign__over_used(problem, &o);
+        return SAT_ERR_ARGUMENT;
+    }
+    if (problem->maximise || problem->unassigned_cost > 0) return softassign__solve_wrapped(column_of_row, problem, &o, report);
+    return softassign__solve_plain(column_of_row, problem, &o, problem->cost != NULL, report);
 }
 
 #ifndef SOFTASSIGN_NO_MOSAIC
@@ -3907,6 +4118,7 @@ struct softassign_gl {
     unsigned texture[SOFTASSIGN__TEXTURES], framebuffer[SOFTASSIGN__TEXTURES];
     int rows, columns;
     float largest; /* cost */
+    double rounding; /* of a cost, relative */
 };
 
 static void softassign__gl_delete_textures(softassign_gl *g)
@@ -4177,12 +4389,30 @@ static sat_result softassign__gl_find_largest(softassign_gl *g)
     return result;
 }
 
+/* What no pass looks at is refused, not ignored. */
+static int softassign__gl_explain(softassign_gl *g, const softassign_problem *p)
+{
+    sat__text t = sat__text_begin(g->gl.message, sizeof g->gl.message);
+    const char *name = NULL;
+    if (!softassign__explain_costs(&t, p)) return 0;
+    if (p->capacity) name = "capacity";
+    else if (p->minimum_use) name = "minimum_use";
+    else if (p->previous) name = "previous";
+    else if (p->maximise) name = "maximise";
+    else if (p->unassigned_cost > 0) name = "unassigned_cost";
+    if (!name) return 1;
+    sat__text_add(&t, name);
+    sat__text_add(&t, " is given; the passes do not know it");
+    return 0;
+}
+
 SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softassign_problem *problem)
 {
     sat__gl_state state;
     sat_result result = SAT_OK;
     float *row;
-    if (!gl || !softassign__problem_is_valid(problem)) return SAT_ERR_ARGUMENT;
+    if (!gl) return SAT_ERR_ARGUMENT;
+    if (!softassign__gl_explain(gl, problem)) return SAT_ERR_ARGUMENT;
     result = softassign__gl_check_costs(problem);
     if (result != SAT_OK) return result;
     sat__gl_begin(&gl->gl, &state, 3);
@@ -4194,6 +4424,7 @@ SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softa
         result = row ? softassign__gl_upload_costs(gl, problem, row) : SAT_ERR_MEMORY;
         sat__release(&gl->allocator, row, size);
     }
+    gl->rounding = problem->cost || problem->cost_fn ? 1e-6 : 1e-6 + 6e-8 * problem->feature_count;
     if (result == SAT_OK) result = softassign__gl_find_largest(gl);
     if (result == SAT_OK) result = sat__gl_check(&gl->gl, "OpenGL refused the costs");
     sat__gl_end(&gl->gl, &state);
@@ -4314,13 +4545,20 @@ static sat_result softassign__gl_bound(softassign_gl *g, int rows, const float *
     size_t size = (size_t)g->rows * 2 * sizeof(float);
     float *least = (float *)sat__alloc(&g->allocator, size);
     softassign__sum sum = {0, 0, 0};
+    double dearest = 0, lost = 0;
     sat_result result;
     int i;
     if (!least) return SAT_ERR_MEMORY;
     result = sat__gl_read(&g->gl, least, g->texture[rows], SAT__GL_RG32F, 1, g->rows);
-    for (i = 0; i < g->rows; i++) softassign__add(&sum, (double)least[2 * i]);
-    for (i = 0; i < g->columns; i++) softassign__add(&sum, (double)price[i]);
-    *bound = softassign__total_below(&sum) - sum.magnitude * 1e-6;
+    for (i = 0; i < g->columns; i++) {
+        softassign__add(&sum, (double)price[i]);
+        if (fabs((double)price[i]) > dearest) dearest = fabs((double)price[i]);
+    }
+    for (i = 0; i < g->rows; i++) { /* |cost| is at most |least| + the price */
+        softassign__add(&sum, (double)least[2 * i]);
+        lost += fabs((double)least[2 * i]) + 2 * dearest;
+    }
+    *bound = softassign__total_below(&sum) - lost * g->rounding;
     sat__release(&g->allocator, least, size);
     return result;
 }

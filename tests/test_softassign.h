@@ -1517,3 +1517,271 @@ TEST(softassign_closed_columns_leave_lists_whole)
     free(columns);
     free(cost);
 }
+
+/* ---- options and problems: each row of the table, each sentence ---- */
+
+static inline void set_field(const sat__field *field, softassign_options *o, double value) { sat__field_set(field, o, value); }
+
+/* Refused by solve and create, and named. */
+static inline void check_refused(const softassign_options *o, const char *name)
+{
+    const float cost[6] = {1, 2, 3, 4, 5, 6};
+    softassign_problem p;
+    softassign *s = NULL;
+    char text[200];
+    int x[2];
+    memset(&p, 0, sizeof p);
+    p.rows = 2;
+    p.stride = p.columns = 3;
+    p.cost = cost;
+    EXPECT_EQ(softassign_solve(x, &p, o, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(softassign_create(&s, 2, 3, o), SAT_ERR_ARGUMENT);
+    EXPECT(softassign_explain(text, sizeof text, o) == text && strncmp(text, name, strlen(name)) == 0);
+    EXPECT(softassign_explain_problem(text, sizeof text, &p, o) == text && strncmp(text, name, strlen(name)) == 0);
+}
+
+TEST(softassign_every_option_is_checked_and_named)
+{
+    char text[200];
+    int i, k;
+    for (i = 0; i < SAT__COUNT(softassign__fields); i++) {
+        const sat__field *f = &softassign__fields[i];
+        softassign_options o = softassign_defaults();
+        const double good[3] = {f->low, f->high, f->initial};
+        if (f->type == 't' || f->type == 'a') continue;
+        for (k = 0; k < 3; k++) {
+            o.grid_width = 1; /* min_distance asks for it */
+            set_field(f, &o, good[k]);
+            EXPECT(softassign_explain(text, sizeof text, &o)[0] == 0);
+        }
+        if (f->high < 2147483647 || f->type != 'i') {
+            set_field(f, &o, f->high + (f->type == 'i' ? 1 : fabs(f->high) * 1e-6));
+            check_refused(&o, f->name);
+        }
+        set_field(f, &o, f->low - (f->type == 'i' ? 1 : fabs(f->low) * 1e-6 + 1e-12));
+        check_refused(&o, f->name);
+        if (f->type != 'd') continue;
+        set_field(f, &o, (double)NAN);
+        check_refused(&o, f->name);
+    }
+    EXPECT(strcmp(softassign_explain(text, sizeof text, NULL), "") == 0);
+    EXPECT(softassign_explain(NULL, 0, NULL) == NULL);
+}
+
+/* First, last and default of every two options: what explain lets pass is solved, the rest is refused. */
+TEST(softassign_corners_of_options_in_pairs)
+{
+    problem q = make_features(6, 8, 3, 4);
+    int a, b, k, wrong = 0, count = SAT__COUNT(softassign__fields) - 2;
+    for (a = 0; a < count; a++)
+        for (b = a; b < count; b++)
+            for (k = 0; k < 9; k++) {
+                const sat__field *f = &softassign__fields[a], *g = &softassign__fields[b];
+                const double first[3] = {f->low, f->high < 2e9 || f->type == 'd' ? f->high : 3, f->initial};
+                const double second[3] = {g->low, g->high < 2e9 || g->type == 'd' ? g->high : 3, g->initial};
+                softassign_options o = softassign_method_defaults((softassign_method)((a + b + k) % (SOFTASSIGN_ANTS + 1)));
+                softassign_report r;
+                char text[200];
+                int x[6], j;
+                sat_result result;
+                for (j = 0; j < 3; j++) o.iterations[j] = 3;
+                set_field(f, &o, first[k / 3]);
+                set_field(g, &o, second[k % 3]);
+                result = softassign_solve(x, &q.p, &o, &r);
+                if (softassign_explain_problem(text, sizeof text, &q.p, &o)[0]) wrong += result != SAT_ERR_ARGUMENT;
+                else if (o.capacity_default == 0) wrong += result != SAT_ERR_LIMIT;
+                else wrong += result != SAT_OK || !(r.lower_bound <= r.cost);
+            }
+    EXPECT_EQ(wrong, 0);
+    free_problem(&q);
+}
+
+TEST(softassign_every_refused_problem_is_named)
+{
+    const float cost[6] = {1, 2, 3, 4, 5, 6};
+    int bad[3] = {1, -1, 1}, less[3] = {0, 2, 0}, stay[2] = {0, 3}, x[2];
+    softassign_problem p;
+    softassign_options o;
+    softassign *s = NULL;
+    double price[3];
+    char text[200];
+#define REFUSED(change, words)                                                                                                   \
+    (memset(&p, 0, sizeof p), o = softassign_defaults(), p.rows = 2, p.columns = 3, p.cost = cost, p.stride = 3, (void)(change), \
+     EXPECT_EQ(softassign_solve(x, &p, &o, NULL), SAT_ERR_ARGUMENT),                                                             \
+     EXPECT(strcmp(softassign_explain_problem(text, sizeof text, &p, &o), words) == 0) ? (void)0 : (void)puts(text))
+    REFUSED(p.rows = 0, "rows is 0; 1..2.14748e9");
+    REFUSED(p.columns = -1, "columns is -1; 1..2.14748e9");
+    REFUSED(p.stride = 2, "stride is shorter than a row of the matrix");
+    REFUSED(p.cost = NULL, "cost, cost_fn and row_features are NULL");
+    REFUSED((p.cost = NULL, p.row_features = cost), "column_features is NULL");
+    REFUSED((p.cost = NULL, p.row_features = p.column_features = cost), "feature_count is 0; 1..2.14748e9");
+    REFUSED(p.capacity = bad, "capacity[1] is -1; 0..2.14748e9");
+    REFUSED(p.minimum_use = less, "minimum_use[1] is 2; 0..1");
+    REFUSED(p.previous = stay, "previous[1] is 3; -1..2");
+    REFUSED(p.maximise = 2, "maximise is 2; 0..1");
+    REFUSED(p.unassigned_cost = -1, "unassigned_cost is -1; 0..1e30");
+    REFUSED(p.unassigned_cost = NAN, "unassigned_cost is NaN; 0..1e30");
+    REFUSED((p.maximise = 1, o.method = SOFTASSIGN_ANTS), "maximise is 1; only AUTO, EXACT and FAST take it");
+    REFUSED((p.unassigned_cost = 1, o.method = SOFTASSIGN_GREEDY), "unassigned_cost is above 0; only AUTO, EXACT and FAST take it");
+    REFUSED((p.unassigned_cost = 1, o.grid_width = 2, o.min_distance = 2), "unassigned_cost is above 0; min_distance does not go with it");
+    REFUSED((p.minimum_use = stay, stay[1] = 0, o.method = SOFTASSIGN_GREEDY), "minimum_use is given; only AUTO, EXACT and FAST take it");
+    REFUSED((p.minimum_use = stay, o.row_price = price), "minimum_use is given; row_price and column_price do not go with it");
+    REFUSED((o.method = SOFTASSIGN_FAST, o.column_price = price), "row_price or column_price is given; only AUTO and EXACT have them");
+    REFUSED(o.min_distance = 1, "grid_width is 0; min_distance above 0 needs the grid");
+#undef REFUSED
+    EXPECT(strcmp(softassign_explain_problem(text, sizeof text, NULL, NULL), "problem is NULL") == 0);
+    EXPECT(strcmp(softassign_explain_problem(text, 5, NULL, NULL), "prob") == 0);
+    EXPECT(softassign_explain_problem(NULL, 0, &p, NULL) == NULL);
+    EXPECT_EQ(softassign_create(&s, 2, 3, NULL), SAT_OK);
+    memset(&p, 0, sizeof p);
+    p.rows = 2;
+    p.stride = p.columns = 3;
+    p.cost = cost;
+    p.maximise = 1; /* of softassign_solve only */
+    EXPECT_EQ(softassign_step(s, x, &p, 100, NULL), SAT_ERR_ARGUMENT);
+    p.maximise = 0;
+    p.unassigned_cost = 1;
+    EXPECT_EQ(softassign_step(s, x, &p, 100, NULL), SAT_ERR_ARGUMENT);
+    softassign_destroy(s);
+}
+
+/* ---- rows left out, the largest total, dual prices: against enumeration ---- */
+
+/* u_i + v_j <= cost (maximise: >= gain), equal where used, 0 where there is room; together they are worth the optimum. */
+static inline int prices_are_dual(const brute *b, int columns, const int *x, const double *u, const double *v, double price, int square, long double optimum)
+{
+    double scale = price, sum = 0;
+    int i, j, ok = 1, used[BRUTE_COLUMNS] = {0};
+    for (i = 0; i < b->rows * BRUTE_COLUMNS; i++)
+        if (!brute_is_forbidden(b->cost[i]) && fabs((double)b->cost[i]) > scale) scale = fabs((double)b->cost[i]);
+    for (i = 0; i < b->rows; i++) {
+        if (x[i] >= 0) used[x[i]]++;
+        sum += u[i];
+        ok &= price == 0 || u[i] <= price + 1e-12 * scale;
+        ok &= x[i] >= 0 || fabs(u[i] - price) <= 1e-12 * scale;
+        for (j = 0; j < columns; j++) {
+            double off = brute_is_forbidden(b->cost[i * BRUTE_COLUMNS + j]) || b->left[j] == 0 ? 0 : (double)b->cost[i * BRUTE_COLUMNS + j] - u[i] - v[j];
+            ok &= off >= -1e-12 * scale && (x[i] != j || off <= 1e-12 * scale);
+        }
+    }
+    for (j = 0; j < columns; j++) {
+        sum += b->left[j] * v[j];
+        if (!square) ok &= v[j] <= 0 && (v[j] >= 0 || used[j] >= b->left[j] || used[j] == b->rows);
+    }
+    return ok && fabs(sum - (double)optimum) <= 1e-11 * scale;
+}
+
+TEST(softassign_rows_left_out_and_the_largest_total_by_brute_force)
+{
+    uint64_t seed = 77;
+    int n, m, i, j;
+    for (n = 0; n < 6000 && expect_state.failures < 10; n++) {
+        static const int kinds[] = {0, 1, 3, 4, 6, 8};
+        brute b;
+        softassign_problem p;
+        float given[BRUTE_ROWS * BRUTE_COLUMNS];
+        int kind = kinds[support_below(&seed, 6)], capacities = support_below(&seed, 3) == 0, optional = support_below(&seed, 3) > 0;
+        int maximise = (int)support_below(&seed, 2);
+        float price = optional ? (float)(support_uniform(&seed) * (kind == 0 ? 0.8 : kind == 8 ? 4e5 : 4)) + 1e-3f : 0;
+        memset(&b, 0, sizeof b);
+        memset(&p, 0, sizeof p);
+        p.rows = b.rows = 1 + (int)support_below(&seed, BRUTE_ROWS);
+        p.columns = 1 + (int)support_below(&seed, BRUTE_COLUMNS - 1);
+        b.columns = p.columns + optional;
+        for (i = 0; i < BRUTE_ROWS * BRUTE_COLUMNS; i++) {
+            float c = brute_cost(kind, &seed);
+            given[i] = maximise && brute_is_forbidden(c) ? -c : c;
+            b.cost[i] = maximise && !brute_is_forbidden(c) ? -c : c;
+            if (optional && i % BRUTE_COLUMNS == p.columns) b.cost[i] = maximise ? -price : price;
+        }
+        for (j = 0; j < p.columns; j++) b.left[j] = capacities ? (int)support_below(&seed, 4) : 1;
+        if (optional) b.left[p.columns] = p.rows;
+        p.cost = given;
+        p.stride = BRUTE_COLUMNS;
+        p.maximise = maximise;
+        p.unassigned_cost = price;
+        if (capacities) p.capacity = b.left;
+        brute_walk(&b, 0, 0, 0);
+        for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_FAST; m++) {
+            softassign_options o = softassign_method_defaults((softassign_method)m);
+            softassign_problem with_all = p;
+            softassign_report r;
+            double u[BRUTE_ROWS], v[BRUTE_COLUMNS];
+            int x[BRUTE_ROWS], y[BRUTE_ROWS];
+            sat_result result;
+            o.gap = 1e-14;
+            if (m != SOFTASSIGN_FAST) {
+                o.row_price = u;
+                o.column_price = v;
+            }
+            result = softassign_solve(x, &p, &o, &r);
+            for (i = 0; i < p.rows && result == SAT_OK; i++) {
+                EXPECT(x[i] >= 0 || optional);
+                y[i] = x[i] < 0 ? p.columns : x[i];
+            }
+            with_all.columns = b.columns;
+            if (maximise) {
+                r.cost = -r.cost;
+                r.lower_bound = -r.lower_bound;
+            }
+            brute_check(&b, &with_all, result, y, &r, maximise ? "maximise" : "optional");
+            if (result != SAT_OK || !b.found || m == SOFTASSIGN_FAST || kind == 3) continue;
+            for (i = 0; maximise && i < p.rows; i++) u[i] = -u[i];
+            for (j = 0; maximise && j < p.columns; j++) v[j] = -v[j];
+            if (maximise && optional) { /* the price is a gain: compare as a shifted problem is no proof, so only the sums */
+                double sum = 0;
+                for (i = 0; i < p.rows; i++) sum += u[i];
+                for (j = 0; j < p.columns; j++) sum += b.left[j] * v[j];
+                EXPECT(fabs(sum - (double)b.best) <= 1e-10 * (1 + (double)b.magnitude));
+            } else EXPECT(prices_are_dual(&b, p.columns, x, u, v, (double)price, p.rows == p.columns, b.best));
+        }
+    }
+}
+
+/* The lines of the header. */
+TEST(softassign_a_tracker_leaves_far_detections_alone)
+{
+    enum { TRACKS = 3, DETECTIONS = 2 };
+    float distance[TRACKS][DETECTIONS] = {{10, 25}, {12, 90}, {80, 70}};
+    int detection_of_track[TRACKS];
+    softassign_problem p;
+    memset(&p, 0, sizeof p);
+    p.rows = TRACKS, p.columns = DETECTIONS;
+    p.cost = &distance[0][0], p.stride = DETECTIONS;
+    p.unassigned_cost = 30;
+    EXPECT_EQ(softassign_solve(detection_of_track, &p, NULL, NULL), SAT_OK);
+    EXPECT(detection_of_track[0] == 1 && detection_of_track[1] == 0 && detection_of_track[2] == -1);
+    distance[0][1] = SOFTASSIGN__INFINITY; /* 10 + 30 or 12 + 30 */
+    EXPECT_EQ(softassign_solve(detection_of_track, &p, NULL, NULL), SAT_OK);
+    EXPECT(detection_of_track[0] == 0 && detection_of_track[1] == -1 && detection_of_track[2] == -1);
+}
+
+/* Many rows, features and lists: as a matrix with a column of its own for every row. */
+TEST(softassign_rows_left_out_of_larger_problems)
+{
+    int turn, i, j;
+    for (turn = 0; turn < 4; turn++) {
+        int rows = 60, columns = turn % 2 ? 2000 : 40, x[60], none = 0;
+        problem q = make_features(rows, columns, 5, (uint64_t)turn + 3);
+        float *wide = (float *)malloc((size_t)rows * (size_t)(rows + columns) * sizeof *wide), price = turn % 2 ? 14 : 40;
+        softassign_report r;
+        long double optimum, sum = 0;
+        for (i = 0; i < rows; i++)
+            for (j = 0; j < columns + rows; j++) wide[i * (columns + rows) + j] = j < columns ? q.cost[i * columns + j] : price;
+        optimum = reference_optimum(wide, rows, columns + rows, NULL, NULL);
+        q.p.unassigned_cost = price;
+        if (turn < 2) {
+            q.p.cost = q.cost;
+            q.p.stride = columns;
+        }
+        EXPECT_EQ(softassign_solve(x, &q.p, NULL, &r), SAT_OK);
+        for (i = 0; i < rows; i++) {
+            sum += (long double)(x[i] < 0 ? price : q.cost[i * columns + x[i]]);
+            none += x[i] < 0;
+        }
+        EXPECT_REL(sum, optimum, 1e-6);
+        EXPECT(r.complete && r.gap < 1e-12 && none > 0 && fabs(r.cost - (double)sum) < 1e-4 * r.cost);
+        free(wide);
+        free_problem(&q);
+    }
+}

@@ -265,6 +265,7 @@ TEST(softassign_gl_refuses_and_names)
     softassign_options o = softassign_defaults();
     softassign_gl *gl = NULL;
     support_memory memory;
+    int lists[6] = {1, 1, 1, 1, 1, 1};
     EXPECT_EQ(softassign_gl_create(NULL, NULL, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(softassign_gl_create(&gl, NULL, NULL), SAT_ERR_ARGUMENT);
     EXPECT(gl == NULL && softassign_gl_message(NULL) != NULL);
@@ -281,6 +282,17 @@ TEST(softassign_gl_refuses_and_names)
     EXPECT_EQ(softassign_gl_sweep(gl, price, NULL, 1, 1), SAT_ERR_ARGUMENT); /* no costs yet */
     EXPECT_EQ(softassign_gl_published(gl, soft, 6, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(softassign_gl_set_costs(gl, NULL), SAT_ERR_ARGUMENT);
+#define REFUSED(member, value)                                                                          \
+    (p = problem_of(cost, 4, 6), p.member = value, EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_ERR_ARGUMENT), \
+     EXPECT(strncmp(softassign_gl_message(gl), #member, strlen(#member)) == 0))
+    REFUSED(capacity, lists);
+    REFUSED(minimum_use, lists);
+    REFUSED(previous, lists);
+    REFUSED(maximise, 1);
+    REFUSED(unassigned_cost, 2);
+    REFUSED(rows, 0);
+#undef REFUSED
+    p = problem_of(cost, 4, 6);
     cost[5] = NAN;
     EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_ERR_NON_FINITE);
     cost[5] = 1;
@@ -305,5 +317,69 @@ TEST(softassign_gl_shaders_are_valid_in_es)
     if (!EXPECT_EQ(result, SAT_OK)) puts(softassign_gl_message(gl));
     softassign_gl_destroy(gl);
     EXPECT(strstr(softassign_gl_glsl(), "softassign_join") != NULL && strlen(softassign_gl_glsl()) < 4096);
+    close_gl();
+}
+
+/* The same options are refused as on the CPU. */
+TEST(softassign_gl_refuses_the_options_that_the_cpu_refuses)
+{
+    int i, k;
+    if (!open_gl()) return;
+    for (i = 0; i < SAT__COUNT(softassign__fields); i++) {
+        const sat__field *f = &softassign__fields[i];
+        const double value[2] = {f->low - 1, f->high + fabs(f->high)};
+        for (k = 0; k < 2 && f->type != 'a' && f->type != 't'; k++) {
+            softassign_options o = softassign_defaults();
+            softassign_gl *gl = NULL;
+            char text[200];
+            if (f->type == 'i' && !(value[k] < 2147483647)) continue;
+            sat__field_set(f, &o, value[k]);
+            if (f->also == 'I' && k) continue;
+            EXPECT(softassign_explain(text, sizeof text, &o)[0] != 0);
+            EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, &o), SAT_ERR_ARGUMENT);
+            EXPECT(gl == NULL);
+        }
+    }
+    close_gl();
+}
+
+/* Distances of many features round more in a pass: the bound is still below the optimum. */
+TEST(softassign_gl_bound_holds_for_many_features)
+{
+    static const int counts[] = {3, 48, 4000};
+    size_t k;
+    if (!open_gl()) return;
+    for (k = 0; k < 3; k++) {
+        int n = counts[k], i, j, x[12];
+        float *f = (float *)malloc(24 * (size_t)n * sizeof *f), price[12] = {0};
+        double bound, cost[12][12], least = 0;
+        uint64_t seed = k + 9;
+        softassign_problem p;
+        softassign_gl *gl;
+        softassign_report r;
+        memset(&p, 0, sizeof p);
+        for (i = 0; i < 24 * n; i++) f[i] = (float)(1e4 + 100 * support_uniform(&seed));
+        p.rows = p.columns = 12;
+        p.row_features = f;
+        p.column_features = f + 12 * n;
+        p.feature_count = n;
+        EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, NULL), SAT_OK);
+        EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_OK);
+        EXPECT_EQ(softassign_gl_sweep(gl, price, &bound, 1, 1), SAT_OK);
+        for (i = 0; i < 12; i++) { /* at the prices 0 the exact bound is the sum of the least distances */
+            double row = HUGE_VAL;
+            for (j = 0; j < 12; j++) {
+                int c;
+                for (cost[i][j] = 0, c = 0; c < n; c++) cost[i][j] += pow((double)f[i * n + c] - (double)f[(12 + j) * n + c], 2);
+                row = fmin(row, sqrt(cost[i][j]));
+            }
+            least += row;
+        }
+        EXPECT(bound <= least && bound > least * (1 - 2 * (1e-6 + 6e-8 * n)));
+        EXPECT_EQ(softassign_solve(x, &p, NULL, &r), SAT_OK);
+        EXPECT(bound <= r.cost);
+        softassign_gl_destroy(gl);
+        free(f);
+    }
     close_gl();
 }
