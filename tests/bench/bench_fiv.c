@@ -622,6 +622,66 @@ static void many_occluders(bench *b)
     fiv_occluder_destroy(o);
 }
 
+/* ---- what rests on a floor ---- */
+
+static void resting_row(bench *b, const char *light, int big, double gap)
+{
+    fiv_occluder_options o = fiv_occluder_defaults();
+    fiv_irradiance_stats stats;
+    fiv_occluder *occluder;
+    fiv_instance instance;
+    double error[2], seconds[2], points = b->side * b->side;
+    run r;
+    int own;
+    if (big) o.theta = 64, o.phi = 33, o.rho = 30;
+    for (own = 0; own < 2; own++) {
+        o.keep_mesh = own;
+        check(fiv_occluder_create(&occluder, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o, NULL), "occluder");
+        check(fiv_occluder_light(occluder, b->environment, NULL), "light");
+        instance = instance_of(b, occluder);
+        r.b = b, r.instances = &instance, r.count = 1;
+        error[own] = error_of(&r, 3, &seconds[own]);
+        check(fiv_irradiance(b->rgb, b->points, b->normals, (size_t)points, b->environment, &instance, 1, &r.options, &stats), "irradiance");
+        fiv_occluder_destroy(occluder);
+    }
+    bench_row("%s\t%s\t%.3f\t%dx%dx%d\t%.4f\t%.4f\t%.3f\t%.2f\t%.1f\t%.1f", b->mesh_name, light, gap, o.theta, o.phi, o.rho, error[0], error[1],
+              1e6 * seconds[0] / points, 1e6 * seconds[1] / points, 100 * (double)stats.own_masks / points, 100 * (double)stats.rays / points);
+}
+
+static void resting(int side)
+{
+    static const char *const names[5] = {"box", "mesh/queen.ply", "mesh/fandisk.ply", "mesh/bunny_small.ply", "mesh/dragon_res4.ply"};
+    static const double gaps[2] = {0, 0.002};
+    static const int lights[2] = {0, 4};
+    int i, g, l, big, last = bench_smoke() ? 1 : 5;
+    bench_table("What rests on a floor 3 R wide: own masks near contact, rays for suns (keep_mesh)",
+                "mesh\tenvironment\tgap_R\tsamples\tnrmse_interpolated\tnrmse\tpoint_us_interpolated\tpoint_us\town_masks_percent\trays_percent");
+    bench_note("nrmse: eq 17 against rays to every texel of the light and to each split-off light.");
+    for (i = 0; i < last; i++) {
+        bench b;
+        memset(&b, 0, sizeof b);
+        if (i == 0) b.mesh = reference_box(0.5f, 0.3f, 0.4f), b.mesh_name = "box";
+        else b.mesh = load(names[i], &b.mesh_name);
+        open_plane(&b, side);
+        for (l = 0; l < 2; l++)
+            for (g = 0; g < 2; g++) {
+                size_t n;
+                for (n = 0; n < (size_t)(side * side); n++) {
+                    b.points[3 * n] = 3 * (((float)(n % (size_t)side) + 0.5f) / (float)side - 0.5f);
+                    b.points[3 * n + 1] = b.low - (float)gaps[g];
+                    b.points[3 * n + 2] = 3 * (((float)(n / (size_t)side) + 0.5f) / (float)side - 0.5f);
+                }
+                if (!open_environment(&b, lights[l])) continue;
+                plane_truth(&b, 1);
+                for (big = 0; big < (bench_quick() ? 1 : 2); big++) resting_row(&b, environment_names[lights[l]], big, gaps[g]);
+            }
+        reference_free(&b.scene);
+        reference_mesh_free(&b.mesh);
+        fiv_environment_destroy(b.environment);
+        free(b.points), free(b.covered), free(b.directions), free(b.powers);
+    }
+}
+
 /* ---- table 4, our column ---- */
 
 static void table_4(void)
@@ -649,6 +709,7 @@ int main(void)
     tables_17_18(&b);
     many_occluders(&b);
     table_4();
+    resting(bench_smoke() ? 12 : bench_quick() ? 40 : 96);
     b.side = bench_smoke() ? 8 : bench_quick() ? 20 : 40; /* the first rows of the plane would be a strip: start anew */
     reference_free(&b.scene);
     open_plane(&b, b.side);
