@@ -113,6 +113,26 @@ check_comments() {
     offences comments "$("$dir/comments" | sed 's/^\([a-z_0-9.]*\)/\1/')"
 }
 
+# The list of contents: a line "CONTENTS" in the comments, then lines "   >> name   what it holds". Each name stands once more, as
+# the mark of its section, in the same order, and no section has more than 700 lines.
+check_contents() {
+    grep -q '^ *CONTENTS' "$lib.h" || { skip "there is no list of contents"; return; }
+    offences contents "$(awk '
+        /^ *CONTENTS/ { listing = 1; next }
+        listing && /\*\// { listing = 0 }
+        match($0, />> [A-Za-z][A-Za-z0-9 ,_-]*/) {
+            name = substr($0, RSTART + 3, RLENGTH - 3); sub(/(  .*| +)$/, "", name)
+            if (listing) { want[++n] = name; next }
+            if (name != want[++found]) print "section " name " stands where the list says " (found in want ? want[found] : "nothing")
+            if (found > 1 && FNR - at > 700) print "section " last " has " FNR - at " lines"
+            at = FNR; last = name
+        }
+        END {
+            for (i = found + 1; i <= n; ++i) print "section " want[i] " is in the list only"
+            if (at && FNR - at > 700) print "section " last " has " FNR - at " lines"
+        }' "$lib.h")"
+}
+
 # every public function, each argument NULL or zero in turn
 check_null() {
     dir=build/check/house/null; rm -rf "$dir"; mkdir -p "$dir"
@@ -131,4 +151,5 @@ check_stack
 check_used
 check_gl
 check_comments
+check_contents
 finish
