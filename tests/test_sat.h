@@ -1304,6 +1304,22 @@ TEST(every_refusal_names_its_field)
 #undef REFUSED
 }
 
+/* Rows that do not start at a multiple of 16 bytes, in a table larger than the cache. */
+TEST(narrow_and_very_tall_tables)
+{
+    int width = 17, height = 70000, y;
+    float *pixels = (float *)malloc((size_t)width * (size_t)height * sizeof(float));
+    sat_table *t = NULL;
+    sat_image view = sat_image_f32(pixels, width, height, 1);
+    for (y = 0; y < width * height; y++) pixels[y] = (float)(y % 5);
+    EXPECT_EQ(sat_create(&t, width, height, 1, NULL), SAT_OK);
+    EXPECT_EQ(sat_build(t, &view), SAT_OK);
+    EXPECT(sat_sum(t, 0, 0, 0, width, height) == 2.0 * width * height);
+    EXPECT(sat_sum(t, 0, 16, 69999, 17, 70000) == (double)pixels[width * height - 1]);
+    sat_destroy(t);
+    free(pixels);
+}
+
 /* ---- memory, arguments, small functions */
 
 TEST(one_allocation_at_create_and_none_afterwards)

@@ -861,6 +861,38 @@ TEST(repeated_builds_make_nothing)
     test_close();
 }
 
+static int test_gl_refused(const sat_gl_options *options)
+{
+    sat_gl *g = NULL;
+    sat_result r = sat_gl_create(&g, test_get_proc, options);
+    sat_gl_destroy(g);
+    return r == SAT_ERR_ARGUMENT;
+}
+
+TEST(every_refusal_names_its_field)
+{
+    char text[200];
+    size_t i, j;
+    if (!test_open()) return;
+    for (i = 0; i < SAT__COUNT(sat__gl_fields); i++) {
+        const sat__field *f = &sat__gl_fields[i];
+        double bad[3];
+        if (f->type == 'a') continue;
+        bad[0] = f->type == 'i' ? f->low - 1 : f->low - 1 - fabs(f->low);
+        bad[1] = f->type == 'i' ? f->high + 1 : f->high * 2;
+        bad[2] = f->type == 'i' ? f->high + 100 : (double)sat__float_from_bits(0x7fc00000u);
+        for (j = 0; j < 3; j++) {
+            sat_gl_options options = sat_gl_defaults();
+            sat__field_set(f, &options, bad[j]);
+            EXPECT(test_gl_refused(&options));
+            if (!EXPECT(strncmp(sat_explain_gl(text, sizeof text, &options), f->name, strlen(f->name)) == 0)) printf("%s: \"%s\"\n", f->name, text);
+        }
+    }
+    EXPECT(strcmp(sat_explain_gl(text, sizeof text, NULL), "") == 0);
+    EXPECT(sat_explain_gl(NULL, 0, NULL) == NULL);
+    test_close();
+}
+
 TEST(bad_arguments)
 {
     sat_gl_options options;
