@@ -53,7 +53,7 @@
    An environment is one block; an occluder has one each for tables, masks (keep_masks) and mesh (keep_mesh, or no keep_masks). Only
    create, share and load allocate. Functions take sat_threads in their options; different objects may be used at
    once, and any number of threads may call fiv_irradiance on the same ones. All arguments are checked in every build.
-   fiv_irradiance takes 64 to 90 KB of stack a worker.
+   No function takes more than 32 KB of stack: fiv_irradiance 20 KB, and up to 34 KB below it, on each of at most 256 workers.
 
    NUMERICS
    - Same bits for any number of workers and any order of instances (sums of parts of I_tot in 2^-40 fixed point); where the
@@ -165,8 +165,8 @@ FIV_DEF void fiv_environment_irradiance(const fiv_environment *environment, floa
 /* The vector of the whole environment (eq 10): x, y, z of red, then of green, then of blue. */
 FIV_DEF void fiv_environment_vector(const fiv_environment *environment, float fiv[9]);
 /* The M directional lights that the environment is made of (eq 6): first the split-off ones, then one a cube texel.
-   Fills at most `capacity` directions and powers (3 floats each: unit vector, radiance times solid angle) and
-   returns M. */
+   Fills at most `capacity` directions and powers (3 floats each: unit vector, radiance times solid angle; none where one of
+   them is NULL) and returns M. */
 FIV_DEF size_t fiv_environment_lights(const fiv_environment *environment, float *directions, float *powers, size_t capacity);
 
 /* ------------------------------------------------------------------------------------------------
@@ -1119,9 +1119,11 @@ FIV_DEF void fiv_environment_irradiance(const fiv_environment *e, float rgb[3], 
 {
     float n[3], d[3];
     int i, c;
+    if (!rgb) return;
     rgb[0] = rgb[1] = rgb[2] = 0;
+    if (!e || !normal) return;
     fiv__normalise(n, normal);
-    if (!e || !(fiv__dot(n, n) > 0.5f)) return;
+    if (!(fiv__dot(n, n) > 0.5f)) return;
     fiv__diffuse(rgb, e, n);
     fiv__turn_back(d, e->rotation, n);
     for (i = 0; i < e->light_count; i++) {
@@ -1134,6 +1136,7 @@ FIV_DEF void fiv_environment_irradiance(const fiv_environment *e, float rgb[3], 
 FIV_DEF void fiv_environment_vector(const fiv_environment *e, float fiv[9])
 {
     int i, c, k;
+    if (!fiv) return;
     for (k = 0; k < 9; k++) fiv[k] = e ? (float)e->vector[k] : 0;
     for (i = 0; e && i < e->light_count; i++) {
         float d[3];
@@ -1147,6 +1150,7 @@ FIV_DEF size_t fiv_environment_lights(const fiv_environment *e, float *direction
 {
     size_t i, c, texels, split;
     if (!e) return 0;
+    if (!directions || !powers) capacity = 0;
     split = (size_t)e->light_count;
     texels = 6 * (size_t)e->face * (size_t)e->face;
     for (i = 0; i < split + texels && i < capacity; i++) {
@@ -1312,7 +1316,7 @@ static void fiv__make_clusters(fiv__mesh *mesh, const uint64_t *order, const uns
    (Badoiu and Clarkson 2003); within 1 % of the smallest ball. */
 static void fiv__bounding_ball(double centre[3], double *radius, const fiv__mesh *mesh, const float *positions)
 {
-    size_t i, far = 0;
+    size_t i, farthest = 0;
     int step, k;
     double best = 0;
     centre[0] = centre[1] = centre[2] = *radius = 0;
@@ -1325,11 +1329,11 @@ static void fiv__bounding_ball(double centre[3], double *radius, const fiv__mesh
             double x = (double)p[0] - centre[0], y = (double)p[1] - centre[1], z = (double)p[2] - centre[2], d = x * x + y * y + z * z;
             if (d > best) {
                 best = d;
-                far = i;
+                farthest = i;
             }
         }
         if (step == 100) break;
-        for (k = 0; k < 3; k++) centre[k] += ((double)positions[3 * (size_t)mesh->source[far] + (size_t)k] - centre[k]) / (step + 1);
+        for (k = 0; k < 3; k++) centre[k] += ((double)positions[3 * (size_t)mesh->source[farthest] + (size_t)k] - centre[k]) / (step + 1);
     }
     for (k = 0; k < 3; k++) centre[k] = (double)(float)centre[k];
     *radius = sqrt(best) * 1.000001;
@@ -1938,8 +1942,8 @@ static inline float fiv__log2(float v)
 
 static inline float fiv__atan2(float y, float x)
 {
-    float ax = fabsf(x), ay = fabsf(y), big = ax > ay ? ax : ay, small = ax > ay ? ay : ax;
-    float t = big > 0 ? small / big : 0, s = t * t;
+    float ax = fabsf(x), ay = fabsf(y), big = ax > ay ? ax : ay, less = ax > ay ? ay : ax;
+    float t = big > 0 ? less / big : 0, s = t * t;
     float a = t * (0.9998660f + s * (-0.3302995f + s * (0.1801410f + s * (-0.0851330f + s * 0.0208351f))));
     if (ay > ax) a = 1.57079633f - a;
     if (x < 0) a = 3.14159265f - a;
@@ -2000,6 +2004,14 @@ enum {
 };
 enum { FIV__VALID, FIV__INSIDE, FIV__STALE, FIV__WANTED };
 
+/* The texels around a split-off light. */
+typedef struct fiv__near {
+    int count, row_count;
+    uint64_t texel[FIV__NEAR];     /* by rising distance: distance (21 a texel) << 32 | row << 8 | x */
+    int row[FIV__NEAR_ROWS];       /* the same texels as bits */
+    uint64_t bits[FIV__NEAR_ROWS];
+} fiv__near;
+
 struct fiv_occluder {
     sat_allocator allocator;
     sat_threads threads;
@@ -2018,6 +2030,7 @@ struct fiv_occluder {
     float *table;          /* FIV__TERMS a sample: rho^2 times vector and solid angle, the latter < 0 where not valid */
     uint16_t *half_table;  /* the same as half floats */
     signed char *distance; /* max_lights a sample: from the silhouette to the light, + covered; 21 = one mask texel */
+    fiv__near *lights;     /* max_lights: the lights in the occluder's frame */
     double *sums;          /* integrals of the environment in the occluder's frame */
     unsigned char *state;  /* FIV__VALID ... a sample */
     float *support;        /* largest extent along a direction, in radii */
@@ -2085,6 +2098,7 @@ static void fiv__occluder_layout(fiv_occluder *o, sat__arena *arena)
     o->table = (float *)sat__carve(arena, o->half_floats ? 0 : n, FIV__TERMS * sizeof(float));
     o->half_table = (uint16_t *)sat__carve(arena, o->half_floats ? FIV__TERMS * n + 8 : 0, sizeof(uint16_t));
     o->distance = (signed char *)sat__carve(arena, n, (size_t)o->max_lights);
+    o->lights = (fiv__near *)sat__carve(arena, (size_t)o->max_lights, sizeof *o->lights);
     if (o->share) return;
     o->state = (unsigned char *)sat__carve(arena, n, 1);
     o->support = (float *)sat__carve(arena, FIV__SUPPORT * FIV__SUPPORT, sizeof(float));
@@ -2396,13 +2410,6 @@ FIV_DEF sat_result fiv_occluder_share(fiv_occluder **out, const fiv_occluder *ma
    blur over a whole cell. The angle from the light to the mask's border changes smoothly, so that is what is
    interpolated, and the step is taken afterwards. */
 
-typedef struct fiv__near {
-    int count, row_count;
-    uint64_t texel[FIV__NEAR];     /* by rising distance: distance (21 a texel) << 32 | row << 8 | x */
-    int row[FIV__NEAR_ROWS];       /* the same texels as bits */
-    uint64_t bits[FIV__NEAR_ROWS];
-} fiv__near;
-
 static void fiv__find_near(fiv__near *near_light, const float direction[3], int size)
 {
     uint64_t scratch[FIV__NEAR], *sorted;
@@ -2452,11 +2459,6 @@ static int fiv__silhouette_distance(const fiv__near *near_light, const uint64_t 
 
 /* ---- lighting */
 
-typedef struct fiv__lighting {
-    fiv_occluder *occluder;
-    fiv__near lights[FIV_MAX_LIGHTS];
-} fiv__lighting;
-
 static void fiv__store_vector(fiv_occluder *o, size_t sample, const double sum[FIV__TERMS])
 {
     double radius = (double)o->grid.shell[sample / ((size_t)o->grid.theta * (size_t)o->grid.phi)];
@@ -2470,9 +2472,8 @@ static void fiv__store_vector(fiv_occluder *o, size_t sample, const double sum[F
         else o->table[FIV__TERMS * sample + (size_t)k] = v[k];
 }
 
-static void fiv__light_sample(const fiv__lighting *l, size_t sample, const uint16_t *words, size_t count)
+static void fiv__light_sample(fiv_occluder *o, size_t sample, const uint16_t *words, size_t count)
 {
-    fiv_occluder *o = l->occluder;
     double sum[FIV__TERMS];
     int i;
     fiv__integrate(sum, o->sums, words, count, o->face);
@@ -2481,25 +2482,23 @@ static void fiv__light_sample(const fiv__lighting *l, size_t sample, const uint1
         uint64_t rows[FIV__MAX_ROWS];
         fiv__decode(rows, words, count, 6 * o->face);
         for (i = 0; i < o->light_count; i++)
-            o->distance[sample * (size_t)o->max_lights + (size_t)i] = (signed char)fiv__silhouette_distance(&l->lights[i], rows);
+            o->distance[sample * (size_t)o->max_lights + (size_t)i] = (signed char)fiv__silhouette_distance(&o->lights[i], rows);
     }
 }
 
 #ifndef FIV_NO_MASKS
 static void fiv__light_stored(int begin, int end, int worker, void *context)
 {
-    const fiv__lighting *l = (const fiv__lighting *)context;
-    const fiv_occluder *o = l->occluder;
+    fiv_occluder *o = (fiv_occluder *)context;
     (void)worker;
-    for (; begin < end; begin++) fiv__light_sample(l, (size_t)begin, o->words + o->first[begin], o->first[begin + 1] - o->first[begin]);
+    for (; begin < end; begin++) fiv__light_sample(o, (size_t)begin, o->words + o->first[begin], o->first[begin + 1] - o->first[begin]);
 }
 #endif
 
 /* Rasterises and lights the samples that are wanted. */
 static void fiv__light_wanted(int begin, int end, int worker, void *context)
 {
-    const fiv__lighting *l = (const fiv__lighting *)context;
-    fiv_occluder *o = l->occluder;
+    fiv_occluder *o = (fiv_occluder *)context;
     uint64_t rows[FIV__MAX_ROWS];
     uint16_t words[FIV__MAX_WORDS];
     (void)worker;
@@ -2510,7 +2509,7 @@ static void fiv__light_wanted(int begin, int end, int worker, void *context)
         fiv__sample_offset(offset, &o->grid, sample);
         fiv__raster_mesh(rows, &o->mesh, offset, o->face);
         o->state[sample] = fiv__judge_mask(rows, o->face, o->mesh.closed);
-        fiv__light_sample(l, sample, words, fiv__encode(words, rows, 6 * o->face));
+        fiv__light_sample(o, sample, words, fiv__encode(words, rows, 6 * o->face));
     }
 }
 
@@ -2535,7 +2534,7 @@ static void fiv__forget_samples(fiv_occluder *o, int state)
 }
 
 /* Makes all wanted samples; twins are copies. Returns how many masks were made. */
-static size_t fiv__make_wanted(fiv_occluder *o, fiv__lighting *l)
+static size_t fiv__make_wanted(fiv_occluder *o)
 {
     size_t i, made = 0, n = o->stats.samples;
     for (i = 0; i < n; i++)
@@ -2544,7 +2543,7 @@ static size_t fiv__make_wanted(fiv_occluder *o, fiv__lighting *l)
             if (o->state[twin] == FIV__STALE) o->state[twin] = FIV__WANTED;
         }
     for (i = 0; i < n; i++) made += o->state[i] == FIV__WANTED && fiv__first_twin(&o->grid, i) == i;
-    sat__parallel_for(&o->threads, (int)n, fiv__light_wanted, l);
+    sat__parallel_for(&o->threads, (int)n, fiv__light_wanted, o);
     for (i = 0; i < n; i++)
         if (o->state[i] == FIV__WANTED) fiv__copy_sample(o, i, fiv__first_twin(&o->grid, i));
     o->stats.rasterised += made;
@@ -2552,15 +2551,14 @@ static size_t fiv__make_wanted(fiv_occluder *o, fiv__lighting *l)
     return made;
 }
 
-static void fiv__prepare_lighting(fiv__lighting *l, fiv_occluder *o)
+static void fiv__find_lights(fiv_occluder *o)
 {
     int i;
-    l->occluder = o;
     for (i = 0; i < o->light_count; i++) {
         float d[3];
         fiv__turn(d, o->environment->rotation, o->environment->lights[i].direction);
         fiv__turn_back(d, o->rotation, d);
-        fiv__find_near(&l->lights[i], d, o->face);
+        fiv__find_near(&o->lights[i], d, o->face);
     }
 }
 
@@ -2580,7 +2578,6 @@ static float fiv__half_scale(const fiv_environment *e)
 FIV_DEF sat_result fiv_occluder_light(fiv_occluder *o, const fiv_environment *e, const float rotation[9])
 {
     fiv__gather g;
-    fiv__lighting l;
     if (!o || !e || e->face != o->face) return SAT_ERR_ARGUMENT;
     if (e->light_count > o->max_lights) return SAT_ERR_LIMIT;
     if (!fiv__set_rotation(o->rotation, rotation)) return SAT_ERR_ARGUMENT;
@@ -2593,16 +2590,16 @@ FIV_DEF sat_result fiv_occluder_light(fiv_occluder *o, const fiv_environment *e,
     g.radiance = NULL;
     fiv__turn_between(g.frame, e->rotation, o->rotation);
     sat__parallel_for(&o->threads, 6 * o->face, fiv__gather_rows, &g);
-    fiv__prepare_lighting(&l, o);
+    fiv__find_lights(o);
 #ifndef FIV_NO_MASKS
     if (o->keep_masks) {
-        sat__parallel_for(&o->threads, (int)o->stats.samples, fiv__light_stored, &l);
+        sat__parallel_for(&o->threads, (int)o->stats.samples, fiv__light_stored, o);
         return SAT_OK;
     }
 #endif
     o->stats.rasterised = 0;
     fiv__forget_samples(o, o->lazy ? FIV__STALE : FIV__WANTED);
-    if (!o->lazy) fiv__make_wanted(o, &l);
+    if (!o->lazy) fiv__make_wanted(o);
     return SAT_OK;
 }
 
@@ -3225,7 +3222,7 @@ static void fiv__receive(float rgb[3], fiv__receiver *r, const float *point, con
 
 /* ---- many receivers, in tiles of fixed size */
 
-enum { FIV__TILE = 64 };
+enum { FIV__TILE = 64, FIV__SHARES = 256 };
 
 typedef struct fiv__job {
     float *rgb;
@@ -3235,25 +3232,28 @@ typedef struct fiv__job {
     const fiv_instance *self, *instances;
     size_t instance_count;
     const fiv_irradiance_options *options;
-    fiv_irradiance_stats *stats; /* one a worker */
+    fiv_irradiance_stats *stats; /* one a share */
+    size_t share;                /* receivers of a share: whole tiles */
 } fiv__job;
 
 #ifndef FIV_NO_SELF
 static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance *self, const float *point, const float *normal);
 #endif
 
-static void fiv__run_tiles(int begin, int end, int worker, void *context)
+/* Shares [begin, end): no other call has the first of them, so that its counters are this call's own. */
+static void fiv__run_shares(int begin, int end, int worker, void *context)
 {
     const fiv__job *job = (const fiv__job *)context;
     fiv__receiver r;
-    size_t i, last = (size_t)end * FIV__TILE < job->count ? (size_t)end * FIV__TILE : job->count;
+    size_t i, last = (size_t)end * job->share < job->count ? (size_t)end * job->share : job->count;
+    (void)worker;
     r.environment = job->environment;
     r.instances = job->instances;
     r.instance_count = job->instance_count;
     r.options = job->options;
-    r.stats = &job->stats[worker];
+    r.stats = &job->stats[begin];
     memset(r.light_cosine, 0, sizeof r.light_cosine);
-    for (i = (size_t)begin * FIV__TILE; i < last; i++) {
+    for (i = (size_t)begin * job->share; i < last; i++) {
         size_t made = r.stats->own_masks;
         if (i % FIV__TILE == 0) r.own_left = r.options->own_masks;
 #ifndef FIV_NO_SELF
@@ -3294,9 +3294,8 @@ static void fiv__add_stats(fiv_irradiance_stats *sum, const fiv_irradiance_stats
 static sat_result fiv__run(fiv__job *job, const fiv_irradiance_options *options, fiv_irradiance_stats *stats)
 {
     fiv_irradiance_options o = options ? *options : fiv_irradiance_defaults();
-    fiv_irradiance_stats workers[1024], sum;
-    size_t i, tiles;
-    int used;
+    fiv_irradiance_stats shares[FIV__SHARES], sum;
+    size_t i, tiles, used;
     if (job->count && (!job->rgb || !job->points || !job->normals)) return SAT_ERR_ARGUMENT;
     if (!job->environment || (job->instance_count && !job->instances)) return SAT_ERR_ARGUMENT;
     if ((unsigned)o.accuracy > (unsigned)FIV_MASK || !(o.cutoff >= 0 && o.cutoff <= 1)) return SAT_ERR_ARGUMENT;
@@ -3307,13 +3306,14 @@ static sat_result fiv__run(fiv__job *job, const fiv_irradiance_options *options,
     if (job->self && !fiv__instance_is_valid(job->self, job->environment, &o)) return SAT_ERR_ARGUMENT;
     tiles = job->count / FIV__TILE + (job->count % FIV__TILE != 0);
     if (tiles > 0x7fffffff) return SAT_ERR_SIZE;
-    used = sat__worker_count(&o.threads);
-    memset(workers, 0, (size_t)used * sizeof *workers);
+    job->share = FIV__TILE * (tiles / FIV__SHARES + (tiles % FIV__SHARES != 0));
+    used = job->count ? (job->count - 1) / job->share + 1 : 0;
+    memset(shares, 0, used * sizeof *shares);
     memset(&sum, 0, sizeof sum);
     job->options = &o;
-    job->stats = workers;
-    sat__parallel_for(&o.threads, (int)tiles, fiv__run_tiles, job);
-    for (i = 0; i < (size_t)used; i++) fiv__add_stats(&sum, &workers[i]);
+    job->stats = shares;
+    sat__parallel_for(&o.threads, (int)used, fiv__run_shares, job);
+    for (i = 0; i < used; i++) fiv__add_stats(&sum, &shares[i]);
     if (stats) *stats = sum;
     return SAT_OK;
 }
@@ -3454,7 +3454,6 @@ FIV_DEF sat_result fiv_self_irradiance(float *rgb, const float *points, const fl
 FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *o, const fiv_instance *instances, size_t instance_count,
                                         const float *points, size_t count, size_t *computed)
 {
-    fiv__lighting l;
     fiv__cell cell;
     size_t i, j, made;
     int q, k;
@@ -3474,8 +3473,8 @@ FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *o, const fiv_instance *ins
                 if (cell.weight[q] > 0 && o->state[cell.index[q]] == FIV__STALE) o->state[cell.index[q]] = FIV__WANTED;
         }
     }
-    fiv__prepare_lighting(&l, o);
-    made = fiv__make_wanted(o, &l);
+    fiv__find_lights(o);
+    made = fiv__make_wanted(o);
     if (computed) *computed = made;
     return SAT_OK;
 }
@@ -3750,8 +3749,8 @@ static const char fiv__glsl_cell[] =
     "}\n"
     "fiv_sum fiv_gather(fiv_cell c, vec2 scale, inout float light[8]) {\n"
     "    fiv_sum s = fiv_sum(mat3(0.0), mat3(0.0), 0.0, 0.0, 0.0);\n"
-    "    float far[8], weight;\n"
-    "    for (int k = 0; k < 8; k++) far[k] = 0.0;\n"
+    "    float away[8], weight;\n"
+    "    for (int k = 0; k < 8; k++) away[k] = 0.0;\n"
     "    for (int q = 0; q < 8; q++) {\n"
     "        int at = fiv_sample(c, q, weight);\n"
     "        float scaled = weight * (q < 4 ? scale.x : scale.y);\n"
@@ -3763,15 +3762,15 @@ static const char fiv__glsl_cell[] =
     "        s.v += v;\n"
     "        s.angle += scaled * e.y;\n"
     "        s.total += weight;\n"
-    "        far[0] += weight * e.z; far[1] += weight * e.w;\n"
+    "        away[0] += weight * e.z; away[1] += weight * e.w;\n"
     "        for (int k = 2; k < fiv_counts.y; k += 4) {\n"
     "            vec4 more = fiv_at(c.base, at + 3 + (k - 2) / 4);\n"
-    "            far[k] += weight * more.x; if (k + 1 < 8) far[k + 1] += weight * more.y;\n"
-    "            if (k + 2 < 8) { far[k + 2] += weight * more.z; far[k + 3] += weight * more.w; }\n"
+    "            away[k] += weight * more.x; if (k + 1 < 8) away[k + 1] += weight * more.y;\n"
+    "            if (k + 2 < 8) { away[k + 2] += weight * more.z; away[k + 3] += weight * more.w; }\n"
     "        }\n"
     "    }\n"
     "    for (int k = 0; k < fiv_counts.y; k++)\n"
-    "        light[k] = max(light[k], s.total > 1e-4 ? clamp(0.5 + far[k] / s.total, 0.0, 1.0) : 1.0);\n"
+    "        light[k] = max(light[k], s.total > 1e-4 ? clamp(0.5 + away[k] / s.total, 0.0, 1.0) : 1.0);\n"
     "    return s;\n"
     "}\n";
 
