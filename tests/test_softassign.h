@@ -1599,7 +1599,7 @@ TEST(softassign_corners_of_options_in_pairs)
 TEST(softassign_every_refused_problem_is_named)
 {
     const float cost[6] = {1, 2, 3, 4, 5, 6};
-    int bad[3] = {1, -1, 1}, less[3] = {0, 2, 0}, stay[2] = {0, 3}, x[2];
+    int bad[3] = {1, -1, 1}, less[3] = {0, 2, 0}, stay[2] = {0, 3}, none[3] = {0, 0, 0}, x[2];
     softassign_problem p;
     softassign_options o;
     softassign *s = NULL;
@@ -1624,8 +1624,8 @@ TEST(softassign_every_refused_problem_is_named)
     REFUSED((p.maximise = 1, o.method = SOFTASSIGN_ANTS), "maximise is 1; only AUTO, EXACT and FAST take it");
     REFUSED((p.unassigned_cost = 1, o.method = SOFTASSIGN_GREEDY), "unassigned_cost is above 0; only AUTO, EXACT and FAST take it");
     REFUSED((p.unassigned_cost = 1, o.grid_width = 2, o.min_distance = 2), "unassigned_cost is above 0; min_distance does not go with it");
-    REFUSED((p.minimum_use = stay, stay[1] = 0, o.method = SOFTASSIGN_GREEDY), "minimum_use is given; only AUTO, EXACT and FAST take it");
-    REFUSED((p.minimum_use = stay, o.row_price = price), "minimum_use is given; row_price and column_price do not go with it");
+    REFUSED((p.minimum_use = none, o.method = SOFTASSIGN_GREEDY), "minimum_use is given; only AUTO, EXACT and FAST take it");
+    REFUSED((p.minimum_use = none, o.row_price = price), "minimum_use is given; row_price and column_price do not go with it");
     REFUSED((o.method = SOFTASSIGN_FAST, o.column_price = price), "row_price or column_price is given; only AUTO and EXACT have them");
     REFUSED(o.min_distance = 1, "grid_width is 0; min_distance above 0 needs the grid");
 #undef REFUSED
