@@ -1,8 +1,9 @@
 /* Fits a kernel for SSAO_SAT_SLABS, polynomials in sine and distance for each ring, to ray-traced pictures and prints it as C,
    beside the error of the kernel that ssao_sat.h has.
 
-   Build as a bench, run with the side of the pictures, rays a pixel, one of how many pixels, ridge, rings, bias (512 256 17 1e-3): build/ keeps the pictures. Scenes 0 to 2 are
-   fitted, each also left out once (the error there is one nothing was fitted to); the others are only measured.
+   Build as a bench, run with the side of the pictures, rays a pixel, one of how many pixels, ridge, rings, bias (512 256 17 1e-3);
+   build/ keeps the pictures. Scenes 0 to 2 are fitted, each also left out once (the error there is one nothing was fitted to); the
+   others are only measured.
 
    The model: accessibility = (1 - x)^3, x = face(n.v) fade sum over rings, cells and slabs of
    coverage (1 - d^2 / range^2) sum c[ring][i][j] s^(i + 1) d^j, s the sine over the tangent plane less the bias, d the distance in
