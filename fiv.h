@@ -59,8 +59,8 @@
    - Same bits for any number of workers and any order of instances (sums of parts of I_tot in 2^-40 fixed point); where the
      compiler contracts products and sums (-mfma without -ffp-contract=off), orders differ in the last digits, 1e-6.
    - NaN and negative radiance count as 0, what exceeds max_radiance as that much; all are counted. NaN receivers are black.
-   - A texel of 1e8 changes no other vector: relative error of a span sum below 1e-10 (double prefixes), of a split-off light
-     1e-7. Masks equal rays through the texel centres but for rays that graze an edge (2e-6 of the texels set).
+   - A texel of 1e8 changes no other vector: relative error of a span sum below 1e-10 (double prefixes), of the power of a
+     split-off light 4e-5 (beside the poles of the image up to 2 % of it stays in the cube). Masks equal rays through the texel centres but for rays that graze an edge (2e-6 of the texels set).
    - OpenGL: within 2e-3 of the largest irradiance of fiv_irradiance and fiv_self_irradiance with cutoff 0, 1e-4 rms.
    - I_tot: within 6e-4 of its largest value of the sum over all texels. Turned vectors: 1.7 % rms of the same
      vectors computed from a turned mesh.
@@ -130,15 +130,17 @@ enum {
 };
 
 typedef struct fiv_environment_options {
-    int face;              /* 32; 8..64: texels along an edge of the light's cube and of every mask */
-    float delta_ratio;     /* 400; a patch this many times brighter than the mean, and half a texel wide, becomes a
+    int face;              /* 32; 8..64; texels along an edge of the light's cube and of every mask */
+    float delta_ratio;     /* 400; 0..1e38; a patch this many times brighter than the mean, and half a texel wide, becomes a
                               directional light; 0: none does */
-    int max_lights;        /* 8; 0..FIV_MAX_LIGHTS: the strongest ones are kept, the rest stays in the cube */
-    float max_radiance;    /* 1e10; > 0: larger values, infinity included, count as this much */
+    int max_lights;        /* 8; 0..FIV_MAX_LIGHTS; the strongest ones are kept, the rest stays in the cube */
+    float max_radiance;    /* 1e10; 1e-30..1e38; larger values, infinity included, count as this much */
     sat_allocator allocator; /* malloc; used by create and destroy only */
     sat_threads threads;     /* serial; used by create and update; same bits for any worker count */
 } fiv_environment_options;
 FIV_DEF fiv_environment_options fiv_environment_defaults(void);
+/* One sentence on what create would refuse about these options ("face is 99; 8..64"), "" when nothing; returns text. */
+FIV_DEF const char *fiv_explain_environment(char *text, size_t size, const fiv_environment_options *options);
 
 typedef struct fiv_environment_stats {
     size_t nan, negative, clamped; /* channel values that counted as 0, as 0 and as max_radiance */
@@ -336,7 +338,8 @@ typedef struct fiv_gl fiv_gl;
 /* For the current context (3.3 core, or ES 3.0 with EXT_color_buffer_float) and pictures of this size. On an error
    *out still is an object, for its message alone. */
 FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int width, int height, const fiv_gl_options *options);
-/* Uploads the environment and the vectors of the occluders: after each fiv_occluder_light. */
+/* Uploads the environment and the vectors of the occluders: after each fiv_occluder_light. Arguments that are refused leave the
+   last scene as it was. */
 FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *gl, const fiv_environment *environment, const fiv_instance *instances, size_t count);
 /* Only places and scales differ from the last fiv_gl_set_scene: what moving occluders cost a frame. */
 FIV_DEF sat_result fiv_gl_move(fiv_gl *gl, const fiv_instance *instances, size_t count);
@@ -550,15 +553,28 @@ struct fiv_environment {
     double *angles;      /* solid angles of the texels of a face */
 };
 
+static const sat__field fiv__environment_fields[] = {
+    SAT__FIELD(fiv_environment_options, 'i', face, 32, 8, 64, ' '),
+    SAT__FIELD(fiv_environment_options, 'f', delta_ratio, 400, 0, 1e38, ' '),
+    SAT__FIELD(fiv_environment_options, 'i', max_lights, 8, 0, FIV_MAX_LIGHTS, ' '),
+    SAT__FIELD(fiv_environment_options, 'f', max_radiance, 1e10, 1e-30, 1e38, ' '),
+    SAT__FIELD(fiv_environment_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(fiv_environment_options, 't', threads, 0, 0, 0, ' '),
+};
+
 FIV_DEF fiv_environment_options fiv_environment_defaults(void)
 {
     fiv_environment_options o;
-    memset(&o, 0, sizeof o);
-    o.face = 32;
-    o.delta_ratio = 400;
-    o.max_lights = FIV_MAX_LIGHTS;
-    o.max_radiance = 1e10f;
+    sat__fields_default(&o, sizeof o, fiv__environment_fields, SAT__COUNT(fiv__environment_fields));
     return o;
+}
+
+FIV_DEF const char *fiv_explain_environment(char *text, size_t size, const fiv_environment_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    const sat__field *wrong = options ? sat__fields_check(options, fiv__environment_fields, SAT__COUNT(fiv__environment_fields)) : NULL;
+    if (wrong) sat__text_field(&t, wrong, options);
+    return text && size ? text : "";
 }
 
 /* ---- from the image to the source cube: every image texel is cut into `cut` x `cut` points, and a patch of the cube
@@ -1007,14 +1023,6 @@ static void fiv__environment_layout(fiv_environment *e, sat__arena *arena)
     e->angles = (double *)sat__carve(arena, face * face, sizeof(double));
 }
 
-static int fiv__environment_options_are_valid(const fiv_environment_options *o)
-{
-    if (o->face < 8 || o->face > FIV__MAX_FACE || o->max_lights < 0 || o->max_lights > FIV_MAX_LIGHTS) return 0;
-    if (!sat__is_finite(o->delta_ratio) || o->delta_ratio < 0) return 0;
-    if (!sat__is_finite(o->max_radiance) || !(o->max_radiance > 0)) return 0;
-    return sat__threads_are_valid(&o->threads);
-}
-
 static int fiv__image_is_valid(const sat_image *image)
 {
     return sat__image_is_valid(image) && image->channels != 2 && image->width <= 1 << 20 && image->height <= 1 << 20;
@@ -1031,7 +1039,7 @@ FIV_DEF sat_result fiv_environment_create(fiv_environment **out, const sat_image
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (!fiv__image_is_valid(equirect_rgb) || !fiv__environment_options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    if (!fiv__image_is_valid(equirect_rgb) || sat__fields_check(&o, fiv__environment_fields, SAT__COUNT(fiv__environment_fields))) return SAT_ERR_ARGUMENT;
     memset(&e, 0, sizeof e);
     if (!sat__resolve_allocator(&e.allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     e.threads = o.threads;
@@ -3111,12 +3119,14 @@ static int fiv__balls_overlap(const fiv__shadow *a, const fiv__shadow *b)
 }
 
 /* Exact union: the nearest masks of the occluders that may overlap are ORed; what the union takes, over what they take one by
-   one, scales their interpolated sum. */
+   one, scales their interpolated sum. Where the nearest masks lie below the horizon and the interpolated ones do not, their texels
+   say how much is shared. */
 static void fiv__unite_masks(int64_t taken[3], const fiv__receiver *r, const fiv__shadow *shadows, int count)
 {
     uint64_t all[FIV__MAX_ROWS], one[FIV__MAX_ROWS], twice = 0;
     int64_t group[3] = {0, 0, 0}, alone[3] = {0, 0, 0};
     float rgb[3];
+    double texels = 0, covered = 0, part;
     int i, j, k, row, members = 0;
     memset(all, 0, sizeof all);
     memset(one, 0, sizeof one);
@@ -3128,6 +3138,7 @@ static void fiv__unite_masks(int64_t taken[3], const fiv__receiver *r, const fiv
         for (row = 0; row < 6 * r->environment->face; row++) {
             twice |= all[row] & one[row];
             all[row] |= one[row];
+            texels += fiv__count_bits(one[row]);
         }
         fiv__integrate_rows(rgb, one, r->environment->sums, r->normal, r->environment->face);
         members++;
@@ -3140,10 +3151,11 @@ static void fiv__unite_masks(int64_t taken[3], const fiv__receiver *r, const fiv
     if (!twice) return;
     r->stats->overlaps++;
     fiv__integrate_rows(rgb, all, r->environment->sums, r->normal, r->environment->face);
+    for (row = 0; row < 6 * r->environment->face; row++) covered += fiv__count_bits(all[row]);
     for (k = 0; k < 3; k++) {
         int64_t together = fiv__fixed(rgb[k], r->diffuse[k]);
-        if (alone[k] <= 0 || together >= alone[k]) continue;
-        taken[k] -= group[k] - (int64_t)((double)group[k] * ((double)together / (double)alone[k]));
+        part = alone[k] > 0 ? (double)together / (double)alone[k] : covered / texels;
+        if (part < 1) taken[k] -= group[k] - (int64_t)((double)group[k] * part);
     }
 }
 
@@ -4017,15 +4029,14 @@ static void fiv__gl_fill(float *out, const fiv_occluder *o, int texels)
 }
 
 /* Where each instance's tables begin; instances of one occluder share them. Returns the number of texels. */
-static size_t fiv__gl_bases(fiv_gl *g, const fiv_instance *instances, size_t count)
+static size_t fiv__gl_bases(int base[64], int texels, const fiv_instance *instances, size_t count)
 {
     size_t i, j, used = 0;
     for (i = 0; i < count; i++) {
         const fiv_occluder *o = instances[i].occluder;
         for (j = 0; j < i && instances[j].occluder != o; j++) {}
-        g->occluders[i] = o;
-        g->base[i] = j < i ? g->base[j] : (int)used;
-        if (j == i) used += o->stats.samples * (size_t)g->texels + FIV__SUPPORT_TEXELS;
+        base[i] = j < i ? base[j] : (int)used;
+        if (j == i) used += o->stats.samples * (size_t)texels + FIV__SUPPORT_TEXELS;
         if (used > ((size_t)1 << 24)) return used;
     }
     return used;
@@ -4139,17 +4150,23 @@ FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *g, const fiv_environment *e, const f
     sat__gl_state state;
     fiv_irradiance_options o = fiv_irradiance_defaults();
     size_t i, used;
+    int base[64], texels;
     sat_result r;
     if (!g || !g->program || !e || (count && !instances)) return SAT_ERR_ARGUMENT;
     if (count > (size_t)g->max_instances) return SAT_ERR_LIMIT;
     for (i = 0; i < count; i++)
         if (!fiv__instance_is_valid(&instances[i], e, &o)) return SAT_ERR_ARGUMENT;
+    texels = 3 + (e->light_count > 2 ? (e->light_count + 1) / 4 : 0);
+    used = fiv__gl_bases(base, texels, instances, count);
+    if (used > ((size_t)1 << 24)) return SAT_ERR_LIMIT; /* up to here the last scene stays whole */
     g->count = (int)count;
     g->lights = e->light_count;
-    g->texels = 3 + (e->light_count > 2 ? (e->light_count + 1) / 4 : 0);
+    g->texels = texels;
     memcpy(g->rotation, e->rotation, sizeof g->rotation);
-    used = fiv__gl_bases(g, instances, count);
-    if (used > ((size_t)1 << 24)) return SAT_ERR_LIMIT;
+    for (i = 0; i < count; i++) {
+        g->base[i] = base[i];
+        g->occluders[i] = instances[i].occluder;
+    }
     fiv__gl_light(g, e);
     sat__gl_clear_errors(&g->gl);
     sat__gl_begin(&g->gl, &state, 1);

@@ -947,6 +947,39 @@ TEST(copies_count_once)
     test_close_scene(&s);
 }
 
+#ifndef FIV_NO_MASKS
+/* Anywhere around it, also where its nearest mask is below the horizon and the interpolated vector is not. */
+TEST(the_same_occluder_twice_is_once)
+{
+    enum { AROUND = 4000 };
+    static float points[3 * AROUND], normals[3 * AROUND], one[3 * AROUND], two[3 * AROUND];
+    reference_mesh m = reference_knot(2, 3, 96, 12, 0.3);
+    fiv_environment *e = test_environment(0, 0);
+    fiv_occluder_options options = test_small_set();
+    fiv_irradiance_options io = fiv_irradiance_defaults();
+    fiv_occluder *o;
+    fiv_instance instances[2];
+    uint64_t seed = 5;
+    double worst = 0;
+    int i;
+    options.theta = 16, options.phi = 9, options.rho = 8;
+    o = test_occluder(&m, &options, NULL);
+    EXPECT_EQ(fiv_occluder_light(o, e, NULL), SAT_OK);
+    instances[0] = instances[1] = test_instance(o, 0, 0, 0);
+    for (i = 0; i < 3 * AROUND; i++) points[i] = (float)(8 * support_uniform(&seed) - 4);
+    for (i = 0; i < AROUND; i++) test_random_unit(normals + 3 * i, &seed);
+    io.accuracy = FIV_MASK;
+    EXPECT_EQ(fiv_irradiance(one, points, normals, AROUND, e, instances, 1, &io, NULL), SAT_OK);
+    EXPECT_EQ(fiv_irradiance(two, points, normals, AROUND, e, instances, 2, &io, NULL), SAT_OK);
+    for (i = 0; i < 3 * AROUND; i++) worst = support_larger(worst, fabs((double)two[i] - (double)one[i]));
+    REPORT("the same occluder twice: largest difference of irradiance", worst, "");
+    EXPECT_NEAR(worst, 0, 2e-5);
+    fiv_occluder_destroy(o);
+    fiv_environment_destroy(e);
+    reference_mesh_free(&m);
+}
+#endif
+
 #ifndef FIV_NO_SELF
 /* Points on the mesh itself, against rays that start a hair above it. */
 TEST(self_shadows)
@@ -1616,6 +1649,61 @@ TEST(bad_arguments)
     fiv_environment_destroy(e);
     fiv_environment_destroy(other);
     reference_mesh_free(&m);
+}
+
+TEST(options_of_environments_are_checked_and_named)
+{
+    static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    sat_image sky = test_sky(pixels, 0);
+    char text[160];
+    fiv_environment *e;
+    int i, at;
+    EXPECT(strcmp(fiv_explain_environment(text, sizeof text, NULL), "") == 0);
+    EXPECT(strcmp(fiv_explain_environment(NULL, 0, NULL), "") == 0);
+    for (i = 0; i < SAT__COUNT(fiv__environment_fields); i++) {
+        const sat__field *f = &fiv__environment_fields[i];
+        if (f->type != 'i' && f->type != 'f') continue;
+        for (at = 0; at < 6; at++) {
+            fiv_environment_options o = fiv_environment_defaults();
+            double v = at == 0 ? f->initial : at == 1 ? f->low : at == 2 ? f->high : at == 3 ? f->low - 1 : f->high * 1.1 + 1;
+            if (at == 5 && f->type != 'f') continue;
+            sat__field_set(f, &o, at == 5 ? (double)test_nan() : v);
+            if (at < 3) {
+                EXPECT(strcmp(fiv_explain_environment(text, sizeof text, &o), "") == 0);
+                EXPECT_EQ(fiv_environment_create(&e, &sky, &o, NULL), SAT_OK);
+                fiv_environment_destroy(e);
+            } else {
+                EXPECT(strstr(fiv_explain_environment(text, sizeof text, &o), f->name) == text);
+                EXPECT_EQ(fiv_environment_create(&e, &sky, &o, NULL), SAT_ERR_ARGUMENT);
+            }
+        }
+    }
+}
+
+/* One bright texel on black: its power is its radiance times its solid angle; beside the poles, where texels are narrow, a part
+   of it stays in the cube. */
+TEST(power_of_a_split_off_light)
+{
+    static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    sat_image image = sat_image_f32(pixels, SKY_WIDTH, SKY_HEIGHT, 3);
+    double worst = 0, poles = 0, pi = 3.14159265358979323846;
+    int y, c;
+    for (y = 0; y < SKY_HEIGHT; y += 3) {
+        fiv_environment *e = NULL;
+        double truth = 1000 * (2 * pi / SKY_WIDTH) * (cos(pi * y / SKY_HEIGHT) - cos(pi * (y + 1) / SKY_HEIGHT));
+        memset(pixels, 0, sizeof pixels);
+        for (c = 0; c < 3; c++) pixels[3 * (y * SKY_WIDTH + 50) + c] = 1000;
+        if (!EXPECT_EQ(fiv_environment_create(&e, &image, NULL, NULL), SAT_OK)) return;
+        if (EXPECT_EQ(fiv_environment_get_stats(e).lights, 1)) {
+            double error = fabs((double)e->lights[0].power[0] / truth - 1);
+            if (y >= 8 && y < SKY_HEIGHT - 8) worst = support_larger(worst, error);
+            else poles = support_larger(poles, error);
+        }
+        fiv_environment_destroy(e);
+    }
+    REPORT("power of a split-off light: worst relative error", worst, "");
+    EXPECT_NEAR(worst, 0, 4e-5);
+    EXPECT_NEAR(poles, 0, 0.02);
 }
 
 TEST(defaults_are_the_stated_ones)
