@@ -90,7 +90,6 @@ demo: deps
 run-demo: build/$(DEMO)
 	@mkdir -p out
 	build/$(DEMO) --stats --out out/demo.png $(ARGS) $(IN)
-	@echo out/demo.png
 
 # The demo in a browser: open out/web/index.html. emcc's optimiser is not run when linking: Debian's lacks a part.
 # OpenEXR is fetched and compiled into build/web/; without it the page reads the other formats.
