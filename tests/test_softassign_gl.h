@@ -327,7 +327,7 @@ TEST(softassign_gl_refuses_the_options_that_the_cpu_refuses)
     if (!open_gl()) return;
     for (i = 0; i < SAT__COUNT(softassign__fields); i++) {
         const sat__field *f = &softassign__fields[i];
-        const double value[2] = {f->low - 1, f->high + fabs(f->high)};
+        const double value[2] = {f->low - 1 - fabs(f->low), f->high + fabs(f->high)};
         for (k = 0; k < 2 && f->type != 'a' && f->type != 't'; k++) {
             softassign_options o = softassign_defaults();
             softassign_gl *gl = NULL;
