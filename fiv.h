@@ -1664,7 +1664,10 @@ static void fiv__raster_cluster_cones(const fiv__raster *r, const fiv__cluster *
             fiv__raster_cone(r, face, p);
         } else {
             float x[3], y[3];
-            for (j = 0; j < 3; j++) x[j] = px[corner[j]], y[j] = py[corner[j]];
+            for (j = 0; j < 3; j++) {
+                x[j] = px[corner[j]];
+                y[j] = py[corner[j]];
+            }
             fiv__raster_triangle(r->rows + (size_t)(face * r->size), x, y, r->size - 1, mesh->closed ? mesh->turn : 0);
         }
     }

@@ -2107,12 +2107,12 @@ static inline int raindrop__rain_is_valid(const raindrop_rain_options *o)
    their own number with today's speeds would carry 11 (at 5 mm/h) to 14 % (at 1) more than the rate they are named after. */
 static inline double raindrop__expected_count(const raindrop_rain_options *o)
 {
-    enum { STEPS = 256 };
     double lambda = raindrop__lambda(o->rate_mm_h), span = o->diameter_max_mm - o->diameter_min_mm, drops = 0, water = 0;
     double rate = o->rate_mm_h * (1e-3 / 3600), volume = (double)o->box_size[0] * (double)o->box_size[1] * (double)o->box_size[2];
+    const int steps = 256;
     int i;
-    for (i = 0; i < STEPS; i++) {
-        double d = o->diameter_mm > 0 ? o->diameter_mm : o->diameter_min_mm + span * (i + 0.5) / STEPS;
+    for (i = 0; i < steps; i++) {
+        double d = o->diameter_mm > 0 ? o->diameter_mm : o->diameter_min_mm + span * (i + 0.5) / steps;
         double share = o->diameter_mm > 0 ? 1 : exp(-lambda * (d - o->diameter_min_mm));
         drops += share;
         water += share * RAINDROP__PI / 6 * d * d * d * 1e-9 * (o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(d));

@@ -798,7 +798,8 @@ static inline int sat__six_digits(char d[6], double value)
 {
     int exponent = 0, i;
     if (value > 0) {
-        exponent = (int)floor(log10(value));
+        double decade = floor(log10(value));
+        exponent = (int)decade;
         if (exponent < -290) value = value * 1e300 / pow(10, exponent + 300);
         else value /= pow(10, exponent);
         value = floor(value * 1e5 + 0.5);
@@ -808,7 +809,8 @@ static inline int sat__six_digits(char d[6], double value)
         }
     }
     for (i = 5; i >= 0; i--) {
-        d[i] = (char)('0' + (int)fmod(value, 10));
+        double digit = fmod(value, 10);
+        d[i] = (char)('0' + (int)digit);
         value = floor(value / 10);
     }
     return exponent;
@@ -4488,8 +4490,10 @@ SAT_DEF sat_result sat_plan_options(sat_options *out, const sat_image *image, in
     *out = options ? *options : sat_defaults();
     out->kind = kind;
     out->subtract_mean = 0;
-    if (sat__is_fixed(kind) && !(out->max_box_area > 0))
-        out->max_box_area = (double)sat__min_int(box_width, image->width) * sat__min_int(box_height, image->height);
+    if (sat__is_fixed(kind) && !(out->max_box_area > 0)) {
+        int w = sat__min_int(box_width, image->width), h = sat__min_int(box_height, image->height);
+        out->max_box_area = (double)w * h;
+    }
     return result;
 }
 

@@ -1704,7 +1704,7 @@ struct softassign__fixed {
 
 static softassign__fixed softassign__fixed_sum(const softassign__fixed *a, const softassign__fixed *b)
 {
-    softassign__fixed r;
+    softassign__fixed r = {{0, 0, 0, 0, 0}};
     uint64_t carry = 0;
     int k;
     for (k = 0; k < 5; k++) {
@@ -1742,11 +1742,13 @@ static int softassign__fixed_less(const softassign__fixed *a, const softassign__
 static softassign__fixed softassign__fixed_from(double x)
 {
     softassign__fixed r = {{0, 0, 0, 0, 0}}, zero = {{0, 0, 0, 0, 0}};
+    double scaled;
     uint64_t mantissa;
     int exponent, shift, negative = x < 0;
     if (!(x < 1e39)) x = 1e39;
     if (x < -1e39) x = -1e39;
-    mantissa = (uint64_t)ldexp(frexp(fabs(x), &exponent), 53);
+    scaled = ldexp(frexp(fabs(x), &exponent), 53);
+    mantissa = (uint64_t)scaled;
     shift = exponent - 53 + 149;
     if (shift < 0) {
         r.word[0] = shift > -64 ? mantissa >> -shift : 0;
@@ -2133,7 +2135,8 @@ static sat_result softassign__finish_phase(softassign *s)
         if (j >= s->columns && softassign__is_free(s, j)) break;
         s->next++;
     }
-    if (s->next < s->slot_count || !(s->phase = SOFTASSIGN__DONE, softassign__prove(s))) {
+    if (s->next >= s->slot_count) s->phase = SOFTASSIGN__DONE;
+    if (s->next < s->slot_count || !softassign__prove(s)) {
         s->excess = -1;
         softassign__start_repair(s);
         s->phase = SOFTASSIGN__REPAIR;

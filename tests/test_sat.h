@@ -1273,6 +1273,7 @@ static int moments_refused(const void *options, char *text)
 
 TEST(every_refusal_names_its_field)
 {
+    int unknown = 4;
     sat_options table = sat_defaults(), table_defaults = table;
     sat_scan_options scan = sat_scan_defaults(), scan_defaults = scan;
     sat_moments_options moments = sat_moments_defaults(), moments_defaults = moments;
@@ -1298,7 +1299,7 @@ TEST(every_refusal_names_its_field)
     REFUSED(width, 0, "image.width is 0; 1..2.14748e9");
     REFUSED(height, -3, "image.height is -3; 1..2.14748e9");
     REFUSED(channels, 5, "image.channels is 5; 1..4");
-    REFUSED(format, (sat_format)4, "image.format is 4; 0..3");
+    REFUSED(format, (sat_format)unknown, "image.format is 4; 0..3");
     REFUSED(stride, 28, "image.stride is shorter than a row");
     REFUSED(stride, 33, "image.stride is not a multiple of its format's bytes");
 #undef REFUSED
