@@ -1718,7 +1718,7 @@ static softassign__fixed softassign__fixed_sum(const softassign__fixed *a, const
 
 static softassign__fixed softassign__fixed_difference(const softassign__fixed *a, const softassign__fixed *b)
 {
-    softassign__fixed r;
+    softassign__fixed r = {{0, 0, 0, 0, 0}};
     uint64_t borrow = 0;
     int k;
     for (k = 0; k < 5; k++) {
