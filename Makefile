@@ -169,6 +169,7 @@ check-variants:
 	+@$(if $(shell command -v clang),echo 'clang:' && $(call again,clang,,-O3) CC=clang OPENMP= WERROR=)
 
 ASAN  := -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
+check-asan: export TEST_TIMEOUT = 1200
 check-asan: export ASAN_OPTIONS = detect_stack_use_after_return=1:strict_string_checks=1
 check-asan: export LSAN_OPTIONS = suppressions=tests/sanitizers.txt:print_suppressions=0
 check-asan:
