@@ -53,7 +53,7 @@
    An environment is one block; an occluder has one each for tables, masks (keep_masks) and mesh (keep_mesh, or no keep_masks). Only
    create, share and load allocate. Functions take sat_threads in their options; different objects may be used at
    once, and any number of threads may call fiv_irradiance on the same ones. All arguments are checked in every build.
-   No function takes more than 32 KB of stack: fiv_irradiance 20 KB, and up to 34 KB below it, on each of at most 256 workers.
+   No function takes more than 32 KB of stack; at most 256 workers take part in one fiv_irradiance.
 
    NUMERICS
    - Same bits for any number of workers and any order of instances (sums of parts of I_tot in 2^-40 fixed point); where the

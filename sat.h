@@ -188,7 +188,7 @@ SAT_DEF sat_image sat_image_f32(const float *pixels, int width, int height, int 
 
 /* Why an image or the arguments of a create are refused: one sentence in the caller's memory, cut at `size` bytes,
    "tile is 99; 8..128, a power of two"; "" where they would be taken. Returns text. */
-SAT_DEF char *sat_explain_image(char *text, size_t size, const sat_image *image);
+SAT_DEF const char *sat_explain_image(char *text, size_t size, const sat_image *image);
 
 /* ------------------------------------------------------------------------------------------------
    Scans: out[i] = in[0] + ... + in[i], for any associative sum (Slomp 2012, sections 4.3 to 4.5)
@@ -218,7 +218,7 @@ typedef struct sat_scan_options {
     sat_scan_counters *counters;  /* NULL: not counted; otherwise overwritten */
 } sat_scan_options;
 SAT_DEF sat_scan_options sat_scan_defaults(void);
-SAT_DEF char *sat_explain_scan(char *text, size_t size, const sat_scan_options *options); /* as sat_explain_image; NULL options: the defaults */
+SAT_DEF const char *sat_explain_scan(char *text, size_t size, const sat_scan_options *options); /* as sat_explain_image; NULL options: the defaults */
 
 /* Sequential f32 scans without counters carry the sum in double. In place when out == in; otherwise the two must not overlap. n may be 0. Integers wrap around. */
 SAT_DEF sat_result sat_scan_f32(float *out, const float *in, size_t n, const sat_scan_options *options);
@@ -270,7 +270,7 @@ typedef struct sat_options {
 } sat_options;
 SAT_DEF sat_options sat_defaults(void);
 /* As sat_explain_image, for the arguments of sat_create. NULL options mean the defaults, here and in every call. */
-SAT_DEF char *sat_explain(char *text, size_t size, int width, int height, int channels, const sat_options *options);
+SAT_DEF const char *sat_explain(char *text, size_t size, int width, int height, int channels, const sat_options *options);
 
 typedef struct sat_table sat_table;
 
@@ -353,7 +353,7 @@ typedef struct sat_moments_options {
     sat_threads threads;       /* serial; same bits for any worker count */
 } sat_moments_options;
 SAT_DEF sat_moments_options sat_moments_defaults(void);
-SAT_DEF char *sat_explain_moments(char *text, size_t size, int width, int height, int channels, const sat_moments_options *options);
+SAT_DEF const char *sat_explain_moments(char *text, size_t size, int width, int height, int channels, const sat_moments_options *options);
 
 /* Sums of (x - m) and of (x - m)(y - m') in double, where m is the mean of the pixel's own tile: 8 bytes a pixel for each
    channel and for each product (c squares, or c (c + 1) / 2 with covariance). One allocation, at create. */
@@ -417,7 +417,7 @@ typedef struct sat_gl_options {
     sat_allocator allocator;      /* malloc; used by create and destroy only */
 } sat_gl_options;
 SAT_DEF sat_gl_options sat_gl_defaults(void);
-SAT_DEF char *sat_explain_gl(char *text, size_t size, const sat_gl_options *options); /* as sat_explain_image */
+SAT_DEF const char *sat_explain_gl(char *text, size_t size, const sat_gl_options *options); /* as sat_explain_image */
 
 /* Belongs to the context that is current in create: it must be current in every call. Textures are made by the
    first build of a size. Every call leaves the OpenGL state as it was (but for pending errors, which are lost). */
@@ -1942,7 +1942,7 @@ SAT_DEF sat_scan_options sat_scan_defaults(void)
     return options;
 }
 
-SAT_DEF char *sat_explain_scan(char *text, size_t size, const sat_scan_options *options)
+SAT_DEF const char *sat_explain_scan(char *text, size_t size, const sat_scan_options *options)
 {
     sat__text t = sat__text_begin(text, size);
     const sat__field *wrong = options ? sat__fields_check(options, sat__scan_fields, SAT__COUNT(sat__scan_fields)) : NULL;
@@ -2345,14 +2345,14 @@ static int sat__options_are_valid(const sat_options *o)
     return sat__explain_options(&ignored, o);
 }
 
-SAT_DEF char *sat_explain(char *text, size_t size, int width, int height, int channels, const sat_options *options)
+SAT_DEF const char *sat_explain(char *text, size_t size, int width, int height, int channels, const sat_options *options)
 {
     sat__text t = sat__text_begin(text, size);
     if (sat__explain_size(&t, width, height, channels) && options) sat__explain_options(&t, options);
     return text;
 }
 
-SAT_DEF char *sat_explain_image(char *text, size_t size, const sat_image *image)
+SAT_DEF const char *sat_explain_image(char *text, size_t size, const sat_image *image)
 {
     sat__text t = sat__text_begin(text, size);
     if (!image) sat__text_add(&t, "image is NULL");
@@ -4533,7 +4533,7 @@ SAT_DEF sat_moments_options sat_moments_defaults(void)
     return options;
 }
 
-SAT_DEF char *sat_explain_moments(char *text, size_t size, int width, int height, int channels, const sat_moments_options *options)
+SAT_DEF const char *sat_explain_moments(char *text, size_t size, int width, int height, int channels, const sat_moments_options *options)
 {
     sat__text t = sat__text_begin(text, size);
     const sat__field *wrong = options ? sat__fields_check(options, sat__moments_fields, SAT__COUNT(sat__moments_fields)) : NULL;
@@ -5270,7 +5270,7 @@ static int sat__explain_gl_options(sat__text *t, const sat_gl_options *o)
     return 0;
 }
 
-SAT_DEF char *sat_explain_gl(char *text, size_t size, const sat_gl_options *options)
+SAT_DEF const char *sat_explain_gl(char *text, size_t size, const sat_gl_options *options)
 {
     sat__text t = sat__text_begin(text, size);
     if (options) sat__explain_gl_options(&t, options);

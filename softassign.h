@@ -280,8 +280,8 @@ SOFTASSIGN_DEF void softassign_destroy(softassign *solver); /* NULL is fine */
    to size, always ended); returns text. The first: options of softassign_solve, softassign_create and
    softassign_gl_create; the second: a problem with the options it is solved with (NULL: the defaults) by softassign_solve.
    Costs and features are not read; the report names their row. */
-SOFTASSIGN_DEF char *softassign_explain(char *text, size_t size, const softassign_options *options);
-SOFTASSIGN_DEF char *softassign_explain_problem(char *text, size_t size, const softassign_problem *problem,
+SOFTASSIGN_DEF const char *softassign_explain(char *text, size_t size, const softassign_options *options);
+SOFTASSIGN_DEF const char *softassign_explain_problem(char *text, size_t size, const softassign_problem *problem,
                                                 const softassign_options *options);
 
 #ifdef __cplusplus
@@ -3046,7 +3046,7 @@ static int softassign__options_are_valid(const softassign_options *o)
     return softassign__explain_options(&ignored, o);
 }
 
-SOFTASSIGN_DEF char *softassign_explain(char *text, size_t size, const softassign_options *options)
+SOFTASSIGN_DEF const char *softassign_explain(char *text, size_t size, const softassign_options *options)
 {
     sat__text t = sat__text_begin(text, size);
     if (options) softassign__explain_options(&t, options);
@@ -3112,7 +3112,7 @@ static int softassign__problem_is_valid(const softassign_problem *p)
     return softassign__explain_costs(&ignored, p);
 }
 
-SOFTASSIGN_DEF char *softassign_explain_problem(char *text, size_t size, const softassign_problem *problem,
+SOFTASSIGN_DEF const char *softassign_explain_problem(char *text, size_t size, const softassign_problem *problem,
                                                 const softassign_options *options)
 {
     sat__text t = sat__text_begin(text, size);

@@ -76,7 +76,7 @@
      tolerance_codes = 2 skips 32 % (StillLife) and 42 % (night) of the searches, but the bounds take about as long as
      what they save: the time is between 1.0 and 1.2. On noise it looks at an eighth of the tiles, sees that nothing can be
      skipped, and costs 1.03. selective pays where few pixels are near edges, 0.9 to 1.1, and for Ashikhmin, 0.6, at an SSIM
-     of only 0.9. Percentile metering takes 0.96 to 1.04 times the time of the log-average.
+     of only 0.9.
      Against flicker: 0.5 % of noise moves single pixels by up to 56 codes with soft = 0 and by less than 1 with soft = 1. */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(TONEMAP_IMPLEMENTATION)
@@ -213,7 +213,7 @@ TONEMAP_DEF sat_result tonemap_apply_f32(tonemap *map, float *out, ptrdiff_t out
                                          double dt_seconds, tonemap_stats *stats);
 /* One sentence that names the first argument of tonemap_create or tonemap_gl_create that is refused, and its range; ""
    when none is. Written into text (cut to size, always ended); returns text. */
-TONEMAP_DEF char *tonemap_explain(char *text, size_t size, int width, int height, const tonemap_options *options);
+TONEMAP_DEF const char *tonemap_explain(char *text, size_t size, int width, int height, const tonemap_options *options);
 /* Other options from the next picture on; the adaptation goes on, and what only the new options need starts with it. Allocator and worker count stay those of create. */
 TONEMAP_DEF sat_result tonemap_set_options(tonemap *map, const tonemap_options *options);
 TONEMAP_DEF void tonemap_destroy(tonemap *map); /* NULL is fine */
@@ -416,7 +416,7 @@ static inline int tonemap__options_are_valid(const tonemap_options *o)
     return tonemap__explain_options(&ignored, o);
 }
 
-TONEMAP_DEF char *tonemap_explain(char *text, size_t size, int width, int height, const tonemap_options *options)
+TONEMAP_DEF const char *tonemap_explain(char *text, size_t size, int width, int height, const tonemap_options *options)
 {
     sat__text t = sat__text_begin(text, size);
     if (width < 1 || width > 1 << 24) sat__text_range(&t, "width", width, 1, 1 << 24, ' ');
