@@ -2088,11 +2088,11 @@ RAINDROP_DEF raindrop_rain_options raindrop_rain_defaults(void)
 
 static inline int raindrop__rain_is_valid(const raindrop_rain_options *o)
 {
-    int axis;
     if (o->drops) return o->count >= 0 && o->count <= RAINDROP__MAX_DROPS && sat__threads_are_valid(&o->threads);
 #ifdef RAINDROP_NO_RAIN
     return 0;
 #else
+    int axis;
     if (!(o->rate_mm_h >= 0.01 && o->rate_mm_h <= 500) || o->count < 0 || o->count > RAINDROP__MAX_DROPS) return 0;
     if (!(o->diameter_mm == 0 || (o->diameter_mm >= 0.001 && o->diameter_mm <= 6))) return 0;
     if (!(o->diameter_min_mm >= 0.001 && o->diameter_min_mm < o->diameter_max_mm && o->diameter_max_mm <= 6)) return 0;
