@@ -4,7 +4,7 @@
 
 all: examples
 .PHONY: all examples demo web check-view test bench report size check check-strict check-house check-variants check-asan check-tsan \
-        check-analyze check-compilers check-report check-install format format-check fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
+        check-analyze check-compilers check-report check-install format-check fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
@@ -204,11 +204,9 @@ check-report:
 check-install:
 	@RUNNER='bash tests/check_install.sh' JOBS=1 tests/run.sh install
 
-# .clang-format over everything
-FORMATTED = $(wildcard *.h examples/*.[ch] tests/*.[ch] tests/*.cpp tests/bench/*.[ch] tests/bench/*.cpp)
-format format-check:
-	@command -v clang-format >/dev/null || { echo 'make $@ needs clang-format: apt-get install clang-format'; exit 1; }
-	clang-format $(if $(filter format,$@),-i,--dry-run -Werror) $(FORMATTED)
+# columns, tabs and blanks of all sources
+format-check:
+	@RUNNER='bash tests/check_format.sh' JOBS=1 tests/run.sh format
 
 # bytes of machine code with and without each option
 size:
@@ -282,7 +280,7 @@ help:
 	@echo 'make check-analyze    gcc -fanalyzer, clang --analyze; check-compilers: aarch64, mingw-w64, tcc, 32 bit'
 	@echo 'make check-report     every bench once, with all packages and with none: the report is whole'
 	@echo 'make check-install    what make install writes, by pkg-config, CMake and Meson'
-	@echo 'make format-check     .clang-format over all sources; make format changes them'
+	@echo 'make format-check     columns, tabs and blanks of all sources'
 	@echo 'make fuzz             libFuzzer on each header          [FUZZ_SECONDS=20]'
 	@echo 'make check            all of check-*; each takes LIB=sat'
 	@echo 'make deps      install missing packages (Debian)'

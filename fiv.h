@@ -1,4 +1,5 @@
-/* fiv.h - 0.1.0 - fullsphere irradiance vectors: soft shadows from any environment - SPDX-License-Identifier: MIT-0 OR Unlicense
+/* fiv.h - 0.1.0 - fullsphere irradiance vectors: soft shadows from any environment - SPDX-License-Identifier: MIT-0 OR
+   Unlicense
 
    Soft shadows of moving and turning meshes under any environment map, at a fixed cost for each occluder and receiver.
 
@@ -19,29 +20,31 @@
 
    WHAT IT DOES
 
-   Michael 2010, chapter 3. A fullsphere irradiance vector (FIV, eq 10) is the sum of light times direction over a part of the
-   environment; its product with a normal is irradiance (eq 11). For a set of positions of an occluder around a receiver,
-   the vector of the light that it hides is known beforehand; a receiver interpolates eight of them and subtracts the
-   product with its normal from what it would get in the open (eq 12). Self-shadows take what is left instead (eq 13).
-   Beyond the thesis:
+   Michael 2010, chapter 3. A fullsphere irradiance vector (FIV, eq 10) is the sum of light times direction over a part
+   of the environment; its product with a normal is irradiance (eq 11). For a set of positions of an occluder around a
+   receiver, the vector of the light that it hides is known beforehand; a receiver interpolates eight of them and
+   subtracts the product with its normal from what it would get in the open (eq 12). Self-shadows take what is left
+   instead (eq 13). Beyond the thesis:
    - What is stored is not the light but the mask, as spans of texels on the rows of a cube. A mask's vector is a sum of
      differences of prefix sums, so a new environment, a turned one, or a turned occluder costs milliseconds.
-   - Masks are drawn without clipping: a triangle seen from the receiver is a cone, and a cone cuts a row in one interval.
-   - rho^2 times the vector is interpolated, samples inside the mesh are left out, and where the horizon cuts an occluder
-     (by the extent of the mesh, not of its ball) a clipped cap in closed form stands for it; the published factor
-     (d + R) / 2R makes a FIV, which is too small there, smaller still, and remains as FIV_TRILINEAR.
-   - Suns leave the cube as directional lights with exact direction and power. Their shadow is the interpolated distance to
-     the silhouette, not an interpolated bit.
-   - Near contact no interpolation is right: an occluder that keeps its mesh (keep_mesh) draws a mask for each such receiver, and
-     the edges of its suns are rays: what rests on a floor does not leak, and ears keep their shadows. fiv_irradiance
-     only; OpenGL, self-shadows and loaded occluders interpolate.
+   - Masks are drawn without clipping: a triangle seen from the receiver is a cone, and a cone cuts a row in one
+     interval.
+   - rho^2 times the vector is interpolated, samples inside the mesh are left out, and where the horizon cuts an
+     occluder (by the extent of the mesh, not of its ball) a clipped cap in closed form stands for it; the published
+     factor (d + R) / 2R makes a FIV, which is too small there, smaller still, and remains as FIV_TRILINEAR.
+   - Suns leave the cube as directional lights with exact direction and power. Their shadow is the interpolated distance
+     to the silhouette, not an interpolated bit.
+   - Near contact no interpolation is right: an occluder that keeps its mesh (keep_mesh) draws a mask for each such
+     receiver, and the edges of its suns are rays: what rests on a floor does not leak, and ears keep their shadows.
+     fiv_irradiance only; OpenGL, self-shadows and loaded occluders interpolate.
    - Overlapping occluders: the union of their masks (FIV_MASK), or discs of their true solid angle; never below 0.
-   Deviations from the text: sums carry the solid angle of their texels, which eq 6 to 10 leave out; a sample's position is the
-   occluder's centre minus the receiver; the first shell is free (0.3 R halves the error of the inner tangent sphere).
+   Deviations from the text: sums carry the solid angle of their texels, which eq 6 to 10 leave out; a sample's position
+   is the occluder's centre minus the receiver; the first shell is free (0.3 R halves the error of the inner tangent
+   sphere).
 
    WHAT IT DOES NOT
-   Receivers are diffuse; light comes from infinitely far away; light reflected between objects is not there; nothing within
-   a mesh is transparent. Meshes are not loaded. Occluders that deform need new masks (lazy: only those in use).
+   Receivers are diffuse; light comes from infinitely far away; light reflected between objects is not there; nothing
+   within a mesh is transparent. Meshes are not loaded. Occluders that deform need new masks (lazy: only those in use).
 
    OPTIONS (macros)
      FIV_IMPLEMENTATION  the implementation, in one file     FIV_STATIC, FIV_DEF   linkage, everywhere
@@ -50,31 +53,34 @@
      FIV_NO_SELF         no self-shadows (eq 13)             FIV_NO_DELTA          no split-off lights
 
    MEMORY, THREADS, ERRORS
-   An environment is one block; an occluder has one each for tables, masks (keep_masks) and mesh (keep_mesh, or no keep_masks). Only
-   create, share and load allocate. Functions take sat_threads in their options; different objects may be used at
-   once, and any number of threads may call fiv_irradiance on the same ones. All arguments are checked in every build.
-   No function takes more than 32 KB of stack; at most 256 workers take part in one fiv_irradiance.
+   An environment is one block; an occluder has one each for tables, masks (keep_masks) and mesh (keep_mesh, or no
+   keep_masks). Only create, share and load allocate. Functions take sat_threads in their options; different objects may
+   be used at once, and any number of threads may call fiv_irradiance on the same ones. All arguments are checked in
+   every build. No function takes more than 32 KB of stack; at most 256 workers take part in one fiv_irradiance.
 
    NUMERICS
-   - Same bits for any number of workers and any order of instances (sums of parts of I_tot in 2^-40 fixed point); where the
-     compiler contracts products and sums (-mfma without -ffp-contract=off), orders differ in the last digits, 1e-6.
-   - NaN and negative radiance count as 0, what exceeds max_radiance as that much; all are counted. NaN receivers are black.
-   - A texel of 1e8 changes no other vector: relative error of a span sum below 1e-10 (double prefixes), of the power of a
-     split-off light 4e-5 (beside the poles of the image up to 2 % of it stays in the cube). Masks equal rays through the texel centres but for rays that graze an edge (2e-6 of the texels set).
+   - Same bits for any number of workers and any order of instances (sums of parts of I_tot in 2^-40 fixed point); where
+     the compiler contracts products and sums (-mfma without -ffp-contract=off), orders differ in the last digits, 1e-6.
+   - NaN and negative radiance count as 0, what exceeds max_radiance as that much; all are counted. NaN receivers are
+     black.
+   - A texel of 1e8 changes no other vector: relative error of a span sum below 1e-10 (double prefixes), of the power of
+     a split-off light 4e-5 (beside the poles of the image up to 2 % of it stays in the cube). Masks equal rays through
+     the texel centres but for rays that graze an edge (2e-6 of the texels set).
    - OpenGL: within 2e-3 of the largest irradiance of fiv_irradiance and fiv_self_irradiance with cutoff 0, 1e-4 rms.
    - I_tot: within 6e-4 of its largest value of the sum over all texels. Turned vectors: 1.7 % rms of the same
      vectors computed from a turned mesh.
    - Receivers up to 1e9 radii away, anywhere inside and on the mesh, scale 0. Below the first shell its samples stand.
 
-   COST (tests/bench/bench_fiv.c; bunny of 3674 triangles, one core; ratios of one run). NRMSE is eq 17 on a plane below the
-   bunny against rays to every texel, in brackets the published one:
+   COST (tests/bench/bench_fiv.c; bunny of 3674 triangles, one core; ratios of one run). NRMSE is eq 17 on a plane below
+   the bunny against rays to every texel, in brackets the published one:
      samples      NRMSE forest    city    1 point light    masks made  light again  vectors  masks
      32x17x15     0.014 (0.023)   0.026   0.051 (0.1)      1.3 s       5 to 8 ms    0.33 MB  1.2 MB   default
      64x33x30     0.006 (0.008)   0.013   0.037            10 s        30 ms        2.5 MB   8.9 MB
-   - A receiver costs 0.15 us an occluder, 350 to 550 times less than its rays; FIV_MASK 1 to 2 us where masks are needed.
-   - keep_mesh, a floor 3 R wide that the mesh stands on, 32x17x15, forest: NRMSE of the box 0.090 -> 0.004, of the queen
-     0.069 -> 0.005, of a bare sun 0.14 -> 0. A mask takes 0.01 ms (box) to 0.5 ms (queen, 10k triangles), for 10 to 40 % of
-     these receivers; a ray 1 to 2 us, for 35 to 60 %.
+   - A receiver costs 0.15 us an occluder, 350 to 550 times less than its rays; FIV_MASK 1 to 2 us where masks are
+     needed.
+   - keep_mesh, a floor 3 R wide that the mesh stands on, 32x17x15, forest: NRMSE of the box 0.090 -> 0.004, of the
+     queen 0.069 -> 0.005, of a bare sun 0.14 -> 0. A mask takes 0.01 ms (box) to 0.5 ms (queen, 10k triangles), for 10
+     to 40 % of these receivers; a ray 1 to 2 us, for 35 to 60 %.
    - A mask costs 0.94 times Embree's eight-wide rays at 3.7k triangles, 1.3 to 1.75 times at 11k to 48k.
    - Two occluders, 64x33x30: NRMSE 0.034 with eq 14-15, 0.0105 FIV_SCALED, 0.007 FIV_MASK.
    - Cut by the horizon: FIV_SCALED has 0.14 to 0.36 of the error of (d + R) / 2R at d = 0 to 0.6 R.
@@ -131,8 +137,8 @@ enum {
 
 typedef struct fiv_environment_options {
     int face;              /* 32; 8..64; texels along an edge of the light's cube and of every mask */
-    float delta_ratio;     /* 400; 0..1e38; a patch this many times brighter than the mean, and half a texel wide, becomes a
-                              directional light; 0: none does */
+    float delta_ratio;     /* 400; 0..1e38; a patch this many times brighter than the mean, and half a texel wide,
+                              becomes a directional light; 0: none does */
     int max_lights;        /* 8; 0..FIV_MAX_LIGHTS; the strongest ones are kept, the rest stays in the cube */
     float max_radiance;    /* 1e10; 1e-30..1e38; larger values, infinity included, count as this much */
     sat_allocator allocator; /* malloc; used by create and destroy only */
@@ -167,9 +173,10 @@ FIV_DEF void fiv_environment_irradiance(const fiv_environment *environment, floa
 /* The vector of the whole environment (eq 10): x, y, z of red, then of green, then of blue. */
 FIV_DEF void fiv_environment_vector(const fiv_environment *environment, float fiv[9]);
 /* The M directional lights that the environment is made of (eq 6): first the split-off ones, then one a cube texel.
-   Fills at most `capacity` directions and powers (3 floats each: unit vector, radiance times solid angle; none where one of
-   them is NULL) and returns M. */
-FIV_DEF size_t fiv_environment_lights(const fiv_environment *environment, float *directions, float *powers, size_t capacity);
+   Fills at most `capacity` directions and powers (3 floats each: unit vector, radiance times solid angle; none where
+   one of them is NULL) and returns M. */
+FIV_DEF size_t fiv_environment_lights(const fiv_environment *environment, float *directions, float *powers,
+                                      size_t capacity);
 
 /* ------------------------------------------------------------------------------------------------
    Occluders: what casts shadows
@@ -204,7 +211,8 @@ FIV_DEF fiv_occluder_options fiv_occluder_defaults(void);
 typedef struct fiv_occluder_stats {
     size_t triangles;              /* in use */
     size_t skipped_triangles;      /* with a vertex that is not finite, or twice the same one */
-    int closed;                    /* 1: every edge is met once in each direction; half of the triangles are then left out */
+    int closed;                    /* 1: every edge is met once in each direction; half of the triangles are then left
+                                      out */
     float centre[3], radius;       /* bounding ball in the mesh's own coordinates */
     size_t samples, rasterised;    /* positions of the occluder; masks made (shared ones once, stale ones not) */
     size_t inside;                 /* samples whose receiver lies inside the mesh */
@@ -222,7 +230,8 @@ FIV_DEF sat_result fiv_occluder_create(fiv_occluder **out, const float *position
                                        const fiv_occluder_options *options, fiv_occluder_stats *stats);
 /* Integrates the light over the masks (eq 10); `rotation` of the occluder about its own origin, row-major, NULL: none.
    No allocation. The environment must stay unchanged and alive until the next fiv_occluder_light. */
-FIV_DEF sat_result fiv_occluder_light(fiv_occluder *occluder, const fiv_environment *environment, const float rotation[9]);
+FIV_DEF sat_result fiv_occluder_light(fiv_occluder *occluder, const fiv_environment *environment,
+                                      const float rotation[9]);
 /* The same mesh in another orientation or light: own vectors, the masks of `masks_of`, which must outlive it. */
 FIV_DEF sat_result fiv_occluder_share(fiv_occluder **out, const fiv_occluder *masks_of);
 FIV_DEF fiv_occluder_stats fiv_occluder_get_stats(const fiv_occluder *occluder);
@@ -253,7 +262,8 @@ typedef struct fiv_instance {
 typedef enum fiv_accuracy {
     FIV_NEAREST,   /* the nearest sample; else as FIV_TRILINEAR */
     FIV_TRILINEAR, /* as published: 8 samples, (d + R) / 2R where the horizon cuts, discs where occluders overlap */
-    FIV_SCALED,    /* rho^2 times the vector is interpolated, without samples inside the mesh; closed-form cap where the horizon cuts */
+    FIV_SCALED,    /* rho^2 times the vector is interpolated, without samples inside the mesh; closed-form cap where the
+                      horizon cuts */
     FIV_MASK       /* FIV_SCALED, and the stored masks where the horizon or another occluder cuts */
 } fiv_accuracy;
 
@@ -262,9 +272,9 @@ typedef struct fiv_irradiance_options {
     int partial;           /* 1; 0: no correction where the horizon cuts an occluder (figure 23, left) */
     int overlap;           /* 1; 0: no correction where occluders overlap (figure 21, left) */
     float cutoff;          /* 0.001; 0..1: an occluder that cannot take more than this part of I_tot is left out */
-    int own_masks;         /* 64; 0..64: of each 64 receivers so many may get masks of their own of the occluders that keep their
-                              mesh, from FIV_SCALED on: those in a cell with a sample inside the mesh, or from which it may
-                              cover 2 sr; 0: none */
+    int own_masks;         /* 64; 0..64: of each 64 receivers so many may get masks of their own of the occluders that
+                              keep their mesh, from FIV_SCALED on: those in a cell with a sample inside the mesh, or
+                              from which it may cover 2 sr; 0: none */
     sat_threads threads;   /* serial; same bits for any worker count */
 } fiv_irradiance_options;
 FIV_DEF fiv_irradiance_options fiv_irradiance_defaults(void);
@@ -280,16 +290,17 @@ typedef struct fiv_irradiance_stats {
     size_t missing;                     /* lookups that met stale samples only: no shadow */
 } fiv_irradiance_stats;
 
-/* Irradiance of `count` receivers, 3 floats each, lit by the environment and shadowed by the instances (eq 12): between 0
-   and I_tot, and the same bits for any order of the instances. Points in world coordinates; normals are normalised. The
-   occluders must have been lit by this environment. No allocation. stats may be NULL. */
+/* Irradiance of `count` receivers, 3 floats each, lit by the environment and shadowed by the instances (eq 12): between
+   0 and I_tot, and the same bits for any order of the instances. Points in world coordinates; normals are normalised.
+   The occluders must have been lit by this environment. No allocation. stats may be NULL. */
 FIV_DEF sat_result fiv_irradiance(float *rgb, const float *points, const float *normals, size_t count,
                                   const fiv_environment *environment, const fiv_instance *instances,
                                   size_t instance_count, const fiv_irradiance_options *options,
                                   fiv_irradiance_stats *stats);
 
 #ifndef FIV_NO_SELF
-/* The same for receivers on the surface of the mesh `self` (eq 13), which casts shadows on itself; `others` as above. */
+/* The same for receivers on the surface of the mesh `self` (eq 13), which casts shadows on itself; `others` as
+   above. */
 FIV_DEF sat_result fiv_self_irradiance(float *rgb, const float *points, const float *normals, size_t count,
                                        const fiv_environment *environment, const fiv_instance *self,
                                        const fiv_instance *others, size_t other_count,
@@ -337,26 +348,28 @@ typedef struct fiv_gl fiv_gl;
 
 /* For the current context (3.3 core, or ES 3.0 with EXT_color_buffer_float) and pictures of this size. On an error
    *out still is an object, for its message alone. */
-FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int width, int height, const fiv_gl_options *options);
-/* Uploads the environment and the vectors of the occluders: after each fiv_occluder_light. Arguments that are refused leave the
-   last scene as it was. */
-FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *gl, const fiv_environment *environment, const fiv_instance *instances, size_t count);
+FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int width, int height,
+                                 const fiv_gl_options *options);
+/* Uploads the environment and the vectors of the occluders: after each fiv_occluder_light. Arguments that are refused
+   leave the last scene as it was. */
+FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *gl, const fiv_environment *environment, const fiv_instance *instances,
+                                    size_t count);
 /* Only places and scales differ from the last fiv_gl_set_scene: what moving occluders cost a frame. */
 FIV_DEF sat_result fiv_gl_move(fiv_gl *gl, const fiv_instance *instances, size_t count);
-/* Irradiance of every pixel: `points` and `normals` are float textures of world coordinates; a normal of 0 gives 0. With
-   options.self the alpha of `points` says what a receiver lies on: 2 + i the surface of instance i, which shadows itself as in
-   fiv_self_irradiance; any other value, such as the 1 of RGB textures, nothing that casts shadows. State that is touched is
-   put back. */
+/* Irradiance of every pixel: `points` and `normals` are float textures of world coordinates; a normal of 0 gives 0.
+   With options.self the alpha of `points` says what a receiver lies on: 2 + i the surface of instance i, which shadows
+   itself as in fiv_self_irradiance; any other value, such as the 1 of RGB textures, nothing that casts shadows. State
+   that is touched is put back. */
 FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *gl, unsigned points, unsigned normals);
 /* The result, RGBA32F; belongs to the object. */
 FIV_DEF unsigned fiv_gl_texture(const fiv_gl *gl);
 FIV_DEF const char *fiv_gl_message(const fiv_gl *gl);
 FIV_DEF void fiv_gl_destroy(fiv_gl *gl); /* NULL is fine */
 
-/* For a shader of one's own: `vec3 fiv_irradiance(vec3 point, vec3 normal)` and `vec3 fiv_self_irradiance(int self, vec3 point,
-   vec3 normal)` on the surface of instance `self` (-1: none), as a list of strings that ends with NULL. Define FIV_INSTANCES as
-   max_instances in front of it. fiv_gl_bind uses the program and sets its uniforms; it takes three texture units and
-   leaves them bound. */
+/* For a shader of one's own: `vec3 fiv_irradiance(vec3 point, vec3 normal)` and `vec3 fiv_self_irradiance(int self,
+   vec3 point, vec3 normal)` on the surface of instance `self` (-1: none), as a list of strings that ends with NULL.
+   Define FIV_INSTANCES as max_instances in front of it. fiv_gl_bind uses the program and sets its uniforms; it takes
+   three texture units and leaves them bound. */
 FIV_DEF const char *const *fiv_gl_glsl(void);
 FIV_DEF sat_result fiv_gl_bind(fiv_gl *gl, unsigned program, int first_unit);
 
@@ -512,8 +525,10 @@ static inline double fiv__corner_angle(double u, double v) { return atan2(u * v,
 
 static inline double fiv__texel_angle(int x, int y, int size)
 {
-    double u0 = 2.0 * x / size - 1, u1 = 2.0 * (x + 1) / size - 1, v0 = 2.0 * y / size - 1, v1 = 2.0 * (y + 1) / size - 1;
-    return fiv__corner_angle(u1, v1) - fiv__corner_angle(u0, v1) - fiv__corner_angle(u1, v0) + fiv__corner_angle(u0, v0);
+    double u0 = 2.0 * x / size - 1, u1 = 2.0 * (x + 1) / size - 1, v0 = 2.0 * y / size - 1,
+           v1 = 2.0 * (y + 1) / size - 1;
+    return fiv__corner_angle(u1, v1) - fiv__corner_angle(u0, v1) - fiv__corner_angle(u1, v0) +
+           fiv__corner_angle(u0, v0);
 }
 
 /* ---- environments */
@@ -572,7 +587,8 @@ FIV_DEF fiv_environment_options fiv_environment_defaults(void)
 FIV_DEF const char *fiv_explain_environment(char *text, size_t size, const fiv_environment_options *options)
 {
     sat__text t = sat__text_begin(text, size);
-    const sat__field *wrong = options ? sat__fields_check(options, fiv__environment_fields, SAT__COUNT(fiv__environment_fields)) : NULL;
+    const sat__field *wrong =
+        options ? sat__fields_check(options, fiv__environment_fields, SAT__COUNT(fiv__environment_fields)) : NULL;
     if (wrong) sat__text_field(&t, wrong, options);
     return text && size ? text : "";
 }
@@ -653,7 +669,8 @@ static void fiv__splat(const fiv__scan *scan, const float *rgb, float row_sine, 
 static void fiv__fetch(float rgb[3], const fiv_environment *e, const sat_image *image, const float d[3])
 {
     double length = sqrt((double)d[0] * (double)d[0] + (double)d[1] * (double)d[1] + (double)d[2] * (double)d[2]);
-    double u = atan2((double)d[0], (double)-d[2]) / 6.283185307179586 + 0.5, v = acos((double)d[1] / length) / 3.141592653589793;
+    double u = atan2((double)d[0], (double)-d[2]) / 6.283185307179586 + 0.5,
+           v = acos((double)d[1] / length) / 3.141592653589793;
     int c, x = sat__clamp_int((int)(u * image->width), 0, image->width - 1);
     int y = sat__clamp_int((int)(v * image->height), 0, image->height - 1);
     fiv_environment_stats ignored;
@@ -676,7 +693,8 @@ static void fiv__finish_source(fiv_environment *e, const sat_image *image)
                     for (c = 0; c < 3; c++) cell[c] /= cell[3];
                 } else {
                     float d[3];
-                    fiv__cube_direction(d, face, fiv__texel_coordinate(x, e->patch), fiv__texel_coordinate(y, e->patch));
+                    fiv__cube_direction(d, face, fiv__texel_coordinate(x, e->patch),
+                                        fiv__texel_coordinate(y, e->patch));
                     fiv__fetch(cell, e, image, d);
                 }
                 cell[3] = face ? e->source[4 * (y * e->patch + x) + 3] : (float)fiv__texel_angle(x, y, e->patch);
@@ -738,14 +756,16 @@ static void fiv__measure_light(double power[3], double direction[3], fiv_environ
     scan.image = image;
     scan.cut = fiv__cut(e, image);
     height = image->height * scan.cut;
-    fiv__cube_direction(middle, (int)(patch / (size_t)(size * size)), fiv__texel_coordinate((int)(patch % (size_t)size), size),
+    fiv__cube_direction(middle, (int)(patch / (size_t)(size * size)),
+                        fiv__texel_coordinate((int)(patch % (size_t)size), size),
                         fiv__texel_coordinate((int)(patch / (size_t)size % (size_t)size), size));
     length = sqrt((double)fiv__dot(middle, middle));
     polar = acos((double)middle[1] / length) / 3.141592653589793;
     for (c = 0; c < 3; c++) power[c] = direction[c] = 0;
     for (x = 0; x < image->width * scan.cut; x += FIV__BLOCK) {
         fiv__scan_columns(&scan, x);
-        for (y = sat__max_int(0, (int)((polar - reach) * height)); y < height && y < (polar + reach) * height + 1; y++) {
+        for (y = sat__max_int(0, (int)((polar - reach) * height)); y < height && y < (polar + reach) * height + 1;
+             y++) {
             double t = 3.141592653589793 * y / height, step = 3.141592653589793 / height, middle_angle = t + 0.5 * step;
             double solid = (cos(t) - cos(t + step)) * 6.283185307179586 / (image->width * scan.cut);
             fiv__scan_read(rgb, &scan, y / scan.cut, &ignored);
@@ -784,7 +804,8 @@ static int fiv__brightest_patch(size_t *patch, const fiv_environment *e, double 
 }
 
 /* Adds to a light nearer than one texel of the masks, or starts a new one; 0 when there is no room. */
-static int fiv__add_light(fiv_environment *e, double sums[FIV_MAX_LIGHTS][3], const double power[3], const double direction[3])
+static int fiv__add_light(fiv_environment *e, double sums[FIV_MAX_LIGHTS][3], const double power[3],
+                          const double direction[3])
 {
     double length = sqrt(direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
     double near_cosine = cos(2.0 / e->face);
@@ -916,7 +937,8 @@ static void fiv__gather_rows(int begin, int end, int worker, void *context)
 static inline void fiv__half_space(int *begin, int *end, const float normal[3], int row, int size)
 {
     fiv__axes a = fiv__face_axes(row / size);
-    float constant = normal[a.w] * a.sign + normal[a.v] * fiv__texel_coordinate(row % size, size), slope = normal[a.u], x;
+    float constant = normal[a.w] * a.sign + normal[a.v] * fiv__texel_coordinate(row % size, size), slope = normal[a.u],
+          x;
     *begin = 0;
     *end = size;
     if (slope == 0) {
@@ -1039,7 +1061,9 @@ FIV_DEF sat_result fiv_environment_create(fiv_environment **out, const sat_image
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (!fiv__image_is_valid(equirect_rgb) || sat__fields_check(&o, fiv__environment_fields, SAT__COUNT(fiv__environment_fields))) return SAT_ERR_ARGUMENT;
+    if (!fiv__image_is_valid(equirect_rgb) ||
+        sat__fields_check(&o, fiv__environment_fields, SAT__COUNT(fiv__environment_fields)))
+        return SAT_ERR_ARGUMENT;
     memset(&e, 0, sizeof e);
     if (!sat__resolve_allocator(&e.allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     e.threads = o.threads;
@@ -1118,7 +1142,8 @@ static void fiv__diffuse(float rgb[3], const fiv_environment *e, const float uni
     v -= (float)y;
     p = e->irradiance + 3 * ((size_t)(face * side + y) * (size_t)side + (size_t)x);
     for (c = 0; c < 3; c++) {
-        float top = p[c] + (p[c + 3] - p[c]) * u, bottom = p[3 * side + c] + (p[3 * side + c + 3] - p[3 * side + c]) * u;
+        float top = p[c] + (p[c + 3] - p[c]) * u,
+              bottom = p[3 * side + c] + (p[3 * side + c + 3] - p[3 * side + c]) * u;
         rgb[c] = top + (bottom - top) * v;
     }
 }
@@ -1234,7 +1259,8 @@ static int fiv__triangle_is_usable(const float *positions, const unsigned *t)
 }
 
 /* Every edge is met equally often in both directions: rays that enter must leave. keys and scratch: 3 a triangle. */
-static int fiv__is_closed(const uint64_t *triangles, size_t count, const unsigned *indices, uint64_t *keys, uint64_t *scratch)
+static int fiv__is_closed(const uint64_t *triangles, size_t count, const unsigned *indices, uint64_t *keys,
+                          uint64_t *scratch)
 {
     size_t i, n = 0;
     int k;
@@ -1334,14 +1360,16 @@ static void fiv__bounding_ball(double centre[3], double *radius, const fiv__mesh
         best = -1;
         for (i = 0; i < mesh->vertex_count; i++) {
             const float *p = positions + 3 * (size_t)mesh->source[i];
-            double x = (double)p[0] - centre[0], y = (double)p[1] - centre[1], z = (double)p[2] - centre[2], d = x * x + y * y + z * z;
+            double x = (double)p[0] - centre[0], y = (double)p[1] - centre[1], z = (double)p[2] - centre[2],
+                   d = x * x + y * y + z * z;
             if (d > best) {
                 best = d;
                 farthest = i;
             }
         }
         if (step == 100) break;
-        for (k = 0; k < 3; k++) centre[k] += ((double)positions[3 * (size_t)mesh->source[farthest] + (size_t)k] - centre[k]) / (step + 1);
+        for (k = 0; k < 3; k++)
+            centre[k] += ((double)positions[3 * (size_t)mesh->source[farthest] + (size_t)k] - centre[k]) / (step + 1);
     }
     for (k = 0; k < 3; k++) centre[k] = (double)(float)centre[k];
     *radius = sqrt(best) * 1.000001;
@@ -1388,7 +1416,8 @@ static void fiv__bound_cluster(fiv__cluster *c, const fiv__mesh *mesh)
     }
 }
 
-/* Takes the caller's positions over: bounding ball, relative vertices, bounds of the clusters. 0: too large for float. */
+/* Takes the caller's positions over: bounding ball, relative vertices, bounds of the clusters. 0: too large for
+   float. */
 static int fiv__place_mesh(fiv__mesh *mesh, float centre[3], float *radius, const float *positions)
 {
     double middle[3], r, volume = 0;
@@ -1412,7 +1441,8 @@ static int fiv__place_mesh(fiv__mesh *mesh, float centre[3], float *radius, cons
             int j;
             for (j = 0; j < 3; j++)
                 for (k = 0; k < 3; k++) p[j][k] = (double)mesh->x[k][c->vertex + corner[j]];
-            volume += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) + p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+            volume += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
+                      p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
                       p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
         }
     }
@@ -1431,8 +1461,8 @@ static void fiv__mesh_layout(fiv__mesh *mesh, sat__arena *arena)
     mesh->corner = (unsigned char *)sat__carve(arena, 3 * mesh->triangle_count, 1);
 }
 
-/* ---- masks: which texels a mesh covers, seen from the origin when its centre stands at `offset`. One word a row, a bit a
-   texel, set when the ray through the texel's centre meets a triangle, borders included. The triangle is the cone
+/* ---- masks: which texels a mesh covers, seen from the origin when its centre stands at `offset`. One word a row, a
+   bit a texel, set when the ray through the texel's centre meets a triangle, borders included. The triangle is the cone
    of its three corners, so that nothing needs to be clipped: on a row it is one interval, and one OR. */
 
 typedef struct fiv__raster {
@@ -1506,8 +1536,8 @@ static void fiv__raster_cone(const fiv__raster *r, int face, double p[3][3])
     }
 }
 
-/* A triangle in front of the eye, corners in texels: x[i], y[i]. Both triangles at an edge compute the same crossing, lower
-   corner first, so that no crack opens. */
+/* A triangle in front of the eye, corners in texels: x[i], y[i]. Both triangles at an edge compute the same crossing,
+   lower corner first, so that no crack opens. */
 static void fiv__raster_flat(uint64_t *rows, int size, const float x[3], const float y[3], int y0, int y1)
 {
     float bottom[3], top[3], start[3], slope[3];
@@ -1543,7 +1573,8 @@ static void fiv__raster_flat(uint64_t *rows, int size, const float x[3], const f
 static void fiv__project(float *px, float *py, float box[4], const fiv__raster *r, const fiv__cluster *c, int face)
 {
     fiv__axes ax = fiv__face_axes(face);
-    const float *xu = r->mesh->x[ax.u] + c->vertex, *xv = r->mesh->x[ax.v] + c->vertex, *xw = r->mesh->x[ax.w] + c->vertex;
+    const float *xu = r->mesh->x[ax.u] + c->vertex, *xv = r->mesh->x[ax.v] + c->vertex,
+                *xw = r->mesh->x[ax.w] + c->vertex;
     float ou = r->offset[ax.u], ov = r->offset[ax.v], ow = r->offset[ax.w], half = 0.5f * (float)r->size;
     int i;
 #ifdef SAT__VECTOR
@@ -1552,8 +1583,10 @@ static void fiv__project(float *px, float *py, float box[4], const fiv__raster *
     float lanes[4][4];
     for (i = 0; i < c->vertices; i += 4) {
         sat__f32x4 w = sat__f32x4_add(sat__f32x4_load(xw + i), sat__f32x4_set1(ow)), q = sat__f32x4_div(scale, w);
-        sat__f32x4 x = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_add(sat__f32x4_load(xu + i), sat__f32x4_set1(ou)), q), shift);
-        sat__f32x4 y = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_add(sat__f32x4_load(xv + i), sat__f32x4_set1(ov)), q), shift);
+        sat__f32x4 x =
+            sat__f32x4_add(sat__f32x4_mul(sat__f32x4_add(sat__f32x4_load(xu + i), sat__f32x4_set1(ou)), q), shift);
+        sat__f32x4 y =
+            sat__f32x4_add(sat__f32x4_mul(sat__f32x4_add(sat__f32x4_load(xv + i), sat__f32x4_set1(ov)), q), shift);
         sat__f32x4_store(px + i, x);
         sat__f32x4_store(py + i, y);
         low_x = sat__f32x4_min(low_x, x);
@@ -1614,7 +1647,8 @@ static inline void fiv__raster_triangle(uint64_t *rows, const float x[3], const 
     fiv__raster_flat(rows, last + 1, x, y, y0, y1);
 }
 
-enum { FIV__BESIDE = 15, FIV__NEAR_EYE = 16 }; /* of a vertex: beside the pyramid of a face, a bit a side; behind or far off it */
+enum { FIV__BESIDE = 15, FIV__NEAR_EYE = 16 }; /* of a vertex: beside the pyramid of a face, a bit a side; behind or far
+                                                  off it */
 
 static void fiv__raster_corner(double p[3], const fiv__raster *r, size_t vertex)
 {
@@ -1623,7 +1657,8 @@ static void fiv__raster_corner(double p[3], const fiv__raster *r, size_t vertex)
 }
 
 /* Texel coordinates of a cluster's vertices where they have some, and flags; returns the sides that all are beside. */
-static int fiv__raster_corners(float *px, float *py, unsigned char *flags, const fiv__raster *r, const fiv__cluster *c, int face)
+static int fiv__raster_corners(float *px, float *py, unsigned char *flags, const fiv__raster *r, const fiv__cluster *c,
+                               int face)
 {
     fiv__axes ax = fiv__face_axes(face);
     double half = 0.5 * r->size;
@@ -1698,8 +1733,8 @@ static void fiv__raster_cluster(const fiv__raster *r, const fiv__cluster *c, int
     }
 }
 
-/* Of a closed mesh only the triangles that are left through are drawn: every ray that meets the mesh leaves it at last, also
-   when it starts inside. A cluster is left out when all of its normals face the eye. */
+/* Of a closed mesh only the triangles that are left through are drawn: every ray that meets the mesh leaves it at last,
+   also when it starts inside. A cluster is left out when all of its normals face the eye. */
 static int fiv__cluster_faces_eye(const fiv__cluster *c, const float centre[3])
 {
     float along = fiv__dot(c->axis, centre), square = fiv__dot(centre, centre) - along * along, sine;
@@ -1728,14 +1763,16 @@ static void fiv__raster_mesh(uint64_t *rows, const fiv__mesh *mesh, const float 
             fiv__axes ax = fiv__face_axes(face);
             float w = centre[ax.w] * ax.sign, u = fabsf(centre[ax.u]), v = fabsf(centre[ax.v]), side = u > v ? u : v;
             if (w - side < -reach) continue;                       /* beside the face's pyramid, or behind it */
-            if (4 * w - side > 4.1232f * c->radius && w > c->radius) fiv__raster_cluster(&r, c, face); /* within four faces */
+            if (4 * w - side > 4.1232f * c->radius && w > c->radius)
+                fiv__raster_cluster(&r, c, face); /* within four faces */
             else fiv__raster_cluster_cones(&r, c, face);
         }
     }
 }
 
-/* 1 when a ray from the origin along d meets the mesh; clusters of a closed one through which it could only enter are left out. Seen along the ray a triangle is flat, and the sign of each of its edges
-   is the same number for both of its triangles, so that no ray slips through between them. */
+/* 1 when a ray from the origin along d meets the mesh; clusters of a closed one through which it could only enter are
+   left out. Seen along the ray a triangle is flat, and the sign of each of its edges is the same number for both of its
+   triangles, so that no ray slips through between them. */
 static int fiv__ray_meets_cluster(const fiv__mesh *mesh, const fiv__cluster *c, const float offset[3], float axes[3][3])
 {
     float x[3][FIV__CLUSTER_VERTICES + 4];
@@ -1747,13 +1784,15 @@ static int fiv__ray_meets_cluster(const fiv__mesh *mesh, const fiv__cluster *c, 
         sat__f32x4 p[3];
         for (k = 0; k < 3; k++) p[k] = sat__f32x4_add(sat__f32x4_load(m[k] + i), sat__f32x4_set1(offset[k]));
         for (k = 0; k < 3; k++) {
-            sat__f32x4 v = sat__f32x4_add(sat__f32x4_mul(p[0], sat__f32x4_set1(axes[k][0])), sat__f32x4_mul(p[1], sat__f32x4_set1(axes[k][1])));
+            sat__f32x4 v = sat__f32x4_add(sat__f32x4_mul(p[0], sat__f32x4_set1(axes[k][0])),
+                                          sat__f32x4_mul(p[1], sat__f32x4_set1(axes[k][1])));
             sat__f32x4_store(x[k] + i, sat__f32x4_add(v, sat__f32x4_mul(p[2], sat__f32x4_set1(axes[k][2]))));
         }
 #else
         for (t = i; t < i + 4; t++)
             for (k = 0; k < 3; k++)
-                x[k][t] = (m[0][t] + offset[0]) * axes[k][0] + (m[1][t] + offset[1]) * axes[k][1] + (m[2][t] + offset[2]) * axes[k][2];
+                x[k][t] = (m[0][t] + offset[0]) * axes[k][0] + (m[1][t] + offset[1]) * axes[k][1] +
+                          (m[2][t] + offset[2]) * axes[k][2];
 #endif
     }
     for (t = 0; t < c->triangles; t++) {
@@ -1771,7 +1810,8 @@ static int fiv__ray_meets(const fiv__mesh *mesh, const float offset[3], const fl
 {
     float axes[3][3];
     size_t i;
-    int k, least = fabsf(d[0]) < fabsf(d[1]) ? (fabsf(d[0]) < fabsf(d[2]) ? 0 : 2) : (fabsf(d[1]) < fabsf(d[2]) ? 1 : 2);
+    int k,
+        least = fabsf(d[0]) < fabsf(d[1]) ? (fabsf(d[0]) < fabsf(d[2]) ? 0 : 2) : (fabsf(d[1]) < fabsf(d[2]) ? 1 : 2);
     for (k = 0; k < 3; k++) axes[0][k] = (k == least ? 1.0f : 0.0f) - d[k] * d[least];
     fiv__normalise(axes[0], axes[0]);
     for (k = 0; k < 3; k++) axes[1][k] = d[(k + 1) % 3] * axes[0][(k + 2) % 3] - d[(k + 2) % 3] * axes[0][(k + 1) % 3];
@@ -1779,7 +1819,8 @@ static int fiv__ray_meets(const fiv__mesh *mesh, const float offset[3], const fl
     for (i = 0; i < mesh->cluster_count; i++) {
         const fiv__cluster *c = &mesh->clusters[i];
         float to[3], along, across, up, facing = fiv__dot(c->axis, d);
-        if (mesh->closed && c->cosine > 0 && facing <= 0 && facing * facing >= 1.0001f - c->cosine * c->cosine) continue;
+        if (mesh->closed && c->cosine > 0 && facing <= 0 && facing * facing >= 1.0001f - c->cosine * c->cosine)
+            continue;
         for (k = 0; k < 3; k++) to[k] = c->centre[k] + offset[k];
         along = fiv__dot(to, d);
         across = fiv__dot(to, axes[0]);
@@ -1790,8 +1831,8 @@ static int fiv__ray_meets(const fiv__mesh *mesh, const float offset[3], const fl
     return 0;
 }
 
-/* ---- spans: a mask as 16-bit words: first texel (6 bits), length - 1 (6), rows to go down (4). 15 rows: the other bits are
-   the number of the row, and a span follows. */
+/* ---- spans: a mask as 16-bit words: first texel (6 bits), length - 1 (6), rows to go down (4). 15 rows: the other
+   bits are the number of the row, and a span follows. */
 
 enum { FIV__MAX_WORDS = FIV__MAX_ROWS * (FIV__MAX_FACE / 2 + 1) };
 
@@ -1855,8 +1896,8 @@ static void fiv__integrate(double sum[FIV__TERMS], const double *sums, const uin
 
 #ifndef FIV_NO_MASKS
 /* The same for what lies above the horizon of N. */
-static void fiv__integrate_above(double sum[FIV__TERMS], const double *sums, const uint16_t *words, size_t count, int size,
-                                 const float normal[3])
+static void fiv__integrate_above(double sum[FIV__TERMS], const double *sums, const uint16_t *words, size_t count,
+                                 int size, const float normal[3])
 {
     size_t i;
     int row = 0, known = -1, low = 0, high = 0;
@@ -1919,7 +1960,8 @@ static void fiv__sample_offset(float offset[3], const fiv__grid *g, size_t sampl
     int i = (int)(sample % (size_t)g->theta), j = (int)(sample / (size_t)g->theta % (size_t)g->phi), k;
     float radius = g->shell[sample / ((size_t)g->theta * (size_t)g->phi)];
     if (g->octahedral) {
-        fiv__octahedron_direction(offset, 2 * (float)i / (float)(g->theta - 1) - 1, 2 * (float)j / (float)(g->phi - 1) - 1);
+        fiv__octahedron_direction(offset, 2 * (float)i / (float)(g->theta - 1) - 1,
+                                  2 * (float)j / (float)(g->phi - 1) - 1);
     } else {
         double azimuth = 6.283185307179586 * i / g->theta, polar = 3.141592653589793 * j / (g->phi - 1);
         double sine = j == g->phi - 1 ? 0 : sin(polar);
@@ -2050,7 +2092,10 @@ struct fiv_occluder {
 };
 
 /* Ten half floats. One stands before the first sample, so that fiv__upper_halves may start there. */
-static inline uint16_t *fiv__half_sample(const fiv_occluder *o, size_t sample) { return o->half_table + 1 + FIV__TERMS * sample; }
+static inline uint16_t *fiv__half_sample(const fiv_occluder *o, size_t sample)
+{
+    return o->half_table + 1 + FIV__TERMS * sample;
+}
 
 FIV_DEF fiv_occluder_options fiv_occluder_defaults(void)
 {
@@ -2069,7 +2114,8 @@ FIV_DEF fiv_occluder_options fiv_occluder_defaults(void)
 
 static int fiv__occluder_options_are_valid(const fiv_occluder_options *o)
 {
-    if (o->theta < 4 || o->theta > 4096 || o->theta & 1 || o->phi < 3 || o->phi > 2049 || o->rho < 2 || o->rho > 256) return 0;
+    if (o->theta < 4 || o->theta > 4096 || o->theta & 1 || o->phi < 3 || o->phi > 2049 || o->rho < 2 || o->rho > 256)
+        return 0;
     if (!(o->first_shell > 1e-6f) || !(o->last_shell <= 1000) || !(o->first_shell < o->last_shell)) return 0;
     if (o->face < 8 || o->face > FIV__MAX_FACE || o->max_lights < 0 || o->max_lights > FIV_MAX_LIGHTS) return 0;
     if (o->storage != FIV_STORAGE_FLOAT && o->storage != FIV_STORAGE_HALF_OCTAHEDRAL) return 0;
@@ -2092,7 +2138,8 @@ static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
     g->last = options->last_shell;
     g->log_first = (float)(log((double)g->first) / log(2.0));
     g->per_log = (float)((g->rho - 1) * log(2.0) / log((double)g->last / (double)g->first));
-    for (k = 0; k < g->rho; k++) g->shell[k] = (float)((double)g->first * pow((double)g->last / (double)g->first, (double)k / (g->rho - 1)));
+    for (k = 0; k < g->rho; k++)
+        g->shell[k] = (float)((double)g->first * pow((double)g->last / (double)g->first, (double)k / (g->rho - 1)));
     o->half_floats = g->octahedral;
     o->face = options->face;
     o->keep_masks = options->keep_masks != 0;
@@ -2163,8 +2210,8 @@ static void fiv__count_bytes(fiv_occluder *o)
     o->stats.bytes = o->block_size + o->mesh_size + (o->share ? 0 : o->words_size);
 }
 
-/* ---- support function: how far the mesh reaches along a direction, so that "cut by the horizon" means the mesh and not its
-   ball. What rests on a floor is then whole. */
+/* ---- support function: how far the mesh reaches along a direction, so that "cut by the horizon" means the mesh and
+   not its ball. What rests on a floor is then whole. */
 
 static void fiv__support_row(fiv_occluder *o, int j)
 {
@@ -2315,7 +2362,8 @@ static sat_result fiv__precompute(fiv_occluder *o, const fiv_occluder_options *o
 
 #endif /* FIV_NO_MASKS */
 
-static sat_result fiv__read_mesh(fiv_occluder *o, const float *positions, const unsigned *indices, size_t triangle_count)
+static sat_result fiv__read_mesh(fiv_occluder *o, const float *positions, const unsigned *indices,
+                                 size_t triangle_count)
 {
     fiv__mesh *mesh = &o->mesh;
     sat__arena arena;
@@ -2417,8 +2465,8 @@ FIV_DEF sat_result fiv_occluder_share(fiv_occluder **out, const fiv_occluder *ma
     return result;
 }
 
-/* ---- distance from a silhouette to a light. A light's visibility is a step in space; interpolated between samples it would
-   blur over a whole cell. The angle from the light to the mask's border changes smoothly, so that is what is
+/* ---- distance from a silhouette to a light. A light's visibility is a step in space; interpolated between samples it
+   would blur over a whole cell. The angle from the light to the mask's border changes smoothly, so that is what is
    interpolated, and the step is taken afterwards. */
 
 static void fiv__find_near(fiv__near *near_light, const float direction[3], int size)
@@ -2479,7 +2527,8 @@ static void fiv__store_vector(fiv_occluder *o, size_t sample, const double sum[F
     for (k = 0; k < 9; k++) v[k] = (float)(sum[k] * scale);
     v[9] = (float)(valid ? sum[9] * square : -sum[9] * square - 1e-6);
     for (k = 0; k < FIV__TERMS; k++)
-        if (o->half_floats) fiv__half_sample(o, sample)[k] = sat__half_from_float(v[k] > 65504 ? 65504 : v[k] < -65504 ? -65504 : v[k]);
+        if (o->half_floats)
+            fiv__half_sample(o, sample)[k] = sat__half_from_float(v[k] > 65504 ? 65504 : v[k] < -65504 ? -65504 : v[k]);
         else o->table[FIV__TERMS * sample + (size_t)k] = v[k];
 }
 
@@ -2493,7 +2542,8 @@ static void fiv__light_sample(fiv_occluder *o, size_t sample, const uint16_t *wo
         uint64_t rows[FIV__MAX_ROWS];
         fiv__decode(rows, words, count, 6 * o->face);
         for (i = 0; i < o->light_count; i++)
-            o->distance[sample * (size_t)o->max_lights + (size_t)i] = (signed char)fiv__silhouette_distance(&o->lights[i], rows);
+            o->distance[sample * (size_t)o->max_lights + (size_t)i] =
+                (signed char)fiv__silhouette_distance(&o->lights[i], rows);
     }
 }
 
@@ -2502,7 +2552,8 @@ static void fiv__light_stored(int begin, int end, int worker, void *context)
 {
     fiv_occluder *o = (fiv_occluder *)context;
     (void)worker;
-    for (; begin < end; begin++) fiv__light_sample(o, (size_t)begin, o->words + o->first[begin], o->first[begin + 1] - o->first[begin]);
+    for (; begin < end; begin++)
+        fiv__light_sample(o, (size_t)begin, o->words + o->first[begin], o->first[begin + 1] - o->first[begin]);
 }
 #endif
 
@@ -2573,8 +2624,8 @@ static void fiv__find_lights(fiv_occluder *o)
     }
 }
 
-/* rho^2 times a vector is at most the flux within one radius, and pi times the largest radiance beyond. A factor of four is left
-   for texels that turning makes brighter; small values stay clear of subnormal half floats. */
+/* rho^2 times a vector is at most the flux within one radius, and pi times the largest radiance beyond. A factor of
+   four is left for texels that turning makes brighter; small values stay clear of subnormal half floats. */
 static float fiv__half_scale(const fiv_environment *e)
 {
     double bound = 0;
@@ -2661,7 +2712,8 @@ static inline void fiv__add_sample_plain(float out[FIV__TERMS], float weight, co
 {
     int k;
     for (k = 0; k < 9; k++)
-        out[k] += weight * (o->half_floats ? fiv__half(fiv__half_sample(o, sample)[k]) : o->table[FIV__TERMS * sample + (size_t)k]);
+        out[k] += weight * (o->half_floats ? fiv__half(fiv__half_sample(o, sample)[k])
+                                           : o->table[FIV__TERMS * sample + (size_t)k]);
     out[9] += weight * fabsf(fiv__sample_angle(o, sample));
 }
 
@@ -2672,7 +2724,8 @@ static inline sat__f32x4 fiv__upper_halves(const uint16_t *p)
     sat__i32x4 v = sat__i32x4_load((const int32_t *)(const void *)p);
     sat__i32x4 magnitude = sat__i32x4_and(sat__i32x4_shift_right(v, 3), sat__i32x4_set1(0x0fffe000));
     sat__f32x4 value = sat__f32x4_mul(sat__f32x4_from_bits(magnitude), sat__f32x4_set1(5.192296858534828e33f));
-    return sat__f32x4_from_bits(sat__i32x4_or(sat__f32x4_bits(value), sat__i32x4_and(v, sat__i32x4_set1(-0x7fffffff - 1))));
+    return sat__f32x4_from_bits(
+        sat__i32x4_or(sat__f32x4_bits(value), sat__i32x4_and(v, sat__i32x4_set1(-0x7fffffff - 1))));
 }
 
 static inline void fiv__add_sample(float out[FIV__TERMS], float weight, const fiv_occluder *o, size_t sample)
@@ -2711,7 +2764,8 @@ static inline void fiv__unscale(float v[FIV__TERMS], const fiv_occluder *o, floa
     v[9] *= factor;
 }
 
-/* Published: the vectors themselves are interpolated, and fall with the square of the distance beyond the last shell. */
+/* Published: the vectors themselves are interpolated, and fall with the square of the distance beyond the last
+   shell. */
 static void fiv__lookup_published(float out[FIV__TERMS], const fiv_occluder *o, const fiv__cell *cell)
 {
     float near_shell = o->grid.shell[cell->shell], far_shell = o->grid.shell[cell->shell + 1];
@@ -2726,8 +2780,8 @@ static void fiv__lookup_published(float out[FIV__TERMS], const fiv_occluder *o, 
     fiv__unscale(out, o, 1);
 }
 
-/* rho^2 times the vector changes slowly with the distance; samples inside the mesh see everything dark and are left out.
-   Returns the weight of the valid samples; 0 when the receiver is inside, too. */
+/* rho^2 times the vector changes slowly with the distance; samples inside the mesh see everything dark and are left
+   out. Returns the weight of the valid samples; 0 when the receiver is inside, too. */
 static float fiv__lookup_scaled(float out[FIV__TERMS], const fiv_occluder *o, const fiv__cell *cell)
 {
     float total = 0;
@@ -2761,7 +2815,8 @@ static void fiv__take_nearest(fiv__cell *cell)
     for (q = 0; q < 8; q++) cell->weight[q] = q == best ? 1.0f : 0.0f;
 }
 
-/* How much of each light the occluder takes, 0..1: the interpolated distance of its silhouette, one texel of penumbra. */
+/* How much of each light the occluder takes, 0..1: the interpolated distance of its silhouette, one texel of
+   penumbra. */
 static void fiv__lookup_lights(float covered[FIV_MAX_LIGHTS], const fiv_occluder *o, const fiv__cell *cell)
 {
     int i, q;
@@ -2779,8 +2834,8 @@ static void fiv__lookup_lights(float covered[FIV_MAX_LIGHTS], const fiv_occluder
     }
 }
 
-/* ---- near contact: samples inside the mesh are left out, and those that are left see light that the receiver does not. Such a
-   receiver gets a mask of its own; suns, whose edges no interpolated distance keeps, get a ray. */
+/* ---- near contact: samples inside the mesh are left out, and those that are left see light that the receiver does
+   not. Such a receiver gets a mask of its own; suns, whose edges no interpolated distance keeps, get a ray. */
 
 #define FIV__CONTACT 2.0f /* sr */
 
@@ -2794,7 +2849,8 @@ static int fiv__is_contact(const fiv_occluder *o, const fiv__cell *cell, const f
 }
 
 /* Irradiance that the texels above the horizon give; returns their solid angle. */
-static float fiv__integrate_rows(float rgb[3], const uint64_t *rows, const double *sums, const float normal[3], int size)
+static float fiv__integrate_rows(float rgb[3], const uint64_t *rows, const double *sums, const float normal[3],
+                                 int size)
 {
     double sum[FIV__TERMS];
     int row, c, k, low, high;
@@ -2826,7 +2882,9 @@ static int fiv__agree(const fiv_occluder *o, const fiv__cell *cell, int i)
 {
     int q, first = o->distance[cell->index[0] * (size_t)o->max_lights + (size_t)i];
     for (q = 0; q < 8; q++)
-        if (o->state[cell->index[q]] != FIV__VALID || o->distance[cell->index[q] * (size_t)o->max_lights + (size_t)i] != first) return 0;
+        if (o->state[cell->index[q]] != FIV__VALID ||
+            o->distance[cell->index[q] * (size_t)o->max_lights + (size_t)i] != first)
+            return 0;
     return first == 126 || first == -126;
 }
 
@@ -2870,7 +2928,8 @@ typedef struct fiv__shadow {
 } fiv__shadow;
 
 /* Where an occluder stands: offset in its own frame and radii; 0 when it cannot matter. */
-static int fiv__place(float offset[3], float world[3], float *distance, const fiv_instance *instance, const float point[3])
+static int fiv__place(float offset[3], float world[3], float *distance, const fiv_instance *instance,
+                      const float point[3])
 {
     const fiv_occluder *o = instance->occluder;
     float centre[3], inverse;
@@ -2900,7 +2959,8 @@ static int fiv__is_negligible(const fiv__receiver *r, const float world[3], floa
     return 1;
 }
 
-/* Irradiance taken: N vector, or the cap where the horizon cuts. `cut`: part of the occluder's height below the horizon. */
+/* Irradiance taken: N vector, or the cap where the horizon cuts. `cut`: part of the occluder's height below the
+   horizon. */
 static void fiv__shade(float rgb[3], const float v[FIV__TERMS], const float normal[3], float cut)
 {
     int c;
@@ -2918,7 +2978,8 @@ static void fiv__shade(float rgb[3], const float v[FIV__TERMS], const float norm
 
 #ifndef FIV_NO_MASKS
 /* The eight masks, each cut by the horizon. */
-static void fiv__shade_masks(float rgb[3], const fiv_occluder *o, const fiv__cell *cell, const float normal[3], size_t *masks)
+static void fiv__shade_masks(float rgb[3], const fiv_occluder *o, const fiv__cell *cell, const float normal[3],
+                             size_t *masks)
 {
     double sum[FIV__TERMS], out[3] = {0, 0, 0}, total = 0;
     int q, c, k;
@@ -2946,8 +3007,8 @@ static float fiv__shade_own(float rgb[3], const fiv_occluder *o, const float off
 }
 
 /* The lights near whose direction an occluder that keeps its mesh has an edge, or all of them near contact. */
-static void fiv__cast_rays(float covered[FIV_MAX_LIGHTS], const fiv__receiver *r, const fiv_occluder *o, const fiv__cell *cell,
-                           const float offset[3], int contact)
+static void fiv__cast_rays(float covered[FIV_MAX_LIGHTS], const fiv__receiver *r, const fiv_occluder *o,
+                           const fiv__cell *cell, const float offset[3], int contact)
 {
     int i;
     for (i = 0; i < o->light_count; i++) {
@@ -2960,7 +3021,8 @@ static void fiv__cast_rays(float covered[FIV_MAX_LIGHTS], const fiv__receiver *r
 }
 
 /* Fills in a shadow; 0 when the occluder takes nothing. */
-static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], const fiv__receiver *r, const fiv_instance *instance)
+static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], const fiv__receiver *r,
+                     const fiv_instance *instance)
 {
     const fiv_occluder *o = instance->occluder;
     float offset[3], world[3], distance, height, normal[3], v[FIV__TERMS], below = 1, above = 1, cut = 0, back[3];
@@ -3043,19 +3105,21 @@ static float fiv__lens(float r1, float r2, float d)
     return r1 * r1 * (a - 0.5f * sinf(2 * a)) + r2 * r2 * (b - 0.5f * sinf(2 * b));
 }
 
-/* Published (eq 14 and 15): the part of the summed areas that two discs share, of the summed irradiances. FIV_SCALED: the
-   discs have the solid angle of the silhouettes, and the smaller irradiance bounds what is shared. */
+/* Published (eq 14 and 15): the part of the summed areas that two discs share, of the summed irradiances. FIV_SCALED:
+   the discs have the solid angle of the silhouettes, and the smaller irradiance bounds what is shared. */
 static int fiv__discs_overlap(float shared[3], const fiv__shadow *a, const fiv__shadow *b, int published)
 {
     float d[3], area, smaller;
     int k;
     for (k = 0; k < 3; k++) d[k] = a->direction[k] - b->direction[k];
-    area = fiv__lens(a->disc > b->disc ? a->disc : b->disc, a->disc > b->disc ? b->disc : a->disc, sqrtf(fiv__dot(d, d)));
+    area =
+        fiv__lens(a->disc > b->disc ? a->disc : b->disc, a->disc > b->disc ? b->disc : a->disc, sqrtf(fiv__dot(d, d)));
     if (!(area > 0)) return 0;
     smaller = a->disc < b->disc ? a->disc : b->disc;
     for (k = 0; k < 3; k++) {
         float low = a->rgb[k] < b->rgb[k] ? a->rgb[k] : b->rgb[k];
-        if (published) shared[k] = area / (3.14159265f * (a->disc * a->disc + b->disc * b->disc)) * (a->rgb[k] + b->rgb[k]);
+        if (published)
+            shared[k] = area / (3.14159265f * (a->disc * a->disc + b->disc * b->disc)) * (a->rgb[k] + b->rgb[k]);
         else shared[k] = area / (3.14159265f * smaller * smaller) * low;
     }
     return 1;
@@ -3087,7 +3151,8 @@ static void fiv__subtract_discs(int64_t taken[3], const fiv__receiver *r, const 
 #ifndef FIV_NO_MASKS
 
 /* The mask of a sample in the world's frame. */
-static void fiv__world_mask(uint64_t *rows, const fiv_occluder *o, size_t sample, const float direction[3], float radius)
+static void fiv__world_mask(uint64_t *rows, const fiv_occluder *o, size_t sample, const float direction[3],
+                            float radius)
 {
     uint64_t own[FIV__MAX_ROWS];
     const uint16_t *words = o->words + o->first[sample];
@@ -3121,9 +3186,9 @@ static int fiv__balls_overlap(const fiv__shadow *a, const fiv__shadow *b)
     return fiv__dot(a->direction, b->direction) > cosine - 1e-3f;
 }
 
-/* Exact union: the nearest masks of the occluders that may overlap are ORed; what the union takes, over what they take one by
-   one, scales their interpolated sum. Where the nearest masks lie below the horizon and the interpolated ones do not, their texels
-   say how much is shared. */
+/* Exact union: the nearest masks of the occluders that may overlap are ORed; what the union takes, over what they take
+   one by one, scales their interpolated sum. Where the nearest masks lie below the horizon and the interpolated ones do
+   not, their texels say how much is shared. */
 static void fiv__unite_masks(int64_t taken[3], const fiv__receiver *r, const fiv__shadow *shadows, int count)
 {
     uint64_t all[FIV__MAX_ROWS], one[FIV__MAX_ROWS], twice = 0;
@@ -3214,7 +3279,8 @@ static int fiv__start_receiver(fiv__receiver *r, const float *point, const float
     return 1;
 }
 
-static void fiv__finish_receiver(float rgb[3], const fiv__receiver *r, const int64_t taken[3], const float covered[FIV_MAX_LIGHTS])
+static void fiv__finish_receiver(float rgb[3], const fiv__receiver *r, const int64_t taken[3],
+                                 const float covered[FIV_MAX_LIGHTS])
 {
     int i, k;
     for (k = 0; k < 3; k++) {
@@ -3252,7 +3318,8 @@ typedef struct fiv__job {
 } fiv__job;
 
 #ifndef FIV_NO_SELF
-static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance *self, const float *point, const float *normal);
+static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance *self, const float *point,
+                              const float *normal);
 #endif
 
 /* Shares [begin, end): no other call has the first of them, so that its counters are this call's own. */
@@ -3281,7 +3348,8 @@ static void fiv__run_shares(int begin, int end, int worker, void *context)
     }
 }
 
-static int fiv__instance_is_valid(const fiv_instance *instance, const fiv_environment *e, const fiv_irradiance_options *o)
+static int fiv__instance_is_valid(const fiv_instance *instance, const fiv_environment *e,
+                                  const fiv_irradiance_options *o)
 {
     int k;
     const fiv_occluder *occluder = instance->occluder;
@@ -3350,13 +3418,14 @@ FIV_DEF sat_result fiv_irradiance(float *rgb, const float *points, const float *
     return fiv__run(&job, options, stats);
 }
 
-/* ---- self-shadows: all that is not covered lies above the horizon (eq 13), so that what remains is N (FIV - FIV_occ). That holds
-   on the surface, and no longer at the nearest sample above it; FIV_SCALED therefore cuts the open part at the
-   horizon as a cap, and FIV_MASK cuts the masks themselves. */
+/* ---- self-shadows: all that is not covered lies above the horizon (eq 13), so that what remains is N (FIV - FIV_occ).
+   That holds on the surface, and no longer at the nearest sample above it; FIV_SCALED therefore cuts the open part at
+   the horizon as a cap, and FIV_MASK cuts the masks themselves. */
 
 #ifndef FIV_NO_SELF
 
-static void fiv__self_diffuse(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const fiv__cell *cell, const float normal[3])
+static void fiv__self_diffuse(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const fiv__cell *cell,
+                              const float normal[3])
 {
     float v[FIV__TERMS], open[FIV__TERMS], world[3], total = 0;
     int c, k, q;
@@ -3378,7 +3447,8 @@ static void fiv__self_diffuse(float rgb[3], const fiv__receiver *r, const fiv_oc
 }
 
 #ifndef FIV_NO_MASKS
-static void fiv__self_masks(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const fiv__cell *cell, const float normal[3])
+static void fiv__self_masks(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const fiv__cell *cell,
+                            const float normal[3])
 {
     double sum[FIV__TERMS], taken[3] = {0, 0, 0}, total = 0;
     int q, c, k;
@@ -3416,7 +3486,8 @@ static void fiv__locate_outside(fiv__cell *cell, const fiv_occluder *o, const fl
 }
 
 /* What the others take is taken of what the mesh itself leaves. */
-static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance *self, const float *point, const float *normal)
+static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance *self, const float *point,
+                              const float *normal)
 {
     const fiv_occluder *o = self->occluder;
     float offset[3], world[3], distance, own_normal[3], covered[FIV_MAX_LIGHTS], own[FIV_MAX_LIGHTS], open[3];
@@ -3477,7 +3548,8 @@ FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *o, const fiv_instance *ins
     for (j = 0; j < instance_count; j++) {
         if (instances[j].occluder != o) continue;
         for (k = 0; k < 3; k++)
-            if (!sat__is_finite(instances[j].position[k]) || !sat__is_finite(instances[j].scale)) return SAT_ERR_ARGUMENT;
+            if (!sat__is_finite(instances[j].position[k]) || !sat__is_finite(instances[j].scale))
+                return SAT_ERR_ARGUMENT;
         for (i = 0; i < count; i++) {
             const float *p = points + 3 * i;
             float offset[3], world[3], distance;
@@ -3494,7 +3566,8 @@ FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *o, const fiv_instance *ins
     return SAT_OK;
 }
 
-/* ---- saves: a header of fixed-width little-endian fields, the states, the support function, the counts of words, the words */
+/* ---- saves: a header of fixed-width little-endian fields, the states, the support function, the counts of words, the
+   words */
 
 #ifndef FIV_NO_MASKS
 
@@ -3524,8 +3597,8 @@ static uint64_t fiv__hash(const unsigned char *p, size_t size)
 
 static size_t fiv__save_size(size_t samples, size_t words)
 {
-    return sizeof(fiv__save) + samples + FIV__SUPPORT * FIV__SUPPORT * sizeof(float) + (samples + 1) * sizeof(uint32_t) +
-           words * sizeof(uint16_t);
+    return sizeof(fiv__save) + samples + FIV__SUPPORT * FIV__SUPPORT * sizeof(float) +
+           (samples + 1) * sizeof(uint32_t) + words * sizeof(uint16_t);
 }
 
 FIV_DEF size_t fiv_occluder_save_size(const fiv_occluder *o)
@@ -3606,10 +3679,12 @@ static int fiv__read_header(fiv_occluder *from, fiv__save *s, const unsigned cha
     o.max_lights = from->max_lights;
     fiv__set_grid(from, &o);
     samples = fiv__grid_samples(&from->grid);
-    return s->phi == from->grid.phi && samples <= 0x7fffffff && s->words <= 0x7fffffff && size == fiv__save_size(samples, (size_t)s->words);
+    return s->phi == from->grid.phi && samples <= 0x7fffffff && s->words <= 0x7fffffff &&
+           size == fiv__save_size(samples, (size_t)s->words);
 }
 
-FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, size_t size, const fiv_occluder_options *options)
+FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, size_t size,
+                                     const fiv_occluder_options *options)
 {
     fiv_occluder_options options_used = options ? *options : fiv_occluder_defaults();
     fiv_occluder from, *o = NULL;
@@ -3684,9 +3759,10 @@ SAT__IEEE_BEGIN
 extern "C" {
 #endif
 
-/* Texels of fiv_tables: of each sample the vector and the solid angle in ten components, then the distances of the lights, two
-   in the third texel and four in each further one; then the support function, one a texel. fiv_scene: a row an instance, see
-   fiv__gl_row and fiv__gl_light; two texels a light in the row behind them. fiv_diffuse: I_tot at the corners of the cube. */
+/* Texels of fiv_tables: of each sample the vector and the solid angle in ten components, then the distances of the
+   lights, two in the third texel and four in each further one; then the support function, one a texel. fiv_scene: a row
+   an instance, see fiv__gl_row and fiv__gl_light; two texels a light in the row behind them. fiv_diffuse: I_tot at the
+   corners of the cube. */
 static const char fiv__glsl_cube[] =
     "#ifndef FIV_GLSL\n"
     "#define FIV_GLSL\n"
@@ -3789,8 +3865,8 @@ static const char fiv__glsl_cell[] =
     "    return s;\n"
     "}\n";
 
-/* What one occluder takes, and its solid angle in w; what is left of the light on its own surface (eq 13). Both note in `light` how
-   much of each light is covered. */
+/* What one occluder takes, and its solid angle in w; what is left of the light on its own surface (eq 13). Both note in
+   `light` how much of each light is covered. */
 static const char fiv__glsl_occluder[] =
     "float fiv_cap(float c, float h) {\n"
     "    float s = 1.0 - h * h;\n"
@@ -3913,7 +3989,12 @@ static const char fiv__glsl_main[] =
     "    value = vec4(fiv_receive(self, point.xyz, texelFetch(fiv_normals, p, 0).xyz), 1.0);\n"
     "}\n";
 
-enum { FIV__GL_WIDTH = 2048, FIV__GL_UNITS = 5, FIV__SCENE_WIDTH = 16, FIV__SUPPORT_TEXELS = FIV__SUPPORT * FIV__SUPPORT };
+enum {
+    FIV__GL_WIDTH = 2048,
+    FIV__GL_UNITS = 5,
+    FIV__SCENE_WIDTH = 16,
+    FIV__SUPPORT_TEXELS = FIV__SUPPORT * FIV__SUPPORT
+};
 
 struct fiv_gl {
     sat__gl gl;
@@ -3988,7 +4069,8 @@ static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
     return r;
 }
 
-FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int width, int height, const fiv_gl_options *options)
+FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int width, int height,
+                                 const fiv_gl_options *options)
 {
     fiv_gl_options o = options ? *options : fiv_gl_defaults();
     sat_allocator allocator;
@@ -3997,7 +4079,8 @@ FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int wi
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
     if (!get_proc || width < 1 || height < 1 || width > 16384 || height > 16384) return SAT_ERR_ARGUMENT;
-    if (o.max_instances < 1 || o.max_instances > 64 || !sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
+    if (o.max_instances < 1 || o.max_instances > 64 || !sat__resolve_allocator(&allocator, &o.allocator))
+        return SAT_ERR_ARGUMENT;
 #ifdef FIV_NO_SELF
     if (o.self) return SAT_ERR_ARGUMENT;
 #endif
@@ -4026,7 +4109,8 @@ static void fiv__gl_fill(float *out, const fiv_occluder *o, int texels)
         fiv__unscale(v, o, 1);
         if (fiv__sample_angle(o, s) < 0) v[9] = -v[9];
         memcpy(out, v, sizeof v);
-        for (k = 0; k < o->light_count; k++) out[10 + k] = (float)o->distance[s * (size_t)o->max_lights + (size_t)k] / 21;
+        for (k = 0; k < o->light_count; k++)
+            out[10 + k] = (float)o->distance[s * (size_t)o->max_lights + (size_t)k] / 21;
     }
     for (i = 0; i < FIV__SUPPORT_TEXELS; i++) out[4 * i] = o->support[i];
 }
@@ -4137,7 +4221,9 @@ FIV_DEF sat_result fiv_gl_move(fiv_gl *g, const fiv_instance *instances, size_t 
     int k;
     if (!g || !g->tables || count != (size_t)g->count || (count && !instances)) return SAT_ERR_ARGUMENT;
     for (i = 0; i < count; i++) {
-        if (instances[i].occluder != g->occluders[i] || !sat__is_finite(instances[i].scale) || !(instances[i].scale >= 0)) return SAT_ERR_ARGUMENT;
+        if (instances[i].occluder != g->occluders[i] || !sat__is_finite(instances[i].scale) ||
+            !(instances[i].scale >= 0))
+            return SAT_ERR_ARGUMENT;
         for (k = 0; k < 3; k++)
             if (!sat__is_finite(instances[i].position[k])) return SAT_ERR_ARGUMENT;
     }
@@ -4231,9 +4317,9 @@ SAT__IEEE_END
    are in the file LICENSE.
 
    MIT No Attribution. Copyright 2026 the lightscan authors. Permission is hereby granted, free of charge, to any person
-   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software without
-   restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute, sublicense,
-   and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
+   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software
+   without restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute,
+   sublicense, and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
 
    THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE
    WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR

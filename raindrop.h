@@ -33,7 +33,8 @@
 
    - Drops do not see the scene or each other, only the environment; they do not collide, merge, splash or run down.
    - A drop that reaches the near plane, or that the eye is in, is left out (and counted).
-   - Sprites (MAP, SPRITE) are still and in focus. Flattened drops have order 0 only. OpenGL draws unsorted, as published.
+   - Sprites (MAP, SPRITE) are still and in focus. Flattened drops have order 0 only. OpenGL draws unsorted, as
+     published.
    - No Airy theory: no supernumerary bows.
    - It starts no thread, opens no window, creates no OpenGL context, keeps no global state.
 
@@ -51,9 +52,9 @@
 
    MEMORY, THREADS, ERRORS
 
-   A rain and a map are one allocation each; an environment is one that stays (22.6 MB for a 1024 x 512 picture) and up to
-   two while it is made, and with RAINDROP_FILTER_SAT a table. advance and render allocate nothing. A rain carries the
-   scratch memory of one render; environments and maps may be shared by any number of threads. Options may carry a
+   A rain and a map are one allocation each; an environment is one that stays (22.6 MB for a 1024 x 512 picture) and up
+   to two while it is made, and with RAINDROP_FILTER_SAT a table. advance and render allocate nothing. A rain carries
+   the scratch memory of one render; environments and maps may be shared by any number of threads. Options may carry a
    parallel_for, which create, advance and render then use. What can fail returns a sat_result and leaves outputs alone
    unless it is SAT_OK; arguments are checked in every build.
 
@@ -63,15 +64,15 @@
      glass and bubbles. Orders 0..3: 1e-6. The shares of all orders sum to 1 within 1e-6.
    - b -> 1, n = 1 (which gives the direction itself, bit for bit), total reflection and the view along the up vector
      are all ordinary cases; a radius or position that is no number leaves the drop out and counts it.
-   - The drag step is exact for vertical fall and rise in a steady wind, for h/tau from 0 to 1e6 (a 1 um drop, 10 s): the
-     fixed point to 1e-6, two half steps equal one to 1e-6. Sideways the drag takes the vertical speed for the whole
+   - The drag step is exact for vertical fall and rise in a steady wind, for h/tau from 0 to 1e6 (a 1 um drop, 10 s):
+     the fixed point to 1e-6, two half steps equal one to 1e-6. Sideways the drag takes the vertical speed for the whole
      speed: a gust is followed up to about a third too slowly by the largest drops, and never unstably.
-   - Terminal velocity: Stokes' law and Best 1950 blended, rms 3.5 % from Gunn and Kinzer 1949. Rain rate: within 15 % of
-     the asked one, 1..100 mm/h (Marshall and Palmer's own sizes carry 1.13 mm/h where they are asked for 1).
-   - Environment: NaN counts as 0, infinity as the largest finite value, negative light as 0; all are counted. One texel of
-     1e8 stays what it is: mips and footprints spread it, or `clamp` cuts it.
-   - The same bits for any number of workers; SIMD differs from plain C in the last digits. The GPU's picture is within an
-     RMSE of 5e-4 of the CPU's (tone-mapped luminance, quads, both unsorted; llvmpipe: 4e-5, with the longest streaks
+   - Terminal velocity: Stokes' law and Best 1950 blended, rms 3.5 % from Gunn and Kinzer 1949. Rain rate: within 15 %
+     of the asked one, 1..100 mm/h (Marshall and Palmer's own sizes carry 1.13 mm/h where they are asked for 1).
+   - Environment: NaN counts as 0, infinity as the largest finite value, negative light as 0; all are counted. One texel
+     of 1e8 stays what it is: mips and footprints spread it, or `clamp` cuts it.
+   - The same bits for any number of workers; SIMD differs from plain C in the last digits. The GPU's picture is within
+     an RMSE of 5e-4 of the CPU's (tone-mapped luminance, quads, both unsorted; llvmpipe: 4e-5, with the longest streaks
      2e-4), its drops within 3e-4 m over tens of steps.
 
    COST (one core, SSE2; ratios from tests/bench/bench_raindrop.c, forest environment)
@@ -88,8 +89,8 @@
      .0208). Boxes of a table: 20 to 150 times as long, better for small drops only (12 pixels: .036 against .049).
    - Streaks: RMSE .001 to .002 from 64 still moments, 36 to 60 times faster.
    - Sorting is 2 % of a frame.
-   - OpenGL, auto, 50000 drops of 2 mm at 512 x 512 on llvmpipe (tests/bench/gpu_raindrop.c), over round, sharp and still
-     drops without internal reflections: orders 1.1, flattened drops 1.1, a lens 1.4, a shutter 1.5.
+   - OpenGL, auto, 50000 drops of 2 mm at 512 x 512 on llvmpipe (tests/bench/gpu_raindrop.c), over round, sharp and
+     still drops without internal reflections: orders 1.1, flattened drops 1.1, a lens 1.4, a shutter 1.5.
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(RAINDROP_IMPLEMENTATION)
@@ -234,7 +235,8 @@ typedef struct raindrop_environment_options {
 RAINDROP_DEF raindrop_environment_options raindrop_environment_defaults(void);
 
 typedef struct raindrop_environment_stats {
-    size_t nan, infinite, negative, clamped; /* channel values replaced: by 0, by the largest finite one, by 0, by `clamp` */
+    size_t nan, infinite, negative, clamped; /* channel values replaced: by 0, by the largest finite one, by 0, by
+                                                `clamp` */
     float largest;                           /* after that */
     size_t bytes;
 } raindrop_environment_stats;
@@ -249,7 +251,8 @@ RAINDROP_DEF void raindrop_environment_destroy(raindrop_environment *environment
 RAINDROP_DEF void raindrop_environment_sample(float rgb[3], const raindrop_environment *environment,
                                               const float direction[3], float footprint);
 /* Mean colour of a far drop seen in that direction: the environment filtered by the drop's own phase function. */
-RAINDROP_DEF void raindrop_environment_far(float rgb[3], const raindrop_environment *environment, const float direction[3]);
+RAINDROP_DEF void raindrop_environment_far(float rgb[3], const raindrop_environment *environment,
+                                           const float direction[3]);
 
 /* ------------------------------------------------------------------------------------------------
    Rainbows
@@ -283,8 +286,8 @@ typedef struct raindrop_drop { float position[3], radius, velocity[3], axis_rati
 
 #ifndef RAINDROP_NO_RAIN
 /* One step of any length dt >= 0 under gravity and drag towards the terminal velocity in a steady wind (see NUMERICS);
-   dt = 0 changes nothing. SAT_ERR_ARGUMENT, and the drop as it was, for what is not finite, radius <= 0, dt < 0, or a dt
-   after which its place is no float. */
+   dt = 0 changes nothing. SAT_ERR_ARGUMENT, and the drop as it was, for what is not finite, radius <= 0, dt < 0, or a
+   dt after which its place is no float. */
 RAINDROP_DEF sat_result raindrop_fall(raindrop_drop *drop, const float wind[3], double dt);
 #endif
 
@@ -359,7 +362,8 @@ typedef struct raindrop_render_options {
 } raindrop_render_options;
 RAINDROP_DEF raindrop_render_options raindrop_render_defaults(void);
 
-/* How many drops were drawn, and why the others were not: the counts from `drawn_near` to `below_threshold` sum to `drops`. */
+/* How many drops were drawn, and why the others were not: the counts from `drawn_near` to `below_threshold` sum to
+   `drops`. */
 typedef struct raindrop_render_stats {
     size_t drops;
     size_t drawn_near, drawn_far; /* by rays (or sprites); by one lookup */
@@ -383,7 +387,8 @@ RAINDROP_DEF sat_result raindrop_render(float *rgb, ptrdiff_t stride, int width,
 
 /* The environment as a background picture for that camera. */
 RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride, int width, int height,
-                                                    const raindrop_camera *camera, const raindrop_environment *environment,
+                                                    const raindrop_camera *camera,
+                                                    const raindrop_environment *environment,
                                                     const sat_threads *threads);
 
 #ifdef __cplusplus
@@ -415,7 +420,8 @@ RAINDROP_DEF raindrop_gl_options raindrop_gl_defaults(void);
    state as it was (but for pending errors, which are lost). */
 typedef struct raindrop_gl raindrop_gl;
 /* On an OpenGL error *out only answers raindrop_gl_message, and is to be destroyed; on the others it is NULL. */
-RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *get_proc, const raindrop_gl_options *options);
+RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *get_proc,
+                                           const raindrop_gl_options *options);
 RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *gl);
 RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl);
 
@@ -471,7 +477,10 @@ RAINDROP_DEF int raindrop_version(void) { return RAINDROP_VERSION; }
 
 /* ---- vectors and clamps */
 
-static inline float raindrop__dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static inline float raindrop__dot(const float a[3], const float b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 static inline void raindrop__set(float out[3], float x, float y, float z)
 {
@@ -492,7 +501,10 @@ static inline void raindrop__normalise(float v[3])
     raindrop__set(v, v[0] * scale, v[1] * scale, v[2] * scale);
 }
 
-static inline float raindrop__clamp(float v, float low, float high) { return v > low ? v < high ? v : high : low; } /* NaN: low */
+static inline float raindrop__clamp(float v, float low, float high)
+{
+    return v > low ? v < high ? v : high : low;
+} /* NaN: low */
 
 static inline int raindrop__finite3(const float v[3])
 {
@@ -511,7 +523,10 @@ static inline uint32_t raindrop__hash(uint32_t seed, uint32_t stream, uint32_t i
 {
     return raindrop__mix(i ^ raindrop__mix(stream ^ raindrop__mix(seed ^ 0x9e3779b9u)));
 }
-static inline float raindrop__uniform(uint32_t bits) { return ((float)(bits >> 9) + 0.5f) * (1.0f / 8388608.0f); } /* (0, 1) */
+static inline float raindrop__uniform(uint32_t bits)
+{
+    return ((float)(bits >> 9) + 0.5f) * (1.0f / 8388608.0f);
+} /* (0, 1) */
 
 /* ---- as many floats at a time as the compiler was told to use; one function a sum, the same text for all widths */
 
@@ -565,12 +580,16 @@ static inline raindrop__v raindrop__min(raindrop__v a, raindrop__v b) { return a
 static inline raindrop__v raindrop__max(raindrop__v a, raindrop__v b) { return a > b ? a : b; }
 static inline raindrop__v raindrop__sqrt(raindrop__v a) { return sqrtf(a); }
 static inline raindrop__v raindrop__abs(raindrop__v a) { return fabsf(a); }
-static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindrop__v yes, raindrop__v no) { return a < b ? yes : no; }
+static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindrop__v yes, raindrop__v no)
+{
+    return a < b ? yes : no;
+}
 #endif
 
 static inline raindrop__v raindrop__dot_v(const raindrop__v a[3], const raindrop__v b[3])
 {
-    return raindrop__add(raindrop__add(raindrop__mul(a[0], b[0]), raindrop__mul(a[1], b[1])), raindrop__mul(a[2], b[2]));
+    return raindrop__add(raindrop__add(raindrop__mul(a[0], b[0]), raindrop__mul(a[1], b[1])),
+                         raindrop__mul(a[2], b[2]));
 }
 
 /* ------------------------------------------------------------------------------------------------
@@ -637,7 +656,9 @@ RAINDROP_DEF void raindrop_trace(raindrop_ray *out, const float direction[3], co
 }
 
 /* The same for RAINDROP__LANES rays, without branches: a totally reflected lane takes its values by selection. */
-typedef struct raindrop__rays { raindrop__v reflect[3], refract[3], fresnel, transmit, footprint_reflect, footprint_refract; } raindrop__rays;
+typedef struct raindrop__rays {
+    raindrop__v reflect[3], refract[3], fresnel, transmit, footprint_reflect, footprint_refract;
+} raindrop__rays;
 
 /* GCC at -O2 leaves a function of this size and its vectors in memory: 1.4 to 1.8 times as long. */
 #if defined(__GNUC__)
@@ -652,19 +673,26 @@ static inline raindrop__v raindrop__sum(raindrop__v a, raindrop__v x, raindrop__
     return raindrop__add(raindrop__mul(a, x), raindrop__mul(b, y));
 }
 
-RAINDROP__INLINE void raindrop__trace_v(raindrop__rays *out, const raindrop__v d[3], const raindrop__v p[3], raindrop__v one_minus_b2, float n)
+RAINDROP__INLINE void raindrop__trace_v(raindrop__rays *out, const raindrop__v d[3], const raindrop__v p[3],
+                                        raindrop__v one_minus_b2, float n)
 {
-    const raindrop__v zero = raindrop__splat(0), one = raindrop__splat(1), two = raindrop__splat(2), per_n = raindrop__splat(1 / n);
-    const raindrop__v index = raindrop__splat(n), tiny = raindrop__splat(RAINDROP__TINY), rim = raindrop__splat(RAINDROP__RIM);
+    const raindrop__v zero = raindrop__splat(0), one = raindrop__splat(1), two = raindrop__splat(2),
+                      per_n = raindrop__splat(1 / n);
+    const raindrop__v index = raindrop__splat(n), tiny = raindrop__splat(RAINDROP__TINY),
+                      rim = raindrop__splat(RAINDROP__RIM);
     const raindrop__v total_below = raindrop__splat(n < 1 ? 0 : -1.0f);
     raindrop__v m = raindrop__min(raindrop__max(one_minus_b2, zero), one), b2 = raindrop__sub(one, m);
-    raindrop__v inside = raindrop__mul(raindrop__add(m, raindrop__splat((n - 1) * (n + 1))), raindrop__mul(per_n, per_n));
+    raindrop__v inside =
+        raindrop__mul(raindrop__add(m, raindrop__splat((n - 1) * (n + 1))), raindrop__mul(per_n, per_n));
     raindrop__v ci = raindrop__sqrt(m), cr = raindrop__sqrt(raindrop__max(inside, zero));
-    raindrop__v cd = raindrop__add(raindrop__mul(ci, cr), raindrop__mul(b2, per_n)), sd = raindrop__sub(cr, raindrop__mul(ci, per_n));
+    raindrop__v cd = raindrop__add(raindrop__mul(ci, cr), raindrop__mul(b2, per_n)),
+                sd = raindrop__sub(cr, raindrop__mul(ci, per_n));
     raindrop__v n_cr = raindrop__mul(index, cr), n_ci = raindrop__mul(index, ci);
     /* four quotients by one division */
-    raindrop__v sum_s = raindrop__add(raindrop__add(ci, n_cr), tiny), sum_p = raindrop__add(raindrop__add(n_ci, cr), tiny);
-    raindrop__v both = raindrop__mul(sum_s, sum_p), cosines = raindrop__mul(raindrop__add(ci, rim), raindrop__add(n_cr, rim));
+    raindrop__v sum_s = raindrop__add(raindrop__add(ci, n_cr), tiny),
+                sum_p = raindrop__add(raindrop__add(n_ci, cr), tiny);
+    raindrop__v both = raindrop__mul(sum_s, sum_p),
+                cosines = raindrop__mul(raindrop__add(ci, rim), raindrop__add(n_cr, rim));
     raindrop__v per_all = raindrop__div(one, raindrop__mul(both, cosines)), per_both = raindrop__mul(per_all, cosines);
     raindrop__v less = raindrop__sub(ci, n_cr), a = raindrop__mul(raindrop__mul(less, sum_p), per_both);
     raindrop__v c = raindrop__mul(raindrop__mul(raindrop__sub(n_ci, cr), sum_s), per_both);
@@ -696,7 +724,8 @@ static inline void raindrop__keep(float *out, int at, raindrop__v v)
     if (out) raindrop__store(out + at, v);
 }
 
-RAINDROP__INLINE void raindrop__trace_block(const raindrop_ray_outputs *out, const raindrop_ray_inputs *in, int at, float n)
+RAINDROP__INLINE void raindrop__trace_block(const raindrop_ray_outputs *out, const raindrop_ray_inputs *in, int at,
+                                            float n)
 {
     raindrop__v d[3], p[3];
     raindrop__rays rays;
@@ -776,11 +805,13 @@ RAINDROP_DEF void raindrop_trace_order(raindrop_order *out, const float directio
 }
 
 /* The point (s, t) of the silhouette disc lies at the tangent of its angle, tan(alpha) = |(s,t)| / sqrt(D^2-1), and
-   1 - b^2 = (1 - s^2 - t^2) cos^2(alpha): no difference of large numbers (p = t d - c loses three digits at D = 1000). */
+   1 - b^2 = (1 - s^2 - t^2) cos^2(alpha): no difference of large numbers (p = t d - c loses three digits at D =
+   1000). */
 RAINDROP_DEF void raindrop_sprite_ray(float direction[3], float centre_offset[3], float *one_minus_b2, float s, float t,
                                       float distance)
 {
-    double away = (double)distance, scale = 1 / sqrt((away - 1) * (away + 1)), x = (double)s, y = (double)t, rho2 = x * x + y * y, cos2;
+    double away = (double)distance, scale = 1 / sqrt((away - 1) * (away + 1)), x = (double)s, y = (double)t,
+           rho2 = x * x + y * y, cos2;
     if (!direction || !centre_offset || !one_minus_b2) return;
     if (rho2 > 1) {
         scale /= sqrt(rho2);
@@ -797,7 +828,8 @@ RAINDROP_DEF void raindrop_sprite_ray(float direction[3], float centre_offset[3]
 
 /* ---- flattened drops: two quadric hits in the space where the drop is a sphere */
 
-/* Snell's law: direction d meets the surface of unit normal `normal` (against d) from index 1 to index n; 0: totally reflected. */
+/* Snell's law: direction d meets the surface of unit normal `normal` (against d) from index 1 to index n; 0: totally
+   reflected. */
 static inline int raindrop__snell(float out[3], const float d[3], const float normal[3], float n)
 {
     float ci = -raindrop__dot(d, normal), per_n = 1 / n, inside = 1 - (1 - ci * ci) * per_n * per_n;
@@ -849,7 +881,8 @@ RAINDROP_DEF int raindrop_trace_spheroid(raindrop_ray *out, const float directio
     raindrop__combine(hit, 1, hit, along, unit);
     raindrop__set(normal, -hit[0], -hit[1] * stretch, -hit[2]);
     raindrop__normalise(normal);
-    if (!raindrop__snell(leave, inner, normal, 1 / n)) { /* the rim of a flat drop: mirrored inside, rare; straight on */
+    if (!raindrop__snell(leave, inner, normal, 1 / n)) { /* the rim of a flat drop: mirrored inside, rare; straight
+                                                            on */
         out->transmit = 0;
         raindrop__set(leave, inner[0], inner[1], inner[2]);
     }
@@ -877,7 +910,8 @@ RAINDROP_DEF double raindrop_map_distance(int level) { return sqrt(1 + ldexp(1.0
 /* Share of a texel of half width h around (s, t) that the unit disc covers: 1 or 0, or counted where the rim passes. */
 static inline float raindrop__map_alpha(float s, float t, float h, int samples, uint32_t stream)
 {
-    float near_s = fabsf(s) > h ? fabsf(s) - h : 0, near_t = fabsf(t) > h ? fabsf(t) - h : 0, far_s = fabsf(s) + h, far_t = fabsf(t) + h;
+    float near_s = fabsf(s) > h ? fabsf(s) - h : 0, near_t = fabsf(t) > h ? fabsf(t) - h : 0, far_s = fabsf(s) + h,
+          far_t = fabsf(t) + h;
     int i, covered = 0;
     if (near_s * near_s + near_t * near_t >= 1) return 0;
     if (far_s * far_s + far_t * far_t <= 1) return 1;
@@ -896,8 +930,10 @@ static inline void raindrop__map_fill(float *texels, int resolution, int level, 
     int x, y;
     for (y = 0; y < resolution; y++) {
         for (x = 0; x < resolution; x++, texels += 8) {
-            float s = (float)(2 * x + 1) * h - 1, t = (float)(2 * y + 1) * h - 1, d[3], p[3], m, rho = sqrtf(s * s + t * t);
-            float alpha = raindrop__map_alpha(s, t, h, alpha_samples, raindrop__hash((uint32_t)level, (uint32_t)x, (uint32_t)y));
+            float s = (float)(2 * x + 1) * h - 1, t = (float)(2 * y + 1) * h - 1, d[3], p[3], m,
+                  rho = sqrtf(s * s + t * t);
+            float alpha =
+                raindrop__map_alpha(s, t, h, alpha_samples, raindrop__hash((uint32_t)level, (uint32_t)x, (uint32_t)y));
             raindrop_ray ray;
             memset(texels, 0, 8 * sizeof *texels);
             if (!(alpha > 0)) continue;
@@ -929,7 +965,8 @@ RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, int base_resolut
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (base_resolution < 1 || base_resolution > 4096 || (base_resolution & (base_resolution - 1))) return SAT_ERR_ARGUMENT;
+    if (base_resolution < 1 || base_resolution > 4096 || (base_resolution & (base_resolution - 1)))
+        return SAT_ERR_ARGUMENT;
     if (alpha_samples < 1 || alpha_samples > 4096 || !sat__is_finite(n) || !(n > 0)) return SAT_ERR_ARGUMENT;
     if (!sat__resolve_allocator(&memory, allocator ? allocator : &none)) return SAT_ERR_ARGUMENT;
     for (r = base_resolution; r; r >>= 1) count += (size_t)r * (size_t)r;
@@ -1036,7 +1073,8 @@ RAINDROP_DEF void raindrop_map_sample(float out[8], const raindrop_map *map, flo
         for (i = 0; i < 8; i++) out[i] = 0;
         return;
     }
-    raindrop__map_trilinear(out, map, raindrop__clamp(s, -1, 1), raindrop__clamp(t, -1, 1), raindrop__map_lod(distance * distance));
+    raindrop__map_trilinear(out, map, raindrop__clamp(s, -1, 1), raindrop__clamp(t, -1, 1),
+                            raindrop__map_lod(distance * distance));
 }
 #endif
 
@@ -1087,7 +1125,8 @@ static inline float *raindrop__texel(const raindrop__sphere *sphere, int level, 
 /* Direction to the unit square; returns the direction's |x|+|y|+|z| over its length, 1 .. sqrt(3). */
 static inline float raindrop__fold(float uv[2], const float d[3])
 {
-    float sum = fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]), scale = sum > 0 ? 1 / sum : 0, a = d[0] * scale, b = d[2] * scale;
+    float sum = fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]), scale = sum > 0 ? 1 / sum : 0, a = d[0] * scale,
+          b = d[2] * scale;
     if (d[1] < 0) {
         float c = a;
         a = copysignf(1 - fabsf(b), a);
@@ -1115,9 +1154,11 @@ static inline void raindrop__fill_border(const raindrop__sphere *sphere, int lev
     int r = sphere->resolution >> level, i;
     for (i = 0; i < r; i++) {
         memcpy(raindrop__texel(sphere, level, i, -1), raindrop__texel(sphere, level, r - 1 - i, 0), 4 * sizeof(float));
-        memcpy(raindrop__texel(sphere, level, i, r), raindrop__texel(sphere, level, r - 1 - i, r - 1), 4 * sizeof(float));
+        memcpy(raindrop__texel(sphere, level, i, r), raindrop__texel(sphere, level, r - 1 - i, r - 1),
+               4 * sizeof(float));
         memcpy(raindrop__texel(sphere, level, -1, i), raindrop__texel(sphere, level, 0, r - 1 - i), 4 * sizeof(float));
-        memcpy(raindrop__texel(sphere, level, r, i), raindrop__texel(sphere, level, r - 1, r - 1 - i), 4 * sizeof(float));
+        memcpy(raindrop__texel(sphere, level, r, i), raindrop__texel(sphere, level, r - 1, r - 1 - i),
+               4 * sizeof(float));
     }
     for (i = 0; i < 4; i++)
         memcpy(raindrop__texel(sphere, level, i & 1 ? r : -1, i & 2 ? r : -1),
@@ -1170,7 +1211,8 @@ static inline void raindrop__build_levels(const raindrop__sphere *sphere)
 static inline void raindrop__bilinear(float out[4], const raindrop__sphere *sphere, int level, const float uv[2])
 {
     int r = sphere->resolution >> level, x, y;
-    float a = uv[0] * (float)r + 0.5f, b = uv[1] * (float)r + 0.5f; /* + 1 for the border, - 1/2 for the texel's centre */
+    float a = uv[0] * (float)r + 0.5f, b = uv[1] * (float)r + 0.5f; /* + 1 for the border, - 1/2 for the texel's
+                                                                       centre */
     const float *p, *q;
     x = (int)a;
     y = (int)b;
@@ -1222,9 +1264,11 @@ static inline void raindrop__trilinear(float out[4], const raindrop__sphere *sph
 }
 
 /* A box of the footprint's size on the equirectangular picture, wider towards the poles. */
-static inline void raindrop__sample_table(float out[4], const raindrop_environment *environment, const float d[3], float footprint)
+static inline void raindrop__sample_table(float out[4], const raindrop_environment *environment, const float d[3],
+                                          float footprint)
 {
-    double length = sqrt((double)raindrop__dot(d, d)), y = (double)d[1] / length, sine = sqrt(y < 1 && y > -1 ? 1 - y * y : 0);
+    double length = sqrt((double)raindrop__dot(d, d)), y = (double)d[1] / length,
+           sine = sqrt(y < 1 && y > -1 ? 1 - y * y : 0);
     double u = (atan2((double)d[0], -(double)d[2]) / (2 * RAINDROP__PI) + 0.5) * environment->table_width;
     double v = acos(y > 1 ? 1 : y < -1 ? -1 : y) / RAINDROP__PI * environment->table_height;
     double half = 0.5 * (double)footprint / RAINDROP__PI * environment->table_height, wide;
@@ -1232,11 +1276,13 @@ static inline void raindrop__sample_table(float out[4], const raindrop_environme
     if (!(half > 0.5)) half = 0.5;
     wide = sine * environment->table_width > 2 * half ? half / sine : 0.5 * environment->table_width;
     for (c = 0; c < 3; c++)
-        out[c] = (float)sat_mean_border(environment->table, c, u - wide, v - half, u + wide, v + half, SAT_BORDER_WRAP, SAT_BORDER_CLIP);
+        out[c] = (float)sat_mean_border(environment->table, c, u - wide, v - half, u + wide, v + half, SAT_BORDER_WRAP,
+                                        SAT_BORDER_CLIP);
     out[3] = 0;
 }
 
-static inline void raindrop__sample(float out[4], const raindrop_environment *environment, const float d[3], float footprint)
+static inline void raindrop__sample(float out[4], const raindrop_environment *environment, const float d[3],
+                                    float footprint)
 {
     float uv[2], s;
     if (environment->table) {
@@ -1264,7 +1310,8 @@ static inline void raindrop__far(float out[4], const raindrop_environment *envir
     raindrop__bilinear(out, &environment->far_sphere, 0, uv);
 }
 
-RAINDROP_DEF void raindrop_environment_far(float rgb[3], const raindrop_environment *environment, const float direction[3])
+RAINDROP_DEF void raindrop_environment_far(float rgb[3], const raindrop_environment *environment,
+                                           const float direction[3])
 {
     float v[4] = {0, 0, 0, 0};
     if (!rgb) return;
@@ -1321,15 +1368,19 @@ static inline void raindrop__read_picture(raindrop__picture *picture, const sat_
     for (i = 0; i < count; i++) picture->rgb[i] = raindrop__repair(picture->rgb[i], largest, o->clamp, stats);
 }
 
-static inline void raindrop__picture_bilinear(float rgb[3], const raindrop__picture *p, int top, int height, int wrap, float x, float y)
+static inline void raindrop__picture_bilinear(float rgb[3], const raindrop__picture *p, int top, int height, int wrap,
+                                              float x, float y)
 {
     float fx = floorf(x), fy = floorf(y), a = x - fx, b = y - fy;
-    int x0 = (int)fx, x1 = x0 + 1, y0 = sat__clamp_int((int)fy, 0, height - 1), y1 = sat__clamp_int((int)fy + 1, 0, height - 1), c;
-    const float *row0 = p->rgb + 3 * (size_t)(top + y0) * (size_t)p->width, *row1 = p->rgb + 3 * (size_t)(top + y1) * (size_t)p->width;
+    int x0 = (int)fx, x1 = x0 + 1, y0 = sat__clamp_int((int)fy, 0, height - 1),
+        y1 = sat__clamp_int((int)fy + 1, 0, height - 1), c;
+    const float *row0 = p->rgb + 3 * (size_t)(top + y0) * (size_t)p->width,
+                *row1 = p->rgb + 3 * (size_t)(top + y1) * (size_t)p->width;
     x0 = wrap ? (x0 + p->width) % p->width : sat__clamp_int(x0, 0, p->width - 1);
     x1 = wrap ? (x1 + p->width) % p->width : sat__clamp_int(x1, 0, p->width - 1);
     for (c = 0; c < 3; c++) {
-        float v0 = row0[3 * x0 + c] * (1 - a) + row0[3 * x1 + c] * a, v1 = row1[3 * x0 + c] * (1 - a) + row1[3 * x1 + c] * a;
+        float v0 = row0[3 * x0 + c] * (1 - a) + row0[3 * x1 + c] * a,
+              v1 = row1[3 * x0 + c] * (1 - a) + row1[3 * x1 + c] * a;
         rgb[c] = v0 * (1 - b) + v1 * b;
     }
 }
@@ -1386,7 +1437,8 @@ static void raindrop__resample_rows(int begin, int end, int worker, void *contex
         for (x = 0; x < sphere->resolution; x++) {
             float *out = raindrop__texel(sphere, 0, x, y), d[3], rgb[3], sum[3] = {0, 0, 0};
             for (k = 0; k < 4; k++) {
-                raindrop__unfold(d, ((float)x + ((k & 1) ? 0.75f : 0.25f)) * step, ((float)y + ((k & 2) ? 0.75f : 0.25f)) * step);
+                raindrop__unfold(d, ((float)x + ((k & 1) ? 0.75f : 0.25f)) * step,
+                                 ((float)y + ((k & 2) ? 0.75f : 0.25f)) * step);
                 raindrop__picture_sample(rgb, job->picture, d);
                 for (c = 0; c < 3; c++) sum[c] += 0.25f * rgb[c];
             }
@@ -1441,7 +1493,8 @@ static void raindrop__prefilter_rows(int begin, int end, int worker, void *conte
         for (x = 0; x < sphere->resolution; x++) {
             float *out = raindrop__texel(sphere, 0, x, y), d[3], u[3], v[3], p[3], rgb[3];
             double sum[3] = {0, 0, 0};
-            raindrop__unfold(d, ((float)x + 0.5f) / (float)sphere->resolution, ((float)y + 0.5f) / (float)sphere->resolution);
+            raindrop__unfold(d, ((float)x + 0.5f) / (float)sphere->resolution,
+                             ((float)y + 0.5f) / (float)sphere->resolution);
             raindrop__normalise(d);
             raindrop__perpendicular(u, v, d);
             for (i = 0; i < samples; i++) {
@@ -1472,16 +1525,21 @@ RAINDROP_DEF raindrop_environment_options raindrop_environment_defaults(void)
     return o;
 }
 
-static inline int raindrop__is_power_of_two(int v, int low, int high) { return v >= low && v <= high && !(v & (v - 1)); }
+static inline int raindrop__is_power_of_two(int v, int low, int high)
+{
+    return v >= low && v <= high && !(v & (v - 1));
+}
 
 static inline int raindrop__environment_is_valid(const sat_image *image, const raindrop_environment_options *o)
 {
     float sun2 = raindrop__dot(o->sun_direction, o->sun_direction);
     if (!sat__image_is_valid(image) || image->channels == 2 || image->width > 32768 || image->height > 65536) return 0;
     if ((unsigned)o->layout > RAINDROP_LAYOUT_CUBE || (unsigned)o->filter > RAINDROP_FILTER_SAT) return 0;
-    if (o->layout == RAINDROP_LAYOUT_CUBE && (image->height != 6 * image->width || o->filter == RAINDROP_FILTER_SAT)) return 0;
+    if (o->layout == RAINDROP_LAYOUT_CUBE && (image->height != 6 * image->width || o->filter == RAINDROP_FILTER_SAT))
+        return 0;
     if (o->resolution && !raindrop__is_power_of_two(o->resolution, 16, 4096)) return 0;
-    if (!raindrop__is_power_of_two(o->far_resolution, 8, 256) || o->far_samples < 16 || o->far_samples > 65536) return 0;
+    if (!raindrop__is_power_of_two(o->far_resolution, 8, 256) || o->far_samples < 16 || o->far_samples > 65536)
+        return 0;
     if (o->far_orders < 0 || o->far_orders > 3 || !sat__is_finite(o->n) || !(o->n > 0.1f) || !(o->n < 10)) return 0;
     if (!sat__is_finite(o->scale) || !(o->scale > 0) || !sat__is_finite(o->clamp) || o->clamp < 0) return 0;
     if (!raindrop__finite3(o->sun_direction) || !raindrop__finite3(o->sun_irradiance)) return 0;
@@ -1525,7 +1583,8 @@ RAINDROP_DEF void raindrop_environment_destroy(raindrop_environment *environment
 }
 
 /* The object and its two octahedral pictures, in one block. */
-static inline sat_result raindrop__allocate_environment(raindrop_environment **out, int resolution, int far_resolution, const sat_allocator *memory)
+static inline sat_result raindrop__allocate_environment(raindrop_environment **out, int resolution, int far_resolution,
+                                                        const sat_allocator *memory)
 {
     raindrop_environment layout, *e;
     sat__arena arena = {0, 0, 0};
@@ -1554,7 +1613,8 @@ static inline sat_result raindrop__allocate_environment(raindrop_environment **o
 }
 
 static inline sat_result raindrop__fill_environment(raindrop_environment *e, const raindrop__picture *picture,
-                                                    float *bow, const raindrop_environment_options *o, const sat_allocator *memory)
+                                                    float *bow, const raindrop_environment_options *o,
+                                                    const sat_allocator *memory)
 {
     raindrop__environment_job job;
     sat_result result = SAT_OK;
@@ -1588,13 +1648,16 @@ RAINDROP_DEF sat_result raindrop_environment_create(raindrop_environment **out, 
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (!raindrop__environment_is_valid(image, &o) || !sat__resolve_allocator(&memory, &o.allocator)) return SAT_ERR_ARGUMENT;
-    if (!sat__multiply_size(&bytes, (size_t)image->width * 3 * sizeof(float), (size_t)image->height)) return SAT_ERR_SIZE;
+    if (!raindrop__environment_is_valid(image, &o) || !sat__resolve_allocator(&memory, &o.allocator))
+        return SAT_ERR_ARGUMENT;
+    if (!sat__multiply_size(&bytes, (size_t)image->width * 3 * sizeof(float), (size_t)image->height))
+        return SAT_ERR_SIZE;
     memset(&local, 0, sizeof local);
     picture.width = image->width;
     picture.height = image->height;
     picture.layout = o.layout;
-    result = raindrop__allocate_environment(&e, o.resolution ? o.resolution : raindrop__default_resolution(image, o.layout), o.far_resolution, &memory);
+    result = raindrop__allocate_environment(
+        &e, o.resolution ? o.resolution : raindrop__default_resolution(image, o.layout), o.far_resolution, &memory);
     if (result != SAT_OK) return result;
     picture.rgb = (float *)sat__alloc(&memory, bytes);
     if (o.bow_optical_depth > 0) bow = (float *)sat__alloc(&memory, bow_bytes);
@@ -1629,8 +1692,12 @@ RAINDROP_DEF double raindrop_bow_angle(int order, double n)
     return 2 * (i - r) + k * (RAINDROP__PI - 2 * r);
 }
 
-/* A + B/wavelength^2 through the Fraunhofer lines C (656.3 nm, 1.3311) and F (486.1 nm, 1.3371); 1.3329 at D (1.3330). */
-RAINDROP_DEF double raindrop_water_index(double wavelength_nm) { return 1.3239 + 3125 / (wavelength_nm * wavelength_nm); }
+/* A + B/wavelength^2 through the Fraunhofer lines C (656.3 nm, 1.3311) and F (486.1 nm, 1.3371); 1.3329 at D
+   (1.3330). */
+RAINDROP_DEF double raindrop_water_index(double wavelength_nm)
+{
+    return 1.3239 + 3125 / (wavelength_nm * wavelength_nm);
+}
 
 #ifndef RAINDROP_NO_BOW
 /* CIE 1931 colour matching by the lobes of Wyman, Sloan and Shirley 2013, to linear Rec. 709. */
@@ -1642,7 +1709,8 @@ static inline double raindrop__lobe(double x, double centre, double left, double
 
 static inline void raindrop__wavelength_rgb(double rgb[3], double w)
 {
-    double x = 1.056 * raindrop__lobe(w, 599.8, 37.9, 31.0) + 0.362 * raindrop__lobe(w, 442.0, 16.0, 26.7) - 0.065 * raindrop__lobe(w, 501.1, 20.4, 26.2);
+    double x = 1.056 * raindrop__lobe(w, 599.8, 37.9, 31.0) + 0.362 * raindrop__lobe(w, 442.0, 16.0, 26.7) -
+               0.065 * raindrop__lobe(w, 501.1, 20.4, 26.2);
     double y = 0.821 * raindrop__lobe(w, 568.8, 46.9, 40.5) + 0.286 * raindrop__lobe(w, 530.9, 16.3, 31.1);
     double z = 1.217 * raindrop__lobe(w, 437.0, 11.8, 36.0) + 0.681 * raindrop__lobe(w, 459.0, 26.0, 13.8);
     rgb[0] = 3.2404542 * x - 1.5371385 * y - 0.4985314 * z;
@@ -1706,7 +1774,8 @@ RAINDROP_DEF sat_result raindrop_bow_profile(float *rgb, int count)
    ------------------------------------------------------------------------------------------------ */
 
 enum { RAINDROP__TURN = 0x2545f491 }; /* from one crossing of the box to the next in the streams of random numbers */
-enum { RAINDROP__CHUNK = 4096 }; /* drops that are culled together; fixes the order of everything, whatever the workers */
+enum { RAINDROP__CHUNK = 4096 }; /* drops that are culled together; fixes the order of everything, whatever the
+                                    workers */
 
 /* A drop in the picture. `rows`: first row and row behind the last, packed, of those it may touch. */
 typedef struct raindrop__visible {
@@ -1730,7 +1799,10 @@ typedef struct raindrop__chunk {
     double coverage_left_out;
 } raindrop__chunk;
 
-typedef struct raindrop__tally { size_t fragments, order_fragments; char apart[64 - 2 * sizeof(size_t)]; } raindrop__tally;
+typedef struct raindrop__tally {
+    size_t fragments, order_fragments;
+    char apart[64 - 2 * sizeof(size_t)];
+} raindrop__tally;
 
 struct raindrop_rain {
     raindrop_drop *drops;
@@ -1890,8 +1962,11 @@ RAINDROP_DEF sat_result raindrop_fall(raindrop_drop *drop, const float wind[3], 
 {
     double velocity[3], way[3];
     int i;
-    if (!drop || !wind || !raindrop__finite3(wind) || !raindrop__finite3(drop->position) || !raindrop__finite3(drop->velocity)) return SAT_ERR_ARGUMENT;
-    if (!sat__is_finite(drop->radius) || !(drop->radius > 0) || !sat__is_finite_double(dt) || dt < 0) return SAT_ERR_ARGUMENT;
+    if (!drop || !wind || !raindrop__finite3(wind) || !raindrop__finite3(drop->position) ||
+        !raindrop__finite3(drop->velocity))
+        return SAT_ERR_ARGUMENT;
+    if (!sat__is_finite(drop->radius) || !(drop->radius > 0) || !sat__is_finite_double(dt) || dt < 0)
+        return SAT_ERR_ARGUMENT;
     if (dt == 0) return SAT_OK;
     for (i = 0; i < 3; i++) velocity[i] = (double)drop->velocity[i];
     raindrop__step(velocity, way, (double)drop->radius, wind, dt);
@@ -1912,7 +1987,8 @@ RAINDROP_DEF sat_result raindrop_fall(raindrop_drop *drop, const float wind[3], 
    weighted with their speed: a diameter is taken with the probability v/v_max, else the next one is tried. */
 static inline double raindrop__diameter(const raindrop_rain_options *o, uint32_t stream, uint32_t i, int at_plane)
 {
-    double lambda = raindrop__lambda(o->rate_mm_h), span = o->diameter_max_mm - o->diameter_min_mm, all = -expm1(-lambda * span), d;
+    double lambda = raindrop__lambda(o->rate_mm_h), span = o->diameter_max_mm - o->diameter_min_mm,
+           all = -expm1(-lambda * span), d;
     double fastest = raindrop_terminal_velocity(o->diameter_max_mm);
     uint32_t attempt;
     if (o->diameter_mm > 0) return o->diameter_mm;
@@ -1945,7 +2021,8 @@ static void raindrop__create_range(int begin, int end, int worker, void *context
     (void)worker;
     for (i = begin * RAINDROP__CHUNK; i < last; i++) {
         raindrop_drop *drop = &rain->drops[i];
-        for (axis = 0; axis < 3; axis++) drop->position[axis] = raindrop__place(o, axis, raindrop__hash(o->seed, (uint32_t)axis, (uint32_t)i));
+        for (axis = 0; axis < 3; axis++)
+            drop->position[axis] = raindrop__place(o, axis, raindrop__hash(o->seed, (uint32_t)axis, (uint32_t)i));
         raindrop__give_size(drop, o, raindrop__diameter(o, 0, (uint32_t)i, 0));
     }
 }
@@ -1962,11 +2039,15 @@ static inline float raindrop__wrap(double position, double low, double size)
 
 /* Seconds after which a drop that crosses the box again and again has forgotten where it began: 64 crossings of the
    fastest. */
-static inline double raindrop__forgets(const raindrop_rain_options *o, double fastest) { return 64 * (double)o->box_size[1] / fastest; }
+static inline double raindrop__forgets(const raindrop_rain_options *o, double fastest)
+{
+    return 64 * (double)o->box_size[1] / fastest;
+}
 
 /* Out below since `left` seconds: another drop comes in on top, one more for each crossing of the box that the time
    allows. After many crossings the box is again what it was in the beginning: any size of a volume at any height. */
-static inline void raindrop__reenter(raindrop_drop *drop, double at[3], const raindrop_rain *rain, double below, uint32_t i)
+static inline void raindrop__reenter(raindrop_drop *drop, double at[3], const raindrop_rain *rain, double below,
+                                     uint32_t i)
 {
     const raindrop_rain_options *o = &rain->options;
     double size = (double)o->box_size[1], top = (double)o->centre[1] + size / 2, old = -(double)drop->velocity[1];
@@ -2028,7 +2109,8 @@ static void raindrop__advance_range(int begin, int end, int worker, void *contex
             raindrop_drop *drop = &rain->drops[i];
             moving |= raindrop__move(way, drop, rain, job->dt);
             for (axis = 0; axis < 3; axis++) at[axis] = (double)drop->position[axis] + way[axis];
-            if (!rain->own && way[1] < 0 && at[1] < low[1]) raindrop__reenter(drop, at, rain, low[1] - at[1], (uint32_t)i);
+            if (!rain->own && way[1] < 0 && at[1] < low[1])
+                raindrop__reenter(drop, at, rain, low[1] - at[1], (uint32_t)i);
             for (axis = 0; axis < 3; axis++) {
                 double size = (double)o->box_size[axis];
                 int outside = !rain->own && (at[axis] < low[axis] || at[axis] >= low[axis] + size);
@@ -2098,24 +2180,29 @@ static inline int raindrop__rain_is_valid(const raindrop_rain_options *o)
     if (!(o->diameter_min_mm >= 0.001 && o->diameter_min_mm < o->diameter_max_mm && o->diameter_max_mm <= 6)) return 0;
     for (axis = 0; axis < 3; axis++)
         if (!sat__is_finite(o->box_size[axis]) || !(o->box_size[axis] > 0)) return 0;
-    if (!raindrop__finite3(o->centre) || !raindrop__finite3(o->wind) || !sat__is_finite(o->speed) || o->speed < 0) return 0;
+    if (!raindrop__finite3(o->centre) || !raindrop__finite3(o->wind) || !sat__is_finite(o->speed) || o->speed < 0)
+        return 0;
     return sat__threads_are_valid(&o->threads);
 #endif
 }
 
 /* Drops in the box, so that their volumes times their speeds make the rate asked for. The sizes are Marshall-Palmer's;
-   their own number with today's speeds would carry 11 (at 5 mm/h) to 14 % (at 1) more than the rate they are named after. */
+   their own number with today's speeds would carry 11 (at 5 mm/h) to 14 % (at 1) more than the rate they are named
+   after. */
 static inline double raindrop__expected_count(const raindrop_rain_options *o)
 {
-    double lambda = raindrop__lambda(o->rate_mm_h), span = o->diameter_max_mm - o->diameter_min_mm, drops = 0, water = 0;
-    double rate = o->rate_mm_h * (1e-3 / 3600), volume = (double)o->box_size[0] * (double)o->box_size[1] * (double)o->box_size[2];
+    double lambda = raindrop__lambda(o->rate_mm_h), span = o->diameter_max_mm - o->diameter_min_mm, drops = 0,
+           water = 0;
+    double rate = o->rate_mm_h * (1e-3 / 3600),
+           volume = (double)o->box_size[0] * (double)o->box_size[1] * (double)o->box_size[2];
     const int steps = 256;
     int i;
     for (i = 0; i < steps; i++) {
         double d = o->diameter_mm > 0 ? o->diameter_mm : o->diameter_min_mm + span * (i + 0.5) / steps;
         double share = o->diameter_mm > 0 ? 1 : exp(-lambda * (d - o->diameter_min_mm));
         drops += share;
-        water += share * RAINDROP__PI / 6 * d * d * d * 1e-9 * (o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(d));
+        water += share * RAINDROP__PI / 6 * d * d * d * 1e-9 *
+                 (o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(d));
     }
     return rate * volume * drops / water;
 }
@@ -2218,7 +2305,8 @@ RAINDROP_DEF raindrop_camera raindrop_camera_defaults(void)
     return camera;
 }
 
-RAINDROP_DEF raindrop_camera raindrop_camera_look(const float position[3], const float target[3], const float up[3], float fov_y)
+RAINDROP_DEF raindrop_camera raindrop_camera_look(const float position[3], const float target[3], const float up[3],
+                                                  float fov_y)
 {
     raindrop_camera camera = raindrop_camera_defaults();
     float side[3], along;
@@ -2229,7 +2317,8 @@ RAINDROP_DEF raindrop_camera raindrop_camera_look(const float position[3], const
     if (!(raindrop__dot(camera.back, camera.back) > 0)) camera.back[2] = 1;
     along = raindrop__dot(up, camera.back);
     raindrop__combine(camera.up, 1, up, -along, camera.back);
-    if (raindrop__dot(camera.up, camera.up) <= 1e-8f * raindrop__dot(up, up)) raindrop__perpendicular(side, camera.up, camera.back);
+    if (raindrop__dot(camera.up, camera.up) <= 1e-8f * raindrop__dot(up, up))
+        raindrop__perpendicular(side, camera.up, camera.back);
     raindrop__normalise(camera.up);
     raindrop__set(camera.right, camera.up[1] * camera.back[2] - camera.up[2] * camera.back[1],
                   camera.up[2] * camera.back[0] - camera.up[0] * camera.back[2],
@@ -2271,7 +2360,8 @@ typedef struct raindrop__frame {
 /* A drop in view space: x right, y up, z forward; the quantities drawing starts from. */
 typedef struct raindrop__placed { float x, y, z, radius, distance2, flatness; } raindrop__placed;
 
-static inline void raindrop__place_drop(raindrop__placed *placed, const raindrop__frame *frame, const raindrop_drop *drop)
+static inline void raindrop__place_drop(raindrop__placed *placed, const raindrop__frame *frame,
+                                        const raindrop_drop *drop)
 {
     float rel[3];
     raindrop__combine(rel, 1, drop->position, -1, frame->camera.position);
@@ -2319,7 +2409,10 @@ static inline raindrop__box raindrop__make_box(const raindrop__frame *frame, flo
     return box;
 }
 
-static inline int raindrop__is_sprite(const raindrop__frame *frame) { return frame->options.look <= RAINDROP_LOOK_SPRITE; }
+static inline int raindrop__is_sprite(const raindrop__frame *frame)
+{
+    return frame->options.look <= RAINDROP_LOOK_SPRITE;
+}
 static inline int raindrop__is_still(const raindrop__visible *v)
 {
     return v->streak[0] * v->streak[0] + v->streak[1] * v->streak[1] + v->blur * v->blur < 0.0625f;
@@ -2336,15 +2429,21 @@ static inline float raindrop__sprite_half(const raindrop__frame *frame, const ra
 
 /* Radius of the round, soft disc that stands for a drop that is moving or out of focus: the second moments of the
    drop, the circle of confusion and the pixel add up. */
-static inline float raindrop__soft_radius(const raindrop__visible *v) { return sqrtf(v->radius * v->radius + v->blur * v->blur + 1.0f / 3); }
+static inline float raindrop__soft_radius(const raindrop__visible *v)
+{
+    return sqrtf(v->radius * v->radius + v->blur * v->blur + 1.0f / 3);
+}
 
 /* The pixels a drop may touch. */
-static inline raindrop__box raindrop__bounds(const raindrop__frame *frame, const raindrop__visible *v, const raindrop__placed *placed)
+static inline raindrop__box raindrop__bounds(const raindrop__frame *frame, const raindrop__visible *v,
+                                             const raindrop__placed *placed)
 {
-    float across[2], up[2], wide = 0.5f, ax = 0.5f * fabsf(v->streak[0]) + 0.5f + v->blur, ay = 0.5f * fabsf(v->streak[1]) + 0.5f + v->blur;
+    float across[2], up[2], wide = 0.5f, ax = 0.5f * fabsf(v->streak[0]) + 0.5f + v->blur,
+                            ay = 0.5f * fabsf(v->streak[1]) + 0.5f + v->blur;
     if (raindrop__is_sprite(frame)) {
         float half = raindrop__sprite_half(frame, placed);
-        return raindrop__make_box(frame, ceilf(v->x - half - 0.5f), ceilf(v->y - half - 0.5f), floorf(v->x + half - 0.5f) + 1, floorf(v->y + half - 0.5f) + 1);
+        return raindrop__make_box(frame, ceilf(v->x - half - 0.5f), ceilf(v->y - half - 0.5f),
+                                  floorf(v->x + half - 0.5f) + 1, floorf(v->y + half - 0.5f) + 1);
     }
     if (v->drop & RAINDROP__FAR_BIT) {
         wide = raindrop__is_still(v) ? 0.886227f * v->radius : raindrop__soft_radius(v) + 0.5f * fabsf(v->streak[0]);
@@ -2353,8 +2452,9 @@ static inline raindrop__box raindrop__bounds(const raindrop__frame *frame, const
     }
     raindrop__tangents(across, placed->x, placed->z, placed->radius);
     raindrop__tangents(up, placed->y, placed->z, placed->radius);
-    return raindrop__make_box(frame, frame->half_width + frame->focal * across[0] - ax, frame->half_height - frame->focal * up[1] - ay,
-                              frame->half_width + frame->focal * across[1] + ax, frame->half_height - frame->focal * up[0] + ay);
+    return raindrop__make_box(
+        frame, frame->half_width + frame->focal * across[0] - ax, frame->half_height - frame->focal * up[1] - ay,
+        frame->half_width + frame->focal * across[1] + ax, frame->half_height - frame->focal * up[0] + ay);
 }
 
 /* A scene depth that lies in front. */
@@ -2379,7 +2479,8 @@ static inline int raindrop__all_occluded(const raindrop__frame *frame, const rai
 /* ---- 1 cull */
 
 #ifndef RAINDROP_NO_STREAK
-static inline void raindrop__add_motion(raindrop__visible *v, const raindrop__frame *frame, const raindrop__placed *placed, const raindrop_drop *drop)
+static inline void raindrop__add_motion(raindrop__visible *v, const raindrop__frame *frame,
+                                        const raindrop__placed *placed, const raindrop_drop *drop)
 {
     const raindrop_camera *camera = &frame->camera;
     float relative[3], vx, vy, vz, scale = frame->focal * camera->exposure / placed->z;
@@ -2392,21 +2493,27 @@ static inline void raindrop__add_motion(raindrop__visible *v, const raindrop__fr
         v->streak[1] = raindrop__clamp(-scale * (vy - placed->y / placed->z * vz), -1e5f, 1e5f);
     }
     if (camera->aperture > 0)
-        v->blur = raindrop__clamp(0.5f * camera->aperture * frame->focal * fabsf(1 / placed->z - 1 / camera->focus_distance), 0, 1e5f);
+        v->blur = raindrop__clamp(
+            0.5f * camera->aperture * frame->focal * fabsf(1 / placed->z - 1 / camera->focus_distance), 0, 1e5f);
 }
 #endif
 
-static inline raindrop__fate raindrop__reject(const raindrop__frame *frame, const raindrop_drop *drop, const raindrop__placed *placed, float reach)
+static inline raindrop__fate raindrop__reject(const raindrop__frame *frame, const raindrop_drop *drop,
+                                              const raindrop__placed *placed, float reach)
 {
     float r = placed->radius;
-    float all = fabsf(drop->velocity[0]) + fabsf(drop->velocity[1]) + fabsf(drop->velocity[2]) + placed->distance2; /* finite if all are */
-    if (!sat__is_finite(all) || !sat__is_finite(r) || !(r > 0) || !(drop->axis_ratio > 0 && drop->axis_ratio <= 1)) return RAINDROP__INVALID;
+    float all = fabsf(drop->velocity[0]) + fabsf(drop->velocity[1]) + fabsf(drop->velocity[2]) +
+                placed->distance2; /* finite if all are */
+    if (!sat__is_finite(all) || !sat__is_finite(r) || !(r > 0) || !(drop->axis_ratio > 0 && drop->axis_ratio <= 1))
+        return RAINDROP__INVALID;
     if (placed->distance2 <= 1.0001f * r * r) return RAINDROP__INSIDE;
     if (placed->z <= 0) return RAINDROP__BEHIND;
     if (!(placed->z - r > frame->camera.near_distance) || !(placed->z > 1.0001f * r)) return RAINDROP__NEAR_PLANE;
     reach = r + reach * placed->z / frame->focal;
-    if (fabsf(placed->x) * frame->focal - placed->z * frame->half_width > reach * frame->side_x) return RAINDROP__OUTSIDE;
-    if (fabsf(placed->y) * frame->focal - placed->z * frame->half_height > reach * frame->side_y) return RAINDROP__OUTSIDE;
+    if (fabsf(placed->x) * frame->focal - placed->z * frame->half_width > reach * frame->side_x)
+        return RAINDROP__OUTSIDE;
+    if (fabsf(placed->y) * frame->focal - placed->z * frame->half_height > reach * frame->side_y)
+        return RAINDROP__OUTSIDE;
     return RAINDROP__NEAR;
 }
 
@@ -2417,7 +2524,8 @@ static inline void raindrop__to_world(float out[3], const raindrop_camera *camer
     for (i = 0; i < 3; i++) out[i] = x * camera->right[i] + y * camera->up[i] - forward * camera->back[i];
 }
 
-static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop__frame *frame, uint32_t index, double *left_out)
+static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop__frame *frame, uint32_t index,
+                                            double *left_out)
 {
     const raindrop_drop *drop = &frame->rain->drops[index];
     raindrop__placed placed;
@@ -2427,7 +2535,9 @@ static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop
     raindrop__place_drop(&placed, frame, drop);
     v->streak[0] = v->streak[1] = v->blur = 0;
     fate = raindrop__reject(frame, drop, &placed, 1);
-    if (fate == RAINDROP__INVALID || fate == RAINDROP__INSIDE || fate == RAINDROP__BEHIND || fate == RAINDROP__NEAR_PLANE) return fate;
+    if (fate == RAINDROP__INVALID || fate == RAINDROP__INSIDE || fate == RAINDROP__BEHIND ||
+        fate == RAINDROP__NEAR_PLANE)
+        return fate;
 #ifndef RAINDROP_NO_STREAK
     if (!raindrop__is_sprite(frame) && (frame->camera.exposure > 0 || frame->camera.aperture > 0)) {
         raindrop__add_motion(v, frame, &placed, drop);
@@ -2435,7 +2545,8 @@ static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop
     }
 #endif
     if (fate != RAINDROP__NEAR) return fate;
-    /* the silhouette is an ellipse of half axes f tan and about f tan / cos^2 of the angle off axis: area f^2 tan^2 pi / cos^3 */
+    /* the silhouette is an ellipse of half axes f tan and about f tan / cos^2 of the angle off axis: area f^2 tan^2 pi
+       / cos^3 */
     tangent2 = placed.radius * placed.radius / (placed.distance2 - placed.radius * placed.radius);
     stretch = sqrtf(placed.distance2) / placed.z;
     v->radius = frame->focal * sqrtf(tangent2 * placed.flatness * stretch * stretch * stretch);
@@ -2474,7 +2585,8 @@ static void raindrop__cull_range(int begin, int end, int worker, void *context)
         raindrop__chunk tally;
         memset(&tally, 0, sizeof tally);
         for (i = first; i < last; i++) {
-            raindrop__fate fate = raindrop__cull(&frame->rain->visible[first + tally.visible], frame, (uint32_t)i, &tally.coverage_left_out);
+            raindrop__fate fate = raindrop__cull(&frame->rain->visible[first + tally.visible], frame, (uint32_t)i,
+                                                 &tally.coverage_left_out);
             tally.fates[fate]++;
             tally.visible += fate <= RAINDROP__FAR;
         }
@@ -2490,7 +2602,8 @@ static inline int raindrop__gather_pairs(const raindrop_rain *rain)
     for (chunk = 0; chunk < chunks; chunk++) {
         for (i = 0; i < rain->chunks[chunk].visible; i++, n++) {
             uint32_t at = (uint32_t)(chunk * RAINDROP__CHUNK + i);
-            rain->pairs[0][n].key = ~sat__float_bits(rain->visible[at].depth); /* depths are positive: bits order as values do */
+            rain->pairs[0][n].key =
+                ~sat__float_bits(rain->visible[at].depth); /* depths are positive: bits order as values do */
             rain->pairs[0][n].at = at;
         }
     }
@@ -2533,7 +2646,8 @@ typedef struct raindrop__batch {
     float flatness;
     float *pixel[RAINDROP__BATCH];
     float slope_x[RAINDROP__BATCH], slope_y[RAINDROP__BATCH]; /* the pixel's ray (x, y, -1) */
-    float offset_x[RAINDROP__BATCH], offset_y[RAINDROP__BATCH]; /* q: where it passes the plane of the centre, in radii */
+    float offset_x[RAINDROP__BATCH], offset_y[RAINDROP__BATCH]; /* q: where it passes the plane of the centre, in
+                                                                   radii */
     float alpha[RAINDROP__BATCH];
     float direction[3][RAINDROP__BATCH], closest[3][RAINDROP__BATCH], one_minus_b2[RAINDROP__BATCH];
     float reflect[3][RAINDROP__BATCH], refract[3][RAINDROP__BATCH], fresnel[RAINDROP__BATCH], pass[RAINDROP__BATCH];
@@ -2544,36 +2658,46 @@ typedef struct raindrop__batch {
 static inline void raindrop__batch_rays(raindrop__batch *batch, int keep_alpha)
 {
     const raindrop_camera *camera = &batch->frame->camera;
-    const raindrop__v one = raindrop__splat(1), half = raindrop__splat(0.5f), rim = raindrop__splat(batch->flatness < 1 ? 1e9f : 0.999f);
+    const raindrop__v one = raindrop__splat(1), half = raindrop__splat(0.5f),
+                      rim = raindrop__splat(batch->flatness < 1 ? 1e9f : 0.999f);
     const raindrop__v k = raindrop__splat(batch->focal_in_radii), per_focal = raindrop__splat(1 / batch->frame->focal);
     int at, i;
     for (at = 0; at < batch->count; at += RAINDROP__LANES) {
         raindrop__v x = raindrop__load(batch->slope_x + at), y = raindrop__load(batch->slope_y + at);
         raindrop__v qx = raindrop__load(batch->offset_x + at), qy = raindrop__load(batch->offset_y + at);
-        raindrop__v per_length2 = raindrop__div(one, raindrop__add(one, raindrop__add(raindrop__mul(x, x), raindrop__mul(y, y))));
-        raindrop__v per_length = raindrop__sqrt(per_length2), w = raindrop__add(raindrop__mul(qx, x), raindrop__mul(qy, y));
+        raindrop__v per_length2 =
+            raindrop__div(one, raindrop__add(one, raindrop__add(raindrop__mul(x, x), raindrop__mul(y, y))));
+        raindrop__v per_length = raindrop__sqrt(per_length2),
+                    w = raindrop__add(raindrop__mul(qx, x), raindrop__mul(qy, y));
         raindrop__v t = raindrop__mul(w, per_length2); /* p = q - t (x, y, -1) */
         raindrop__v px = raindrop__sub(qx, raindrop__mul(t, x)), py = raindrop__sub(qy, raindrop__mul(t, y));
-        raindrop__v b2 = raindrop__add(raindrop__add(raindrop__mul(px, px), raindrop__mul(py, py)), raindrop__mul(t, t));
+        raindrop__v b2 =
+            raindrop__add(raindrop__add(raindrop__mul(px, px), raindrop__mul(py, py)), raindrop__mul(t, t));
         raindrop__v b = raindrop__sqrt(raindrop__max(b2, raindrop__splat(1e-12f))), inward, pz = t;
         if (!keep_alpha) {
             /* half the gradient of b^2: (q - t r) (k - t / f), without the small change of the ray's length */
             raindrop__v scale = raindrop__sub(k, raindrop__mul(t, per_focal));
             raindrop__v gx = raindrop__mul(px, scale), gy = raindrop__mul(py, scale);
-            raindrop__v slope = raindrop__div(raindrop__sqrt(raindrop__add(raindrop__mul(gx, gx), raindrop__mul(gy, gy))), b);
-            raindrop__v cover = raindrop__add(half, raindrop__div(raindrop__sub(one, b), raindrop__max(slope, raindrop__splat(1e-9f))));
+            raindrop__v slope =
+                raindrop__div(raindrop__sqrt(raindrop__add(raindrop__mul(gx, gx), raindrop__mul(gy, gy))), b);
+            raindrop__v cover =
+                raindrop__add(half, raindrop__div(raindrop__sub(one, b), raindrop__max(slope, raindrop__splat(1e-9f))));
             raindrop__store(batch->alpha + at, raindrop__min(raindrop__max(cover, raindrop__splat(0)), one));
         }
         inward = raindrop__min(one, raindrop__div(rim, b));
-        raindrop__store(batch->one_minus_b2 + at, raindrop__max(raindrop__sub(one, b2), raindrop__splat(1 - 0.999f * 0.999f)));
+        raindrop__store(batch->one_minus_b2 + at,
+                        raindrop__max(raindrop__sub(one, b2), raindrop__splat(1 - 0.999f * 0.999f)));
         px = raindrop__mul(px, inward);
         py = raindrop__mul(py, inward);
         pz = raindrop__mul(pz, inward);
         for (i = 0; i < 3; i++) {
-            raindrop__v right = raindrop__splat(camera->right[i]), up = raindrop__splat(camera->up[i]), back = raindrop__splat(camera->back[i]);
+            raindrop__v right = raindrop__splat(camera->right[i]), up = raindrop__splat(camera->up[i]),
+                        back = raindrop__splat(camera->back[i]);
             raindrop__v d = raindrop__sub(raindrop__add(raindrop__mul(x, right), raindrop__mul(y, up)), back);
             raindrop__store(batch->direction[i] + at, raindrop__mul(d, per_length));
-            raindrop__store(batch->closest[i] + at, raindrop__add(raindrop__add(raindrop__mul(px, right), raindrop__mul(py, up)), raindrop__mul(pz, back)));
+            raindrop__store(
+                batch->closest[i] + at,
+                raindrop__add(raindrop__add(raindrop__mul(px, right), raindrop__mul(py, up)), raindrop__mul(pz, back)));
         }
     }
 }
@@ -2581,7 +2705,8 @@ static inline void raindrop__batch_rays(raindrop__batch *batch, int keep_alpha)
 /* The two lookups' directions, weights and cones. */
 static inline void raindrop__batch_trace(raindrop__batch *batch)
 {
-    const raindrop__v width = raindrop__splat(batch->width), pixel = raindrop__splat(1 / batch->frame->focal), blur = raindrop__splat(batch->blur);
+    const raindrop__v width = raindrop__splat(batch->width), pixel = raindrop__splat(1 / batch->frame->focal),
+                      blur = raindrop__splat(batch->blur);
     const int exit_fresnel = batch->frame->options.exit_fresnel;
     const float n = batch->frame->environment->n;
     int at, i;
@@ -2598,18 +2723,25 @@ static inline void raindrop__batch_trace(raindrop__batch *batch)
             raindrop__store(batch->refract[i] + at, rays.refract[i]);
         }
         raindrop__store(batch->fresnel + at, rays.fresnel);
-        raindrop__store(batch->pass + at, exit_fresnel ? rays.transmit : raindrop__sub(raindrop__splat(1), rays.fresnel));
-        raindrop__store(batch->reflect_cone + at, raindrop__mul(blur, raindrop__add(raindrop__mul(rays.footprint_reflect, width), pixel)));
-        raindrop__store(batch->refract_cone + at, raindrop__mul(blur, raindrop__abs(raindrop__sub(raindrop__mul(rays.footprint_refract, width), pixel))));
+        raindrop__store(batch->pass + at,
+                        exit_fresnel ? rays.transmit : raindrop__sub(raindrop__splat(1), rays.fresnel));
+        raindrop__store(batch->reflect_cone + at,
+                        raindrop__mul(blur, raindrop__add(raindrop__mul(rays.footprint_reflect, width), pixel)));
+        raindrop__store(
+            batch->refract_cone + at,
+            raindrop__mul(blur, raindrop__abs(raindrop__sub(raindrop__mul(rays.footprint_refract, width), pixel))));
     }
 }
 
 /* Square coordinates and mip scale of a block of directions: raindrop__fold without branches. */
-static inline void raindrop__batch_fold(float *u, float *v, float *texels, float (*direction)[RAINDROP__BATCH], const float *cone, int at, float half_resolution)
+static inline void raindrop__batch_fold(float *u, float *v, float *texels, float (*direction)[RAINDROP__BATCH],
+                                        const float *cone, int at, float half_resolution)
 {
     const raindrop__v one = raindrop__splat(1), zero = raindrop__splat(0), half = raindrop__splat(0.5f);
-    raindrop__v x = raindrop__load(direction[0] + at), y = raindrop__load(direction[1] + at), z = raindrop__load(direction[2] + at);
-    raindrop__v sum = raindrop__add(raindrop__add(raindrop__abs(x), raindrop__abs(y)), raindrop__abs(z)), scale = raindrop__div(one, sum);
+    raindrop__v x = raindrop__load(direction[0] + at), y = raindrop__load(direction[1] + at),
+                z = raindrop__load(direction[2] + at);
+    raindrop__v sum = raindrop__add(raindrop__add(raindrop__abs(x), raindrop__abs(y)), raindrop__abs(z)),
+                scale = raindrop__div(one, sum);
     raindrop__v a = raindrop__mul(x, scale), b = raindrop__mul(z, scale), c, d, wide;
     c = raindrop__sub(one, raindrop__abs(b));
     d = raindrop__sub(one, raindrop__abs(a));
@@ -2630,7 +2762,8 @@ static inline void raindrop__batch_lookup(float (*colour)[4], raindrop__batch *b
 {
     const raindrop_environment *environment = batch->frame->environment;
     const raindrop__sphere *sphere = &environment->near_sphere;
-    float u[2][RAINDROP__BATCH], v[2][RAINDROP__BATCH], texels[2][RAINDROP__BATCH], mirrored[4], through[4], half = 0.5f * (float)sphere->resolution;
+    float u[2][RAINDROP__BATCH], v[2][RAINDROP__BATCH], texels[2][RAINDROP__BATCH], mirrored[4], through[4],
+        half = 0.5f * (float)sphere->resolution;
     int i, c;
     if (!environment->table) {
         for (i = 0; i < batch->count; i += RAINDROP__LANES) {
@@ -2697,7 +2830,8 @@ static inline void raindrop__flat_colour(float colour[4], raindrop__batch *batch
 }
 
 /* Adds one ray's orders. */
-static inline void raindrop__add_orders(float colour[4], const raindrop__batch *batch, const float d[3], const float p[3], float one_minus_b2)
+static inline void raindrop__add_orders(float colour[4], const raindrop__batch *batch, const float d[3],
+                                        const float p[3], float one_minus_b2)
 {
     const raindrop_environment *environment = batch->frame->environment;
     const int exit_fresnel = batch->frame->options.exit_fresnel;
@@ -2719,7 +2853,8 @@ static inline void raindrop__add_orders(float colour[4], const raindrop__batch *
 
 /* One fragment of a large drop. At the rim the angles change so fast along the radius that one lookup, however wide, is
    wrong: four rays there share the pixel. */
-static inline void raindrop__large_colour(float colour[4], raindrop__batch *batch, int i, const float d[3], const float p[3])
+static inline void raindrop__large_colour(float colour[4], raindrop__batch *batch, int i, const float d[3],
+                                          const float p[3])
 {
     const int taps = 4;
     float b = sqrtf(1 - batch->one_minus_b2[i]), tap[3];
@@ -2821,11 +2956,13 @@ static inline void raindrop__push_ray(raindrop__batch *batch, int x, int y, floa
     batch->offset_y[at] = (centre_y - (float)y - 0.5f) * batch->focal_in_radii;
 }
 
-static inline void raindrop__begin_drop(raindrop__batch *batch, const raindrop__visible *v, const raindrop__placed *placed)
+static inline void raindrop__begin_drop(raindrop__batch *batch, const raindrop__visible *v,
+                                        const raindrop__placed *placed)
 {
     const raindrop_render_options *o = &batch->frame->options;
     batch->focal_in_radii = placed->z / (batch->frame->focal * placed->radius);
-    batch->width = 1 / (batch->frame->focal * placed->radius / sqrtf(placed->distance2 - placed->radius * placed->radius));
+    batch->width =
+        1 / (batch->frame->focal * placed->radius / sqrtf(placed->distance2 - placed->radius * placed->radius));
     batch->blur = 1;
     batch->samples = 1;
     batch->flatness = placed->flatness;
@@ -2886,7 +3023,8 @@ static inline void raindrop__draw_far_soft(raindrop__batch *batch, const raindro
     for (y = box->y0; y < box->y1; y++) {
         for (x = box->x0; x < box->x1; x++) {
             float alpha = opacity * raindrop__path_cover(span, &path, (float)x + 0.5f - v->x, (float)y + 0.5f - v->y);
-            if (!(alpha > 0) || raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth)) continue;
+            if (!(alpha > 0) || raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth))
+                continue;
             raindrop__blend(raindrop__pixel(frame, x, y), alpha, v->colour);
             batch->tally->fragments++;
         }
@@ -2918,9 +3056,14 @@ static inline void raindrop__flush_soft(raindrop__batch *batch, float *alpha)
 static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
 {
     const raindrop__frame *frame = batch->frame;
-    raindrop__path path = raindrop__path_of(v, v->blur > 0.25f ? sqrtf(v->radius * v->radius + v->blur * v->blur) : v->radius);
-    int moving = v->streak[0] * v->streak[0] + v->streak[1] * v->streak[1] > 0.0625f, samples = !moving ? 1 : v->radius < 6 ? 4 : v->radius < 24 ? 8 : 16;
-    float opacity = v->radius * v->radius / (path.radius * path.radius), alpha[RAINDROP__BATCH], span[2] = {0, 0}, spacing;
+    raindrop__path path =
+        raindrop__path_of(v, v->blur > 0.25f ? sqrtf(v->radius * v->radius + v->blur * v->blur) : v->radius);
+    int moving = v->streak[0] * v->streak[0] + v->streak[1] * v->streak[1] > 0.0625f, samples = !moving          ? 1
+                                                                                                : v->radius < 6  ? 4
+                                                                                                : v->radius < 24 ? 8
+                                                                                                                 : 16;
+    float opacity = v->radius * v->radius / (path.radius * path.radius), alpha[RAINDROP__BATCH], span[2] = {0, 0},
+          spacing;
     int x, y, j;
     batch->samples = samples;
     batch->orders = -1;
@@ -2934,7 +3077,8 @@ static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__v
                 float blur = v->blur > 0.5f ? v->blur : 0.5f;
                 cover = raindrop__lens(v->radius, blur, sqrtf(dx * dx + dy * dy)) / ((float)RAINDROP__PI * blur * blur);
             }
-            if (!(cover > 0) || raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth)) continue;
+            if (!(cover > 0) || raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth))
+                continue;
             for (j = 0; j < samples; j++) {
                 float t = span[0] + (span[1] - span[0]) * ((float)j + 0.5f) / (float)samples;
                 alpha[batch->count] = cover;
@@ -2954,11 +3098,15 @@ static inline void raindrop__draw_far(raindrop__batch *batch, const raindrop__vi
     float half = 0.886227f * v->radius; /* sqrt(pi)/2 */
     int x, y;
     for (y = box->y0; y < box->y1; y++) {
-        float low = v->y - half > (float)y ? v->y - half : (float)y, high = v->y + half < (float)(y + 1) ? v->y + half : (float)(y + 1);
+        float low = v->y - half > (float)y ? v->y - half : (float)y,
+              high = v->y + half < (float)(y + 1) ? v->y + half : (float)(y + 1);
         for (x = box->x0; x < box->x1; x++) {
-            float left = v->x - half > (float)x ? v->x - half : (float)x, right = v->x + half < (float)(x + 1) ? v->x + half : (float)(x + 1);
+            float left = v->x - half > (float)x ? v->x - half : (float)x,
+                  right = v->x + half < (float)(x + 1) ? v->x + half : (float)(x + 1);
             float alpha = (high - low) * (right - left);
-            if (!(high > low) || !(right > left) || raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth)) continue;
+            if (!(high > low) || !(right > left) ||
+                raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth))
+                continue;
             raindrop__blend(raindrop__pixel(frame, x, y), alpha, v->colour);
             batch->tally->fragments++;
         }
@@ -2970,9 +3118,11 @@ static inline void raindrop__draw_far(raindrop__batch *batch, const raindrop__vi
    R = [u v n] turns the map's frame into the world (eq 2.1), n pointing from the drop to the eye (eq 2.2). Eq 2.3 takes
    u = V x n, which is not a unit vector and vanishes where n is parallel to V. Here u and v are the camera's right and
    up under the shortest rotation that takes its back to n: orthonormal for every drop before the camera. */
-static inline void raindrop__sprite_frame(float u[3], float v[3], float n[3], const raindrop_camera *camera, const raindrop__placed *placed)
+static inline void raindrop__sprite_frame(float u[3], float v[3], float n[3], const raindrop_camera *camera,
+                                          const raindrop__placed *placed)
 {
-    float per_distance = 1 / sqrtf(placed->distance2), r = -placed->x * per_distance, t = -placed->y * per_distance, b = placed->z * per_distance;
+    float per_distance = 1 / sqrtf(placed->distance2), r = -placed->x * per_distance, t = -placed->y * per_distance,
+          b = placed->z * per_distance;
     float k = 1 / (1 + b);
     int i;
     for (i = 0; i < 3; i++) {
@@ -2982,7 +3132,8 @@ static inline void raindrop__sprite_frame(float u[3], float v[3], float n[3], co
     }
 }
 
-static inline void raindrop__rotate(float out[3], const float u[3], const float v[3], const float n[3], const float in[3])
+static inline void raindrop__rotate(float out[3], const float u[3], const float v[3], const float n[3],
+                                    const float in[3])
 {
     int i;
     for (i = 0; i < 3; i++) out[i] = u[i] * in[0] + v[i] * in[1] + n[i] * in[2];
@@ -3023,7 +3174,8 @@ static inline int raindrop__push_map(raindrop__batch *batch, int at, float s, fl
 }
 #endif
 
-static inline int raindrop__push_sprite(raindrop__batch *batch, int at, float s, float t, float distance, float frame[3][3])
+static inline int raindrop__push_sprite(raindrop__batch *batch, int at, float s, float t, float distance,
+                                        float frame[3][3])
 {
     float d[3], p[3], turned[3], rho = sqrtf(s * s + t * t);
     int i;
@@ -3041,10 +3193,12 @@ static inline int raindrop__push_sprite(raindrop__batch *batch, int at, float s,
     return 1;
 }
 
-static inline void raindrop__draw_sprite(raindrop__batch *batch, const raindrop__visible *v, const raindrop__placed *placed, const raindrop__box *box)
+static inline void raindrop__draw_sprite(raindrop__batch *batch, const raindrop__visible *v,
+                                         const raindrop__placed *placed, const raindrop__box *box)
 {
     const raindrop__frame *frame = batch->frame;
-    float per_half = 1 / raindrop__sprite_half(frame, placed), axes[3][3], distance2 = placed->distance2 / (placed->radius * placed->radius);
+    float per_half = 1 / raindrop__sprite_half(frame, placed), axes[3][3],
+          distance2 = placed->distance2 / (placed->radius * placed->radius);
     float distance = sqrtf(distance2);
     int x, y, kept;
 #ifndef RAINDROP_NO_MAP
@@ -3095,7 +3249,8 @@ static inline void raindrop__draw(raindrop__batch *batch, const raindrop__visibl
     else raindrop__draw_still(batch, v, &box);
 }
 
-/* Records lie in the order of the array, not of the depths: those of the next drops are asked for before they are used. */
+/* Records lie in the order of the array, not of the depths: those of the next drops are asked for before they are
+   used. */
 static inline void raindrop__fetch(const raindrop__visible *v)
 {
 #if defined(SAT__SSE2)
@@ -3140,12 +3295,16 @@ static void raindrop__draw_bands(int begin, int end, int worker, void *context)
 
 static inline int raindrop__camera_is_valid(const raindrop_camera *c)
 {
-    float rr = raindrop__dot(c->right, c->right), uu = raindrop__dot(c->up, c->up), bb = raindrop__dot(c->back, c->back);
-    float skew = fabsf(raindrop__dot(c->right, c->up)) + fabsf(raindrop__dot(c->up, c->back)) + fabsf(raindrop__dot(c->back, c->right));
+    float rr = raindrop__dot(c->right, c->right), uu = raindrop__dot(c->up, c->up),
+          bb = raindrop__dot(c->back, c->back);
+    float skew = fabsf(raindrop__dot(c->right, c->up)) + fabsf(raindrop__dot(c->up, c->back)) +
+                 fabsf(raindrop__dot(c->back, c->right));
     if (!raindrop__finite3(c->position) || !raindrop__finite3(c->velocity)) return 0;
     if (!(fabsf(rr - 1) < 0.01f && fabsf(uu - 1) < 0.01f && fabsf(bb - 1) < 0.01f && skew < 0.01f)) return 0;
-    if (!(c->fov_y >= 0.001f && c->fov_y <= 3) || !(c->near_distance >= 0) || !sat__is_finite(c->near_distance)) return 0;
-    if (!(c->exposure >= 0 && c->aperture >= 0) || !sat__is_finite(c->exposure) || !sat__is_finite(c->aperture)) return 0;
+    if (!(c->fov_y >= 0.001f && c->fov_y <= 3) || !(c->near_distance >= 0) || !sat__is_finite(c->near_distance))
+        return 0;
+    if (!(c->exposure >= 0 && c->aperture >= 0) || !sat__is_finite(c->exposure) || !sat__is_finite(c->aperture))
+        return 0;
 #ifdef RAINDROP_NO_STREAK
     if (c->exposure > 0 || c->aperture > 0) return 0;
 #endif
@@ -3156,10 +3315,13 @@ static inline int raindrop__render_is_valid(const raindrop__frame *frame, const 
 {
     const raindrop_render_options *o = &frame->options;
     ptrdiff_t row = (ptrdiff_t)frame->width * 3 * (ptrdiff_t)sizeof(float);
-    if (!frame->rgb || !frame->rain || !environment || frame->width < 1 || frame->height < 1 || frame->width > 32768 || frame->height > 32768) return 0;
+    if (!frame->rgb || !frame->rain || !environment || frame->width < 1 || frame->height < 1 || frame->width > 32768 ||
+        frame->height > 32768)
+        return 0;
     if ((frame->stride < row && frame->stride > -row) || frame->stride % (ptrdiff_t)sizeof(float)) return 0;
     if (!raindrop__camera_is_valid(&frame->camera) || (unsigned)o->look > RAINDROP_LOOK_AUTO) return 0;
-    if (!(o->far_radius >= 0 && o->far_radius <= 64) || !(o->coverage_threshold >= 0 && o->coverage_threshold <= 1)) return 0;
+    if (!(o->far_radius >= 0 && o->far_radius <= 64) || !(o->coverage_threshold >= 0 && o->coverage_threshold <= 1))
+        return 0;
     if (o->orders < 0 || o->orders > 3 || !(o->orders_radius >= 0)) return 0;
 #ifdef RAINDROP_NO_MAP
     return o->look != RAINDROP_LOOK_MAP;
@@ -3227,7 +3389,8 @@ RAINDROP_DEF sat_result raindrop_render(float *rgb, ptrdiff_t stride, int width,
     threads = &rain->options.threads;
     workers = sat__worker_count(threads);
     memset(rain->tally, 0, (size_t)workers * sizeof *rain->tally);
-    sat__parallel_for(threads, rain->count / RAINDROP__CHUNK + (rain->count % RAINDROP__CHUNK != 0), raindrop__cull_range, &frame);
+    sat__parallel_for(threads, rain->count / RAINDROP__CHUNK + (rain->count % RAINDROP__CHUNK != 0),
+                      raindrop__cull_range, &frame);
     frame.visible = raindrop__gather_pairs(rain);
     frame.order = raindrop__sort(rain, frame.visible, frame.options.sort);
     sat__parallel_for(threads, (height + RAINDROP__BAND - 1) / RAINDROP__BAND, raindrop__draw_bands, &frame);
@@ -3253,8 +3416,8 @@ static void raindrop__background_rows(int begin, int end, int worker, void *cont
 }
 
 RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride, int width, int height,
-                                                    const raindrop_camera *camera, const raindrop_environment *environment,
-                                                    const sat_threads *threads)
+                                                    const raindrop_camera *camera,
+                                                    const raindrop_environment *environment, const sat_threads *threads)
 {
     raindrop__frame frame;
     ptrdiff_t row = (ptrdiff_t)width * 3 * (ptrdiff_t)sizeof(float);
@@ -3266,7 +3429,9 @@ RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride
     frame.width = width;
     frame.height = height;
     if (!rgb || !environment || width < 1 || height < 1 || width > 32768 || height > 32768) return SAT_ERR_ARGUMENT;
-    if ((stride < row && stride > -row) || stride % (ptrdiff_t)sizeof(float) || !raindrop__camera_is_valid(&frame.camera)) return SAT_ERR_ARGUMENT;
+    if ((stride < row && stride > -row) || stride % (ptrdiff_t)sizeof(float) ||
+        !raindrop__camera_is_valid(&frame.camera))
+        return SAT_ERR_ARGUMENT;
     if (threads && !sat__threads_are_valid(threads)) return SAT_ERR_ARGUMENT;
     raindrop__set_frame(&frame);
     sat__parallel_for(threads, height, raindrop__background_rows, &frame);
@@ -3344,21 +3509,23 @@ static const char raindrop__glsl_environment[] =
     "    return mix(fine, atlas(at.xy, level + 1.0), lod - level);\n"
     "}\n";
 
-/* A drop's square or streak. LOOK 0 map, 1 sprite, 2 ray, 3 auto; SOFT where drops leave streaks or are out of focus, FLAT
-   where some are flattened. */
+/* A drop's square or streak. LOOK 0 map, 1 sprite, 2 ray, 3 auto; SOFT where drops leave streaks or are out of focus,
+   FLAT where some are flattened. */
 static const char raindrop__glsl_draw_vertex[] =
     "layout(location = 0) in vec4 drop;\n"     /* position, radius */
     "layout(location = 1) in vec4 motion;\n"   /* velocity, axis ratio */
     "uniform vec3 eye, right, up, back;\n"
     "uniform vec4 view;\n"                     /* half width, half height, focal length in pixels, near distance */
     "uniform vec4 limits;\n"                   /* far radius, coverage threshold, depth planes */
-    "flat out vec4 place;\n"                   /* centre in pixels, half side (sprite) or radius, focal length in radii */
+    "flat out vec4 place;\n"                   /* centre in pixels, half side (sprite) or radius, focal length in
+                                                  radii */
     "flat out vec4 seen;\n"                    /* centre in radii, view space, z forward; axis ratio */
     "flat out vec4 far_colour;\n"              /* colour, half side of the square that stands for a far drop */
     "#ifdef SOFT\n"
     "uniform vec4 shutter;\n"                  /* the camera's velocity, exposure */
     "uniform vec2 lens;\n"                     /* aperture, focus distance */
-    "flat out vec4 path;\n"                    /* in pixels: streak, circle of confusion, radius of what moves (0: sharp and still) */
+    "flat out vec4 path;\n"                    /* in pixels: streak, circle of confusion, radius of what moves (0: sharp
+                                                  and still) */
     "vec4 path_of(vec3 v, float r, bool is_far) {\n"
     "    vec3 w = motion.xyz - shutter.xyz;\n"
     "    vec2 fall = vec2(dot(w, right), dot(w, up)) + v.xy / v.z * dot(w, back);\n"
@@ -3543,9 +3710,11 @@ static const char raindrop__glsl_flat[] =
     "}\n"
     "#endif\n";
 
-/* LOOK 2 and 3: raindrop__batch_rays, raindrop__draw_far, and with SOFT raindrop__draw_soft and raindrop__draw_far_soft. */
+/* LOOK 2 and 3: raindrop__batch_rays, raindrop__draw_far, and with SOFT raindrop__draw_soft and
+   raindrop__draw_far_soft. */
 static const char raindrop__glsl_draw_ray[] =
-    /* the pixel's ray through the drop whose centre is projected `at` from here; cover: the share of the pixel it takes */
+    /* the pixel's ray through the drop whose centre is projected `at` from here; cover: the share of the pixel it
+       takes */
     "struct fragment { raindrop_ray ray; vec3 d, p; float one_minus_b2, cover; };\n"
     "fragment trace(vec2 at) {\n"
     "    fragment f;\n"
@@ -3777,7 +3946,10 @@ RAINDROP_DEF raindrop_gl_options raindrop_gl_defaults(void)
     return o;
 }
 
-RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl) { return gl ? gl->gl.message : "there is no object"; }
+RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl)
+{
+    return gl ? gl->gl.message : "there is no object";
+}
 
 /* The program of a look and a kind, built when it is first asked for. */
 static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int kind)
@@ -3813,7 +3985,8 @@ static inline sat_result raindrop__gl_programs(raindrop_gl *g)
     sat__gl_shaders shaders;
     sat_result result = SAT_OK;
     int look;
-    for (look = g->options.map ? 0 : 1; look < 4 && result == SAT_OK; look++) result = raindrop__gl_draw_program(g, look, 0);
+    for (look = g->options.map ? 0 : 1; look < 4 && result == SAT_OK; look++)
+        result = raindrop__gl_draw_program(g, look, 0);
     if (result != SAT_OK) return result;
     memset(&shaders, 0, sizeof shaders);
     vertex[0] = raindrop__glsl_step;
@@ -3839,8 +4012,10 @@ static inline sat_result raindrop__gl_map(raindrop_gl *g, const raindrop_map *ma
         for (level = 0; level < map->levels; level++) {
             const float *texels = map->level[level];
             int r = map->base >> level;
-            for (i = 0; i < (size_t)r * (size_t)r; i++) memcpy(scratch + 4 * i, texels + 8 * i + 4 * half, 4 * sizeof(float));
-            gl->TexImage2D(SAT__GL_TEXTURE_2D, level, g->options.half_map ? SAT__GL_RGBA16F : SAT__GL_RGBA32F, r, r, 0, SAT__GL_RGBA, SAT__GL_FLOAT, scratch);
+            for (i = 0; i < (size_t)r * (size_t)r; i++)
+                memcpy(scratch + 4 * i, texels + 8 * i + 4 * half, 4 * sizeof(float));
+            gl->TexImage2D(SAT__GL_TEXTURE_2D, level, g->options.half_map ? SAT__GL_RGBA16F : SAT__GL_RGBA32F, r, r, 0,
+                           SAT__GL_RGBA, SAT__GL_FLOAT, scratch);
         }
         gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MAX_LEVEL, map->levels - 1);
         gl->TexParameteri(SAT__GL_TEXTURE_2D, SAT__GL_TEXTURE_MIN_FILTER, RAINDROP__GL_TEXTURE_MIN_LOD_LINEAR);
@@ -3852,7 +4027,8 @@ static inline sat_result raindrop__gl_map(raindrop_gl *g, const raindrop_map *ma
 }
 #endif
 
-RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *get_proc, const raindrop_gl_options *options)
+RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *get_proc,
+                                           const raindrop_gl_options *options)
 {
     raindrop_gl_options o = options ? *options : raindrop_gl_defaults();
     sat_allocator memory;
@@ -3918,14 +4094,16 @@ RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *g)
 
 /* ---- environment */
 
-static inline void raindrop__gl_sphere(sat__gl *gl, unsigned texture, const raindrop__sphere *sphere, unsigned internal, int width, int height)
+static inline void raindrop__gl_sphere(sat__gl *gl, unsigned texture, const raindrop__sphere *sphere, unsigned internal,
+                                       int width, int height)
 {
     int level, x = 0, y = 0;
     gl->BindTexture(SAT__GL_TEXTURE_2D, texture);
     gl->TexImage2D(SAT__GL_TEXTURE_2D, 0, (int)internal, width, height, 0, SAT__GL_RGBA, SAT__GL_FLOAT, NULL);
     for (level = 0; level < sphere->levels; level++) {
         int side = (sphere->resolution >> level) + 2;
-        gl->TexSubImage2D(SAT__GL_TEXTURE_2D, 0, x, y, side, side, SAT__GL_RGBA, SAT__GL_FLOAT, sphere->texels + sphere->offset[level]);
+        gl->TexSubImage2D(SAT__GL_TEXTURE_2D, 0, x, y, side, side, SAT__GL_RGBA, SAT__GL_FLOAT,
+                          sphere->texels + sphere->offset[level]);
         if (level == 0) x = side;
         else y += side;
     }
@@ -3954,7 +4132,8 @@ RAINDROP_DEF sat_result raindrop_gl_set_environment(raindrop_gl *g, const raindr
     if (!g->environment) g->gl.GenTextures(1, &g->environment);
     if (!g->far_drops) g->gl.GenTextures(1, &g->far_drops);
     raindrop__gl_sphere(&g->gl, g->environment, sphere, internal, width, height);
-    raindrop__gl_sphere(&g->gl, g->far_drops, &environment->far_sphere, internal, environment->far_sphere.resolution + 2, environment->far_sphere.resolution + 2);
+    raindrop__gl_sphere(&g->gl, g->far_drops, &environment->far_sphere, internal,
+                        environment->far_sphere.resolution + 2, environment->far_sphere.resolution + 2);
     result = sat__gl_check(&g->gl, "OpenGL refused the environment");
     sat__gl_end(&g->gl, &state);
     g->resolution = sphere->resolution;
@@ -3979,7 +4158,8 @@ RAINDROP_DEF sat_result raindrop_gl_set_rain(raindrop_gl *g, const raindrop_rain
     for (i = 0; i < 2; i++) {
         g->gl.BindVertexArray(g->arrays[i]);
         g->gl.BindBuffer(SAT__GL_ARRAY_BUFFER, g->drops[i]);
-        g->gl.BufferData(SAT__GL_ARRAY_BUFFER, (ptrdiff_t)sizeof(raindrop_drop) * sat__max_int(rain->count, 1), rain->count && i == 0 ? rain->drops : NULL, SAT__GL_DYNAMIC_COPY);
+        g->gl.BufferData(SAT__GL_ARRAY_BUFFER, (ptrdiff_t)sizeof(raindrop_drop) * sat__max_int(rain->count, 1),
+                         rain->count && i == 0 ? rain->drops : NULL, SAT__GL_DYNAMIC_COPY);
         g->gl.VertexAttribPointer(0, 4, SAT__GL_FLOAT, 0, (int)sizeof(raindrop_drop), NULL);
         g->gl.VertexAttribPointer(1, 4, SAT__GL_FLOAT, 0, (int)sizeof(raindrop_drop), (const void *)sizeof(float[4]));
         g->gl.EnableVertexAttribArray(0);
@@ -3992,7 +4172,8 @@ RAINDROP_DEF sat_result raindrop_gl_set_rain(raindrop_gl *g, const raindrop_rain
     g->settled = rain->settled;
     g->own = rain->own;
     g->flat = rain->options.oblate;
-    for (i = 0; i < rain->count && !g->flat; i++) g->flat = !(rain->drops[i].axis_ratio >= 1 && rain->drops[i].axis_ratio <= 1);
+    for (i = 0; i < rain->count && !g->flat; i++)
+        g->flat = !(rain->drops[i].axis_ratio >= 1 && rain->drops[i].axis_ratio <= 1);
     g->step = rain->step;
     g->rain = rain->options;
     return result;
@@ -4004,7 +4185,8 @@ RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *g, raindrop_drop *dr
     const void *mapped;
     ptrdiff_t bytes = (ptrdiff_t)sizeof *drops * count;
     if (!g || !drops || count < 1 || count > g->count) return SAT_ERR_ARGUMENT;
-    if (!g->gl.MapBufferRange || !g->gl.UnmapBuffer) return sat__gl_fail(&g->gl, SAT_ERR_GL_FUNCTION, "the context cannot read buffers", "glMapBufferRange");
+    if (!g->gl.MapBufferRange || !g->gl.UnmapBuffer)
+        return sat__gl_fail(&g->gl, SAT_ERR_GL_FUNCTION, "the context cannot read buffers", "glMapBufferRange");
     sat__gl_begin(&g->gl, &state, 1);
     g->gl.BindBuffer(SAT__GL_ARRAY_BUFFER, g->drops[g->front]);
     mapped = g->gl.MapBufferRange(SAT__GL_ARRAY_BUFFER, 0, bytes, SAT__GL_MAP_READ_BIT);
@@ -4079,7 +4261,8 @@ RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt_seconds)
 
 /* ---- picture */
 
-static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const raindrop__frame *frame, float depth_near, float depth_far)
+static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const raindrop__frame *frame,
+                                         float depth_near, float depth_far)
 {
     sat__gl *gl = &g->gl;
     const raindrop_camera *camera = &frame->camera;
@@ -4127,13 +4310,17 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     frame.options = options ? *options : raindrop_render_defaults();
     frame.width = width;
     frame.height = height;
-    if (!g || !g->environment || !g->drops[0] || width < 1 || height < 1 || width > 32768 || height > 32768) return SAT_ERR_ARGUMENT;
-    if (!raindrop__camera_is_valid(&frame.camera) || (unsigned)frame.options.look > RAINDROP_LOOK_AUTO) return SAT_ERR_ARGUMENT;
-    if (frame.options.orders < 0 || frame.options.orders > 3 || !(frame.options.orders_radius >= 0)) return SAT_ERR_ARGUMENT;
+    if (!g || !g->environment || !g->drops[0] || width < 1 || height < 1 || width > 32768 || height > 32768)
+        return SAT_ERR_ARGUMENT;
+    if (!raindrop__camera_is_valid(&frame.camera) || (unsigned)frame.options.look > RAINDROP_LOOK_AUTO)
+        return SAT_ERR_ARGUMENT;
+    if (frame.options.orders < 0 || frame.options.orders > 3 || !(frame.options.orders_radius >= 0))
+        return SAT_ERR_ARGUMENT;
     if (!(depth_near >= 0) || (depth_near > 0 && !(depth_far > depth_near))) return SAT_ERR_ARGUMENT;
     if (frame.options.look == RAINDROP_LOOK_MAP && !g->options.map) return SAT_ERR_ARGUMENT;
     if (!g->count) return SAT_OK;
-    if (!raindrop__is_sprite(&frame) && (frame.camera.exposure > 0 || frame.camera.aperture > 0)) kind |= RAINDROP__GL_SOFT;
+    if (!raindrop__is_sprite(&frame) && (frame.camera.exposure > 0 || frame.camera.aperture > 0))
+        kind |= RAINDROP__GL_SOFT;
     if (!raindrop__is_sprite(&frame) && frame.options.orders > 0) kind |= RAINDROP__GL_ORDERS;
     result = raindrop__gl_draw_program(g, (int)frame.options.look, kind);
     if (result != SAT_OK) return result;
@@ -4174,9 +4361,9 @@ SAT__IEEE_END
    are in the file LICENSE.
 
    MIT No Attribution. Copyright 2026 the lightscan authors. Permission is hereby granted, free of charge, to any person
-   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software without
-   restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute, sublicense,
-   and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
+   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software
+   without restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute,
+   sublicense, and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
 
    THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE
    WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR

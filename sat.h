@@ -18,18 +18,18 @@
 
    WHAT IT DOES
 
-   - Tables that keep their precision where plain float tables lose it: over 14 smooth decades, 3 x 3 boxes come out right to
-     5e-6 at the 99th percentile and 5e-5 at worst. The default, SAT_KIND_TILED, sums integers in every 64 x 64 tile, with a
-     quantum of the tile's own, and a box of up to 129 pixels a side reads only the tiles that it touches: bright pixels,
-     infinities and skies elsewhere change nothing.
+   - Tables that keep their precision where plain float tables lose it: over 14 smooth decades, 3 x 3 boxes come out
+     right to 5e-6 at the 99th percentile and 5e-5 at worst. The default, SAT_KIND_TILED, sums integers in every 64 x 64
+     tile, with a quantum of the tile's own, and a box of up to 129 pixels a side reads only the tiles that it touches:
+     bright pixels, infinities and skies elsewhere change nothing.
    - Exact tables in integers modulo 2^32 or 2^64: the same bits on CPU and GPU, for any order of additions.
-   - Means over boxes with real corners, beyond the border (clip, zero, clamp, mirror, wrap), with a radius for each pixel;
-     box filters of whole images, also of images that arrive a row at a time; dirty rectangles.
-   - Variance and covariance over any box, from moments about the mean of each tile: 1e4 +- 1 comes out right to 1e-3 and
-     never negative, where sums of x and x * x give noise.
+   - Means over boxes with real corners, beyond the border (clip, zero, clamp, mirror, wrap), with a radius for each
+     pixel; box filters of whole images, also of images that arrive a row at a time; dirty rectangles.
+   - Variance and covariance over any box, from moments about the mean of each tile: 1e4 +- 1 comes out right to 1e-3
+     and never negative, where sums of x and x * x give noise.
    - An error bound and an expected error for every table, and a plan that picks the cheapest kind for a wanted error.
-   - k-ary scans by recursive doubling and by balanced trees, with the work they do counted (Slomp 2012, chapter 4), for any
-     type and operation.
+   - k-ary scans by recursive doubling and by balanced trees, with the work they do counted (Slomp 2012, chapter 4), for
+     any type and operation.
    - OpenGL 3.3 / ES 3.0 passes that build tables from textures, and GLSL functions that look boxes up.
 
    WHAT IT DOES NOT
@@ -40,7 +40,8 @@
 
    OPTIONS (macros)
 
-     SAT_IMPLEMENTATION    off     implementing file   brings the code; LIGHTSCAN_IMPLEMENTATION does so for all six headers
+     SAT_IMPLEMENTATION    off     implementing file   brings the code; LIGHTSCAN_IMPLEMENTATION does so for all six
+                           headers
      SAT_STATIC            off     everywhere          all functions are private to each file
      SAT_DEF               extern  everywhere          replaces the linkage, as in __declspec(dllexport)
      SAT_GL                off     everywhere          OpenGL; needs no GL header, loader or library
@@ -54,33 +55,35 @@
    sat_create makes one allocation, sat_stream_create two; building, updating, looking up and filtering make none. Scans
    allocate their scratch, except sequential ones. Outputs belong to the caller. A table may be read by any number of
    threads; build and update need it alone. Options may carry a parallel_for, which builds and filters then use.
-   Everything that can fail returns a sat_result and leaves outputs alone when it is not SAT_OK, but where a comment says so;
-   lookups of channels or boxes that are not there return 0.
+   Everything that can fail returns a sat_result and leaves outputs alone when it is not SAT_OK, but where a comment
+   says so; lookups of channels or boxes that are not there return 0.
 
    NUMERICS
 
    u = 2^-24, v = 2^-53; errors of one box sum, worst case for non-negative pixels; sat_error_bound knows the constants.
 
-     TILED     quantum / 2 of its tile for each pixel + few v x (sum of the box; of its super tiles where the box is larger
-               than three tiles); a quantum is the power of two for which the tile's sum just fits in 31 bits, so that 8-
-               and 16-bit input is exact
+     TILED     quantum / 2 of its tile for each pixel + few v x (sum of the box; of its super tiles where the box is
+               larger than three tiles); a quantum is the power of two for which the tile's sum just fits in 31 bits, so
+               that 8- and 16-bit input is exact
      FLOAT     4 (height + width / 8) u x (sum of the image)
      DOUBLE    4 (height + width / 8) v x (sum of the image)
      FIXED     quantum / 2 for each pixel of the box; 0 for 8- and 16-bit input in FIXED64
 
-   - Input: any float. NaN counts as 0 and infinity as the largest value the kind can sum; both are counted, and in TILED
-     and FIXED tables a bad pixel changes no box without it. TILED keeps at most 64 pixels a tile row beyond 1e20; further
-     ones are clamped to the largest other pixel of their tile and counted. FLOAT clamps all pixels to 1.6e29 when their
-     sums would overflow otherwise. SAT_NON_FINITE_REFUSE returns an error instead.
+   - Input: any float. NaN counts as 0 and infinity as the largest value the kind can sum; both are counted, and in
+     TILED and FIXED tables a bad pixel changes no box without it. TILED keeps at most 64 pixels a tile row beyond 1e20;
+     further ones are clamped to the largest other pixel of their tile and counted. FLOAT clamps all pixels to 1.6e29
+     when their sums would overflow otherwise. SAT_NON_FINITE_REFUSE returns an error instead.
    - The same bits for any number of workers, for SSE2, AVX2, NEON and plain C, with and without contraction into fused
      multiply-adds, also under -ffast-math and -Ofast, which the
-     implementation switches off for itself (gcc, clang, MSVC); only subnormals may then count as 0, as the program asked for.
+     implementation switches off for itself (gcc, clang, MSVC); only subnormals may then count as 0, as the program
+     asked for.
    - subtract_mean helps images of low contrast and harms dark boxes of high dynamic range.
 
    COST
 
-   A build reads each pixel once and writes each sum once. Per pixel and channel: 4.8 bytes (TILED; 18 in a column one pixel wide), 4 (FLOAT, FIXED32), 8
-   (DOUBLE, FIXED64). A lookup reads 4 sums (TILED: up to 4 a touched tile, at most 9 tiles, then strips). Measured ratios, one core, SSE2 (bench_sat):
+   A build reads each pixel once and writes each sum once. Per pixel and channel: 4.8 bytes (TILED; 18 in a column one
+   pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE, FIXED64). A lookup reads 4 sums (TILED: up to 4 a touched tile, at most 9
+   tiles, then strips). Measured ratios, one core, SSE2 (bench_sat):
 
      build, time over a memcpy of the same traffic    512^2    2048^2   4096^2   8192^2
        TILED                                                            2.3 to 2.7
@@ -218,9 +221,12 @@ typedef struct sat_scan_options {
     sat_scan_counters *counters;  /* NULL: not counted; otherwise overwritten */
 } sat_scan_options;
 SAT_DEF sat_scan_options sat_scan_defaults(void);
-SAT_DEF const char *sat_explain_scan(char *text, size_t size, const sat_scan_options *options); /* as sat_explain_image; NULL options: the defaults */
+SAT_DEF const char *
+sat_explain_scan(char *text, size_t size,
+                 const sat_scan_options *options); /* as sat_explain_image; NULL options: the defaults */
 
-/* Sequential f32 scans without counters carry the sum in double. In place when out == in; otherwise the two must not overlap. n may be 0. Integers wrap around. */
+/* Sequential f32 scans without counters carry the sum in double. In place when out == in; otherwise the two must not
+   overlap. n may be 0. Integers wrap around. */
 SAT_DEF sat_result sat_scan_f32(float *out, const float *in, size_t n, const sat_scan_options *options);
 SAT_DEF sat_result sat_scan_f64(double *out, const double *in, size_t n, const sat_scan_options *options);
 SAT_DEF sat_result sat_scan_i32(int32_t *out, const int32_t *in, size_t n, const sat_scan_options *options);
@@ -260,9 +266,10 @@ typedef struct sat_options {
     int tile;                  /* 64; 8..128; a power of two: tile side of SAT_KIND_TILED; 32 errs a quarter */
     int subtract_mean;         /* 0; 0..1; 1 (FLOAT, DOUBLE): Hensley 2005. Good at low contrast; makes dark boxes of
                                   HDR images about 100 times worse */
-    double quantum;            /* 0; 0..1e300; 0: the finest power of two that max_value and max_box_area allow; FIXED kinds only */
-    double max_value;          /* 0; 0..1e300; 0: as large as the kind can sum (FIXED kinds: the largest |pixel| of the first
-                                  build). > 0: pixels beyond +-max_value are clamped to it and counted */
+    double quantum;            /* 0; 0..1e300; 0: the finest power of two that max_value and max_box_area allow; FIXED
+                                  kinds only */
+    double max_value;          /* 0; 0..1e300; 0: as large as the kind can sum (FIXED kinds: the largest |pixel| of the
+                                  first build). > 0: pixels beyond +-max_value are clamped to it and counted */
     double max_box_area;       /* 0; 0..1e300; 0: the whole table; FIXED kinds: no larger box is ever asked for */
     sat_non_finite non_finite; /* SAT_NON_FINITE_CLAMP */
     sat_allocator allocator;   /* malloc; used by create and destroy only */
@@ -270,7 +277,8 @@ typedef struct sat_options {
 } sat_options;
 SAT_DEF sat_options sat_defaults(void);
 /* As sat_explain_image, for the arguments of sat_create. NULL options mean the defaults, here and in every call. */
-SAT_DEF const char *sat_explain(char *text, size_t size, int width, int height, int channels, const sat_options *options);
+SAT_DEF const char *sat_explain(char *text, size_t size, int width, int height, int channels,
+                                const sat_options *options);
 
 typedef struct sat_table sat_table;
 
@@ -302,7 +310,13 @@ SAT_DEF float sat_restore(const sat_table *table, int channel, int x, int y);
 
 /* What lies outside the image, for each axis: nothing (the box is clipped), zeros, the border pixel, the
    mirrored image (the border pixel twice) or the periodic image (x of an environment map). */
-typedef enum sat_border { SAT_BORDER_CLIP, SAT_BORDER_ZERO, SAT_BORDER_CLAMP, SAT_BORDER_MIRROR, SAT_BORDER_WRAP } sat_border;
+typedef enum sat_border {
+    SAT_BORDER_CLIP,
+    SAT_BORDER_ZERO,
+    SAT_BORDER_CLAMP,
+    SAT_BORDER_MIRROR,
+    SAT_BORDER_WRAP
+} sat_border;
 /* Mean over a box with real corners, of any size and anywhere; at most 16 box sums of 9 lookups. Empty: 0. */
 SAT_DEF double sat_mean_border(const sat_table *table, int channel, double x0, double y0, double x1, double y1,
                                sat_border border_x, sat_border border_y);
@@ -318,8 +332,8 @@ SAT_DEF sat_result sat_box_filter_variable(float *out, ptrdiff_t out_stride, con
 /* Never below the absolute error of a box mean of that size anywhere in the table, against exact sums of the
    replaced pixels. Worst case, not typical: see sat_error_rms. */
 SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_width, int box_height);
-/* The root-mean-square error to expect over boxes of that size: within a factor of 4 on non-negative images whose pixels
-   are not round numbers and, for FIXED kinds, not mostly below the quantum; an upper estimate on others. */
+/* The root-mean-square error to expect over boxes of that size: within a factor of 4 on non-negative images whose
+   pixels are not round numbers and, for FIXED kinds, not mostly below the quantum; an upper estimate on others. */
 SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width, int box_height);
 
 /* The cheapest kind whose worst error on box means of that size stays below max_relative_error times the mean
@@ -327,14 +341,14 @@ SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width,
    one that fits. Reads the image once. */
 SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_width, int box_height,
                             double max_relative_error, size_t max_bytes, const sat_options *options);
-/* The same as whole options, to be used as they are: FIXED kinds may then count on boxes of that size, which sat_plan alone,
-   where options leave max_box_area 0, may not. */
+/* The same as whole options, to be used as they are: FIXED kinds may then count on boxes of that size, which sat_plan
+   alone, where options leave max_box_area 0, may not. */
 SAT_DEF sat_result sat_plan_options(sat_options *out, const sat_image *image, int box_width, int box_height,
                                     double max_relative_error, size_t max_bytes, const sat_options *options);
 
 /* Box filter of an image that arrives a row at a time, of any height, in memory for 2 radius + 2 rows. The rows
-   that come out equal sat_box_filter of the whole image bit for bit. SAT_KIND_TILED keeps up to three tile rows more, gives
-   rows up to a tile side later, and takes a radius of at most 100000. */
+   that come out equal sat_box_filter of the whole image bit for bit. SAT_KIND_TILED keeps up to three tile rows more,
+   gives rows up to a tile side later, and takes a radius of at most 100000. */
 typedef struct sat_stream sat_stream;
 SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, int radius, const sat_options *options);
 /* Takes the next row (an image of height 1) and writes at most one filtered row to out_row (width x channels floats);
@@ -353,23 +367,27 @@ typedef struct sat_moments_options {
     sat_threads threads;       /* serial; same bits for any worker count */
 } sat_moments_options;
 SAT_DEF sat_moments_options sat_moments_defaults(void);
-SAT_DEF const char *sat_explain_moments(char *text, size_t size, int width, int height, int channels, const sat_moments_options *options);
+SAT_DEF const char *sat_explain_moments(char *text, size_t size, int width, int height, int channels,
+                                        const sat_moments_options *options);
 
-/* Sums of (x - m) and of (x - m)(y - m') in double, where m is the mean of the pixel's own tile: 8 bytes a pixel for each
-   channel and for each product (c squares, or c (c + 1) / 2 with covariance). One allocation, at create. */
+/* Sums of (x - m) and of (x - m)(y - m') in double, where m is the mean of the pixel's own tile: 8 bytes a pixel for
+   each channel and for each product (c squares, or c (c + 1) / 2 with covariance). One allocation, at create. */
 typedef struct sat_moments sat_moments;
-SAT_DEF sat_result sat_moments_create(sat_moments **out, int width, int height, int channels, const sat_moments_options *options);
+SAT_DEF sat_result sat_moments_create(sat_moments **out, int width, int height, int channels,
+                                      const sat_moments_options *options);
 SAT_DEF sat_result sat_moments_build(sat_moments *moments, const sat_image *image);
 SAT_DEF void sat_moments_destroy(sat_moments *moments); /* NULL is fine */
 
-/* Over the box [x0,x1) x [y0,y1), clipped; an empty box gives 0. Divided by the number of pixels (not less one). A variance is
-   never negative. What tiles hold is joined by Chan's rule, so a lookup takes a few additions a touched tile. */
+/* Over the box [x0,x1) x [y0,y1), clipped; an empty box gives 0. Divided by the number of pixels (not less one). A
+   variance is never negative. What tiles hold is joined by Chan's rule, so a lookup takes a few additions a touched
+   tile. */
 SAT_DEF double sat_moments_mean(const sat_moments *moments, int channel, int x0, int y0, int x1, int y1);
 SAT_DEF double sat_variance(const sat_moments *moments, int channel, int x0, int y0, int x1, int y1);
 SAT_DEF double sat_covariance(const sat_moments *moments, int channel, int other, int x0, int y0, int x1, int y1);
 /* sat_covariance(channel, other) around every pixel, (2 radius + 1)^2 pixels clipped at the borders; one float a pixel,
    rows out_stride bytes apart. channel == other: the variance. mean: NULL, or takes the mean of `channel`. */
-SAT_DEF sat_result sat_moments_filter(float *out, float *mean, ptrdiff_t out_stride, const sat_moments *moments, int channel, int other, int radius);
+SAT_DEF sat_result sat_moments_filter(float *out, float *mean, ptrdiff_t out_stride, const sat_moments *moments,
+                                      int channel, int other, int radius);
 
 /* A program that forgets SAT_IMPLEMENTATION fails to link, and this name says why. */
 #ifdef SAT_STATIC
@@ -409,10 +427,12 @@ typedef struct sat_gl_options {
     int compute;                  /* 0; 0..1; 1: the tree's second half by compute shaders where there is GL 4.3: one
                                      invocation writes k texels, so that k = 32 or 64 is best */
     int channel;                  /* 0; 0..3; the channel of the input texture */
-    int unsigned_input;           /* 0; 0..1; 1 (FIXED32): the input is an unsigned integer texture and is summed as it is */
-    double quantum;               /* 0; 1e-35..1e35; a power of two. 0: the finest that max_value and max_box_area allow. FIXED32 */
-    double max_value;             /* 1e30; 1e-300..1e300; pixels beyond +-max_value are clamped to it; NaN counts as 0. Lower
-                                     it for FIXED32: the quantum is proportional to it */
+    int unsigned_input;           /* 0; 0..1; 1 (FIXED32): the input is an unsigned integer texture and is summed as it
+                                     is */
+    double quantum;               /* 0; 1e-35..1e35; a power of two. 0: the finest that max_value and max_box_area
+                                     allow. FIXED32 */
+    double max_value;             /* 1e30; 1e-300..1e300; pixels beyond +-max_value are clamped to it; NaN counts as 0.
+                                     Lower it for FIXED32: the quantum is proportional to it */
     double max_box_area;          /* 0; 0..1e300; 0: the whole table; FIXED32: no larger box is ever asked for */
     sat_allocator allocator;      /* malloc; used by create and destroy only */
 } sat_gl_options;
@@ -487,9 +507,9 @@ SAT_DEF const char *sat_gl_glsl(void);
 #define SAT_ASSERT(condition) assert(condition)
 #endif
 
-/* IEEE arithmetic between SAT__IEEE_BEGIN and SAT__IEEE_END, whatever the program is compiled with: -ffast-math and -Ofast
-   would drop NaN and infinity and reorder sums, contraction into fused multiply-adds would change bits. Where nothing of
-   this is asked for, gcc is left alone. */
+/* IEEE arithmetic between SAT__IEEE_BEGIN and SAT__IEEE_END, whatever the program is compiled with: -ffast-math and
+   -Ofast would drop NaN and infinity and reorder sums, contraction into fused multiply-adds would change bits. Where
+   nothing of this is asked for, gcc is left alone. */
 #define SAT__PRAGMA(text) _Pragma(#text)
 #if defined(__clang__)
 #define SAT__IEEE_BEGIN SAT__PRAGMA(float_control(push)) SAT__PRAGMA(float_control(precise, on)) SAT__PRAGMA(clang fp contract(off))
@@ -604,14 +624,16 @@ static inline int sat__worker_count(const sat_threads *threads)
 static inline void sat__parallel_for(const sat_threads *threads, int count, sat_range_fn *body, void *context)
 {
     if (count <= 0) return;
-    if (threads && sat__worker_count(threads) > 1 && count > 1) threads->parallel_for(count, body, context, threads->user);
+    if (threads && sat__worker_count(threads) > 1 && count > 1)
+        threads->parallel_for(count, body, context, threads->user);
     else body(0, count, 0, context);
 }
 
 /* workers outside 1..1024 with a parallel_for, or workers > 1 without one, are mistakes. */
 static inline int sat__threads_are_valid(const sat_threads *threads)
 {
-    return threads->parallel_for ? threads->workers >= 1 && threads->workers <= 1024 : threads->workers <= 1 && threads->workers >= 0;
+    return threads->parallel_for ? threads->workers >= 1 && threads->workers <= 1024
+                                 : threads->workers <= 1 && threads->workers >= 0;
 }
 
 /* ---- numbers */
@@ -953,10 +975,16 @@ static inline sat__f32x4 sat__f32x4_div(sat__f32x4 a, sat__f32x4 b) { return _mm
 static inline sat__f32x4 sat__f32x4_min(sat__f32x4 a, sat__f32x4 b) { return _mm_min_ps(a, b); }
 static inline sat__f32x4 sat__f32x4_max(sat__f32x4 a, sat__f32x4 b) { return _mm_max_ps(a, b); }
 static inline sat__f32x4 sat__f32x4_sqrt(sat__f32x4 a) { return _mm_sqrt_ps(a); }
-static inline sat__f32x4 sat__f32x4_abs(sat__f32x4 a) { return _mm_and_ps(a, _mm_castsi128_ps(_mm_set1_epi32(0x7fffffff))); }
+static inline sat__f32x4 sat__f32x4_abs(sat__f32x4 a)
+{
+    return _mm_and_ps(a, _mm_castsi128_ps(_mm_set1_epi32(0x7fffffff)));
+}
 /* comparisons give all-one or all-zero lanes */
 static inline sat__i32x4 sat__f32x4_less(sat__f32x4 a, sat__f32x4 b) { return _mm_castps_si128(_mm_cmplt_ps(a, b)); }
-static inline sat__i32x4 sat__f32x4_less_equal(sat__f32x4 a, sat__f32x4 b) { return _mm_castps_si128(_mm_cmple_ps(a, b)); }
+static inline sat__i32x4 sat__f32x4_less_equal(sat__f32x4 a, sat__f32x4 b)
+{
+    return _mm_castps_si128(_mm_cmple_ps(a, b));
+}
 static inline sat__f32x4 sat__f32x4_select(sat__i32x4 mask, sat__f32x4 yes, sat__f32x4 no)
 {
     __m128 m = _mm_castsi128_ps(mask);
@@ -976,16 +1004,22 @@ static inline sat__f32x4 sat__i32x4_to_f32(sat__i32x4 v) { return _mm_cvtepi32_p
 static inline sat__i32x4 sat__f32x4_truncate(sat__f32x4 v) { return _mm_cvttps_epi32(v); } /* |v| < 2^31 */
 static inline sat__i32x4 sat__f32x4_bits(sat__f32x4 v) { return _mm_castps_si128(v); }
 static inline sat__f32x4 sat__f32x4_from_bits(sat__i32x4 v) { return _mm_castsi128_ps(v); }
-static inline sat__i32x4 sat__i32x4_shift_right(sat__i32x4 v, int bits) { return _mm_srl_epi32(v, _mm_cvtsi32_si128(bits)); } /* zeros come in */
-static inline void sat__f32x4_load3(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b) /* four packed RGB pixels */
+static inline sat__i32x4 sat__i32x4_shift_right(sat__i32x4 v, int bits)
+{
+    return _mm_srl_epi32(v, _mm_cvtsi32_si128(bits));
+} /* zeros come in */
+static inline void sat__f32x4_load3(const float *p, sat__f32x4 *r, sat__f32x4 *g,
+                                    sat__f32x4 *b) /* four packed RGB pixels */
 {
     __m128 u = _mm_loadu_ps(p), v = _mm_loadu_ps(p + 4), w = _mm_loadu_ps(p + 8);       /* rgbr gbrg brgb */
-    __m128 s = _mm_shuffle_ps(v, w, _MM_SHUFFLE(2, 1, 3, 2)), t = _mm_shuffle_ps(u, v, _MM_SHUFFLE(1, 0, 2, 1)); /* rgrg gbgb */
+    __m128 s = _mm_shuffle_ps(v, w, _MM_SHUFFLE(2, 1, 3, 2)),
+           t = _mm_shuffle_ps(u, v, _MM_SHUFFLE(1, 0, 2, 1)); /* rgrg gbgb */
     *r = _mm_shuffle_ps(u, s, _MM_SHUFFLE(2, 0, 3, 0));
     *g = _mm_shuffle_ps(t, s, _MM_SHUFFLE(3, 1, 2, 0));
     *b = _mm_shuffle_ps(t, w, _MM_SHUFFLE(3, 0, 3, 1));
 }
-static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 *a) /* four RGBA pixels */
+static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b,
+                                    sat__f32x4 *a) /* four RGBA pixels */
 {
     *r = _mm_loadu_ps(p);
     *g = _mm_loadu_ps(p + 4);
@@ -1004,12 +1038,18 @@ static inline sat__f32x4 sat__f32x4_add(sat__f32x4 a, sat__f32x4 b) { return vad
 static inline sat__f32x4 sat__f32x4_sub(sat__f32x4 a, sat__f32x4 b) { return vsubq_f32(a, b); }
 static inline sat__f32x4 sat__f32x4_mul(sat__f32x4 a, sat__f32x4 b) { return vmulq_f32(a, b); }
 static inline sat__f32x4 sat__f32x4_div(sat__f32x4 a, sat__f32x4 b) { return vdivq_f32(a, b); }
-static inline sat__f32x4 sat__f32x4_min(sat__f32x4 a, sat__f32x4 b) { return vbslq_f32(vcltq_f32(a, b), a, b); } /* NaN: b, as SSE2 */
+static inline sat__f32x4 sat__f32x4_min(sat__f32x4 a, sat__f32x4 b)
+{
+    return vbslq_f32(vcltq_f32(a, b), a, b);
+} /* NaN: b, as SSE2 */
 static inline sat__f32x4 sat__f32x4_max(sat__f32x4 a, sat__f32x4 b) { return vbslq_f32(vcgtq_f32(a, b), a, b); }
 static inline sat__f32x4 sat__f32x4_sqrt(sat__f32x4 a) { return vsqrtq_f32(a); }
 static inline sat__f32x4 sat__f32x4_abs(sat__f32x4 a) { return vabsq_f32(a); }
 static inline sat__i32x4 sat__f32x4_less(sat__f32x4 a, sat__f32x4 b) { return vreinterpretq_s32_u32(vcltq_f32(a, b)); }
-static inline sat__i32x4 sat__f32x4_less_equal(sat__f32x4 a, sat__f32x4 b) { return vreinterpretq_s32_u32(vcleq_f32(a, b)); }
+static inline sat__i32x4 sat__f32x4_less_equal(sat__f32x4 a, sat__f32x4 b)
+{
+    return vreinterpretq_s32_u32(vcleq_f32(a, b));
+}
 static inline sat__f32x4 sat__f32x4_select(sat__i32x4 mask, sat__f32x4 yes, sat__f32x4 no)
 {
     return vbslq_f32(vreinterpretq_u32_s32(mask), yes, no);
@@ -1023,7 +1063,10 @@ static inline sat__i32x4 sat__i32x4_add(sat__i32x4 a, sat__i32x4 b) { return vad
 static inline sat__i32x4 sat__i32x4_sub(sat__i32x4 a, sat__i32x4 b) { return vsubq_s32(a, b); }
 static inline sat__i32x4 sat__i32x4_and(sat__i32x4 a, sat__i32x4 b) { return vandq_s32(a, b); }
 static inline sat__i32x4 sat__i32x4_or(sat__i32x4 a, sat__i32x4 b) { return vorrq_s32(a, b); }
-static inline sat__i32x4 sat__i32x4_greater(sat__i32x4 a, sat__i32x4 b) { return vreinterpretq_s32_u32(vcgtq_s32(a, b)); }
+static inline sat__i32x4 sat__i32x4_greater(sat__i32x4 a, sat__i32x4 b)
+{
+    return vreinterpretq_s32_u32(vcgtq_s32(a, b));
+}
 static inline sat__f32x4 sat__i32x4_to_f32(sat__i32x4 v) { return vcvtq_f32_s32(v); }
 static inline sat__i32x4 sat__f32x4_truncate(sat__f32x4 v) { return vcvtq_s32_f32(v); }
 static inline sat__i32x4 sat__f32x4_bits(sat__f32x4 v) { return vreinterpretq_s32_f32(v); }
@@ -1050,7 +1093,10 @@ static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g
 #endif
 
 /* What a sibling's implementation calls to be sure that sat.h was implemented, and in this version. */
-static inline int sat__version_matches(void) { return sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file == SAT_VERSION; }
+static inline int sat__version_matches(void)
+{
+    return sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file == SAT_VERSION;
+}
 
 SAT__IEEE_END
 #endif /* SAT__SHARED */
@@ -1083,57 +1129,156 @@ SAT__IEEE_END
 
 /* The names and numbers of the OpenGL registry, as far as the six headers use them. */
 enum {
-    SAT__GL_NO_ERROR = 0, SAT__GL_POINTS = 0x0000, SAT__GL_LINES = 0x0001, SAT__GL_TRIANGLES = 0x0004,
+    SAT__GL_NO_ERROR = 0,
+    SAT__GL_POINTS = 0x0000,
+    SAT__GL_LINES = 0x0001,
+    SAT__GL_TRIANGLES = 0x0004,
     SAT__GL_TRIANGLE_STRIP = 0x0005,
-    SAT__GL_ZERO = 0, SAT__GL_ONE = 1, SAT__GL_SRC_ALPHA = 0x0302, SAT__GL_ONE_MINUS_SRC_ALPHA = 0x0303,
-    SAT__GL_LESS = 0x0201, SAT__GL_LEQUAL = 0x0203, SAT__GL_ALWAYS = 0x0207, SAT__GL_FILL = 0x1B02,
-    SAT__GL_BLEND_DST_RGB = 0x80C8, SAT__GL_BLEND_SRC_RGB = 0x80C9, SAT__GL_BLEND_DST_ALPHA = 0x80CA,
-    SAT__GL_BLEND_SRC_ALPHA = 0x80CB, SAT__GL_BLEND_EQUATION_RGB = 0x8009, SAT__GL_BLEND_EQUATION_ALPHA = 0x883D,
-    SAT__GL_FRONT_AND_BACK = 0x0408, SAT__GL_POLYGON_MODE = 0x0B40, SAT__GL_DEPTH_WRITEMASK = 0x0B72,
-    SAT__GL_DEPTH_FUNC = 0x0B74, SAT__GL_VIEWPORT = 0x0BA2, SAT__GL_COLOR_WRITEMASK = 0x0C23,
-    SAT__GL_CULL_FACE = 0x0B44, SAT__GL_DEPTH_TEST = 0x0B71, SAT__GL_STENCIL_TEST = 0x0B90, SAT__GL_DITHER = 0x0BD0,
-    SAT__GL_BLEND = 0x0BE2, SAT__GL_COLOR_LOGIC_OP = 0x0BF2, SAT__GL_SCISSOR_TEST = 0x0C11,
-    SAT__GL_SAMPLE_ALPHA_TO_COVERAGE = 0x809E, SAT__GL_SAMPLE_COVERAGE = 0x80A0, SAT__GL_FRAMEBUFFER_SRGB = 0x8DB9,
-    SAT__GL_RASTERIZER_DISCARD = 0x8C89, SAT__GL_PROGRAM_POINT_SIZE = 0x8642,
-    SAT__GL_UNPACK_SWAP_BYTES = 0x0CF0, SAT__GL_UNPACK_ROW_LENGTH = 0x0CF2, SAT__GL_UNPACK_SKIP_ROWS = 0x0CF3,
-    SAT__GL_UNPACK_SKIP_PIXELS = 0x0CF4, SAT__GL_UNPACK_ALIGNMENT = 0x0CF5, SAT__GL_UNPACK_SKIP_IMAGES = 0x806D,
-    SAT__GL_UNPACK_IMAGE_HEIGHT = 0x806E, SAT__GL_PACK_SWAP_BYTES = 0x0D00, SAT__GL_PACK_ROW_LENGTH = 0x0D02,
-    SAT__GL_PACK_SKIP_ROWS = 0x0D03, SAT__GL_PACK_SKIP_PIXELS = 0x0D04, SAT__GL_PACK_ALIGNMENT = 0x0D05,
-    SAT__GL_MAX_TEXTURE_SIZE = 0x0D33, SAT__GL_TEXTURE_2D = 0x0DE1, SAT__GL_TEXTURE_2D_ARRAY = 0x8C1A,
-    SAT__GL_TEXTURE_BINDING_2D = 0x8069, SAT__GL_TEXTURE_BINDING_2D_ARRAY = 0x8C1D, SAT__GL_SAMPLER_BINDING = 0x8919,
-    SAT__GL_TEXTURE0 = 0x84C0, SAT__GL_ACTIVE_TEXTURE = 0x84E0, SAT__GL_TEXTURE_MAG_FILTER = 0x2800,
-    SAT__GL_TEXTURE_MIN_FILTER = 0x2801, SAT__GL_TEXTURE_WRAP_S = 0x2802, SAT__GL_TEXTURE_WRAP_T = 0x2803,
-    SAT__GL_TEXTURE_MAX_LEVEL = 0x813D, SAT__GL_NEAREST = 0x2600, SAT__GL_LINEAR = 0x2601, SAT__GL_REPEAT = 0x2901,
+    SAT__GL_ZERO = 0,
+    SAT__GL_ONE = 1,
+    SAT__GL_SRC_ALPHA = 0x0302,
+    SAT__GL_ONE_MINUS_SRC_ALPHA = 0x0303,
+    SAT__GL_LESS = 0x0201,
+    SAT__GL_LEQUAL = 0x0203,
+    SAT__GL_ALWAYS = 0x0207,
+    SAT__GL_FILL = 0x1B02,
+    SAT__GL_BLEND_DST_RGB = 0x80C8,
+    SAT__GL_BLEND_SRC_RGB = 0x80C9,
+    SAT__GL_BLEND_DST_ALPHA = 0x80CA,
+    SAT__GL_BLEND_SRC_ALPHA = 0x80CB,
+    SAT__GL_BLEND_EQUATION_RGB = 0x8009,
+    SAT__GL_BLEND_EQUATION_ALPHA = 0x883D,
+    SAT__GL_FRONT_AND_BACK = 0x0408,
+    SAT__GL_POLYGON_MODE = 0x0B40,
+    SAT__GL_DEPTH_WRITEMASK = 0x0B72,
+    SAT__GL_DEPTH_FUNC = 0x0B74,
+    SAT__GL_VIEWPORT = 0x0BA2,
+    SAT__GL_COLOR_WRITEMASK = 0x0C23,
+    SAT__GL_CULL_FACE = 0x0B44,
+    SAT__GL_DEPTH_TEST = 0x0B71,
+    SAT__GL_STENCIL_TEST = 0x0B90,
+    SAT__GL_DITHER = 0x0BD0,
+    SAT__GL_BLEND = 0x0BE2,
+    SAT__GL_COLOR_LOGIC_OP = 0x0BF2,
+    SAT__GL_SCISSOR_TEST = 0x0C11,
+    SAT__GL_SAMPLE_ALPHA_TO_COVERAGE = 0x809E,
+    SAT__GL_SAMPLE_COVERAGE = 0x80A0,
+    SAT__GL_FRAMEBUFFER_SRGB = 0x8DB9,
+    SAT__GL_RASTERIZER_DISCARD = 0x8C89,
+    SAT__GL_PROGRAM_POINT_SIZE = 0x8642,
+    SAT__GL_UNPACK_SWAP_BYTES = 0x0CF0,
+    SAT__GL_UNPACK_ROW_LENGTH = 0x0CF2,
+    SAT__GL_UNPACK_SKIP_ROWS = 0x0CF3,
+    SAT__GL_UNPACK_SKIP_PIXELS = 0x0CF4,
+    SAT__GL_UNPACK_ALIGNMENT = 0x0CF5,
+    SAT__GL_UNPACK_SKIP_IMAGES = 0x806D,
+    SAT__GL_UNPACK_IMAGE_HEIGHT = 0x806E,
+    SAT__GL_PACK_SWAP_BYTES = 0x0D00,
+    SAT__GL_PACK_ROW_LENGTH = 0x0D02,
+    SAT__GL_PACK_SKIP_ROWS = 0x0D03,
+    SAT__GL_PACK_SKIP_PIXELS = 0x0D04,
+    SAT__GL_PACK_ALIGNMENT = 0x0D05,
+    SAT__GL_MAX_TEXTURE_SIZE = 0x0D33,
+    SAT__GL_TEXTURE_2D = 0x0DE1,
+    SAT__GL_TEXTURE_2D_ARRAY = 0x8C1A,
+    SAT__GL_TEXTURE_BINDING_2D = 0x8069,
+    SAT__GL_TEXTURE_BINDING_2D_ARRAY = 0x8C1D,
+    SAT__GL_SAMPLER_BINDING = 0x8919,
+    SAT__GL_TEXTURE0 = 0x84C0,
+    SAT__GL_ACTIVE_TEXTURE = 0x84E0,
+    SAT__GL_TEXTURE_MAG_FILTER = 0x2800,
+    SAT__GL_TEXTURE_MIN_FILTER = 0x2801,
+    SAT__GL_TEXTURE_WRAP_S = 0x2802,
+    SAT__GL_TEXTURE_WRAP_T = 0x2803,
+    SAT__GL_TEXTURE_MAX_LEVEL = 0x813D,
+    SAT__GL_NEAREST = 0x2600,
+    SAT__GL_LINEAR = 0x2601,
+    SAT__GL_REPEAT = 0x2901,
     SAT__GL_CLAMP_TO_EDGE = 0x812F,
-    SAT__GL_UNSIGNED_BYTE = 0x1401, SAT__GL_UNSIGNED_SHORT = 0x1403, SAT__GL_INT = 0x1404,
-    SAT__GL_UNSIGNED_INT = 0x1405, SAT__GL_FLOAT = 0x1406, SAT__GL_HALF_FLOAT = 0x140B,
-    SAT__GL_DEPTH_COMPONENT = 0x1902, SAT__GL_RED = 0x1903, SAT__GL_RGB = 0x1907, SAT__GL_RGBA = 0x1908,
-    SAT__GL_RG = 0x8227, SAT__GL_RG_INTEGER = 0x8228, SAT__GL_RED_INTEGER = 0x8D94, SAT__GL_RGBA_INTEGER = 0x8D99,
-    SAT__GL_R8 = 0x8229, SAT__GL_RG8 = 0x822B, SAT__GL_RGBA8 = 0x8058, SAT__GL_SRGB8_ALPHA8 = 0x8C43,
-    SAT__GL_R8UI = 0x8232, SAT__GL_R16F = 0x822D, SAT__GL_RG16F = 0x822F, SAT__GL_RGBA16F = 0x881A,
-    SAT__GL_R32F = 0x822E, SAT__GL_RG32F = 0x8230, SAT__GL_RGB32F = 0x8815, SAT__GL_RGBA32F = 0x8814,
-    SAT__GL_R32I = 0x8235, SAT__GL_RGBA32I = 0x8D82, SAT__GL_R32UI = 0x8236, SAT__GL_RG32UI = 0x823C,
+    SAT__GL_UNSIGNED_BYTE = 0x1401,
+    SAT__GL_UNSIGNED_SHORT = 0x1403,
+    SAT__GL_INT = 0x1404,
+    SAT__GL_UNSIGNED_INT = 0x1405,
+    SAT__GL_FLOAT = 0x1406,
+    SAT__GL_HALF_FLOAT = 0x140B,
+    SAT__GL_DEPTH_COMPONENT = 0x1902,
+    SAT__GL_RED = 0x1903,
+    SAT__GL_RGB = 0x1907,
+    SAT__GL_RGBA = 0x1908,
+    SAT__GL_RG = 0x8227,
+    SAT__GL_RG_INTEGER = 0x8228,
+    SAT__GL_RED_INTEGER = 0x8D94,
+    SAT__GL_RGBA_INTEGER = 0x8D99,
+    SAT__GL_R8 = 0x8229,
+    SAT__GL_RG8 = 0x822B,
+    SAT__GL_RGBA8 = 0x8058,
+    SAT__GL_SRGB8_ALPHA8 = 0x8C43,
+    SAT__GL_R8UI = 0x8232,
+    SAT__GL_R16F = 0x822D,
+    SAT__GL_RG16F = 0x822F,
+    SAT__GL_RGBA16F = 0x881A,
+    SAT__GL_R32F = 0x822E,
+    SAT__GL_RG32F = 0x8230,
+    SAT__GL_RGB32F = 0x8815,
+    SAT__GL_RGBA32F = 0x8814,
+    SAT__GL_R32I = 0x8235,
+    SAT__GL_RGBA32I = 0x8D82,
+    SAT__GL_R32UI = 0x8236,
+    SAT__GL_RG32UI = 0x823C,
     SAT__GL_RGBA32UI = 0x8D70,
-    SAT__GL_R16UI = 0x8234, SAT__GL_DEPTH_COMPONENT24 = 0x81A6, SAT__GL_DEPTH_COMPONENT32F = 0x8CAC,
-    SAT__GL_RENDERER = 0x1F01, SAT__GL_VERSION = 0x1F02, SAT__GL_FRAGMENT_SHADER = 0x8B30, SAT__GL_VERTEX_SHADER = 0x8B31,
-    SAT__GL_COMPUTE_SHADER = 0x91B9, SAT__GL_COMPILE_STATUS = 0x8B81, SAT__GL_LINK_STATUS = 0x8B82,
-    SAT__GL_CURRENT_PROGRAM = 0x8B8D, SAT__GL_INTERLEAVED_ATTRIBS = 0x8C8C, SAT__GL_VERTEX_ARRAY_BINDING = 0x85B5,
-    SAT__GL_ARRAY_BUFFER = 0x8892, SAT__GL_ARRAY_BUFFER_BINDING = 0x8894, SAT__GL_STREAM_DRAW = 0x88E0,
-    SAT__GL_STATIC_DRAW = 0x88E4, SAT__GL_DYNAMIC_COPY = 0x88EA, SAT__GL_MAP_READ_BIT = 0x0001,
-    SAT__GL_PIXEL_PACK_BUFFER = 0x88EB, SAT__GL_PIXEL_UNPACK_BUFFER = 0x88EC,
-    SAT__GL_PIXEL_PACK_BUFFER_BINDING = 0x88ED, SAT__GL_PIXEL_UNPACK_BUFFER_BINDING = 0x88EF,
-    SAT__GL_TRANSFORM_FEEDBACK_BUFFER = 0x8C8E, SAT__GL_TRANSFORM_FEEDBACK_BUFFER_BINDING = 0x8C8F,
-    SAT__GL_TRANSFORM_FEEDBACK_BUFFER_START = 0x8C84, SAT__GL_TRANSFORM_FEEDBACK_BUFFER_SIZE = 0x8C85,
-    SAT__GL_READ_FRAMEBUFFER = 0x8CA8, SAT__GL_DRAW_FRAMEBUFFER = 0x8CA9, SAT__GL_FRAMEBUFFER = 0x8D40,
-    SAT__GL_DRAW_FRAMEBUFFER_BINDING = 0x8CA6, SAT__GL_READ_FRAMEBUFFER_BINDING = 0x8CAA,
-    SAT__GL_FRAMEBUFFER_COMPLETE = 0x8CD5, SAT__GL_COLOR_ATTACHMENT0 = 0x8CE0, SAT__GL_DEPTH_ATTACHMENT = 0x8D00,
-    SAT__GL_COLOR = 0x1800, SAT__GL_DEPTH = 0x1801,
-    SAT__GL_TIME_ELAPSED = 0x88BF, SAT__GL_QUERY_RESULT = 0x8866, SAT__GL_QUERY_RESULT_AVAILABLE = 0x8867,
-    SAT__GL_READ_ONLY = 0x88B8, SAT__GL_WRITE_ONLY = 0x88B9, SAT__GL_READ_WRITE = 0x88BA,
-    SAT__GL_IMAGE_BINDING_NAME = 0x8F3A, SAT__GL_IMAGE_BINDING_LEVEL = 0x8F3B, SAT__GL_IMAGE_BINDING_LAYERED = 0x8F3C,
-    SAT__GL_IMAGE_BINDING_LAYER = 0x8F3D, SAT__GL_IMAGE_BINDING_ACCESS = 0x8F3E, SAT__GL_IMAGE_BINDING_FORMAT = 0x906E,
-    SAT__GL_TEXTURE_FETCH_BARRIER_BIT = 0x0008, SAT__GL_SHADER_IMAGE_ACCESS_BARRIER_BIT = 0x0020,
-    SAT__GL_TEXTURE_UPDATE_BARRIER_BIT = 0x0100, SAT__GL_FRAMEBUFFER_BARRIER_BIT = 0x0400
+    SAT__GL_R16UI = 0x8234,
+    SAT__GL_DEPTH_COMPONENT24 = 0x81A6,
+    SAT__GL_DEPTH_COMPONENT32F = 0x8CAC,
+    SAT__GL_RENDERER = 0x1F01,
+    SAT__GL_VERSION = 0x1F02,
+    SAT__GL_FRAGMENT_SHADER = 0x8B30,
+    SAT__GL_VERTEX_SHADER = 0x8B31,
+    SAT__GL_COMPUTE_SHADER = 0x91B9,
+    SAT__GL_COMPILE_STATUS = 0x8B81,
+    SAT__GL_LINK_STATUS = 0x8B82,
+    SAT__GL_CURRENT_PROGRAM = 0x8B8D,
+    SAT__GL_INTERLEAVED_ATTRIBS = 0x8C8C,
+    SAT__GL_VERTEX_ARRAY_BINDING = 0x85B5,
+    SAT__GL_ARRAY_BUFFER = 0x8892,
+    SAT__GL_ARRAY_BUFFER_BINDING = 0x8894,
+    SAT__GL_STREAM_DRAW = 0x88E0,
+    SAT__GL_STATIC_DRAW = 0x88E4,
+    SAT__GL_DYNAMIC_COPY = 0x88EA,
+    SAT__GL_MAP_READ_BIT = 0x0001,
+    SAT__GL_PIXEL_PACK_BUFFER = 0x88EB,
+    SAT__GL_PIXEL_UNPACK_BUFFER = 0x88EC,
+    SAT__GL_PIXEL_PACK_BUFFER_BINDING = 0x88ED,
+    SAT__GL_PIXEL_UNPACK_BUFFER_BINDING = 0x88EF,
+    SAT__GL_TRANSFORM_FEEDBACK_BUFFER = 0x8C8E,
+    SAT__GL_TRANSFORM_FEEDBACK_BUFFER_BINDING = 0x8C8F,
+    SAT__GL_TRANSFORM_FEEDBACK_BUFFER_START = 0x8C84,
+    SAT__GL_TRANSFORM_FEEDBACK_BUFFER_SIZE = 0x8C85,
+    SAT__GL_READ_FRAMEBUFFER = 0x8CA8,
+    SAT__GL_DRAW_FRAMEBUFFER = 0x8CA9,
+    SAT__GL_FRAMEBUFFER = 0x8D40,
+    SAT__GL_DRAW_FRAMEBUFFER_BINDING = 0x8CA6,
+    SAT__GL_READ_FRAMEBUFFER_BINDING = 0x8CAA,
+    SAT__GL_FRAMEBUFFER_COMPLETE = 0x8CD5,
+    SAT__GL_COLOR_ATTACHMENT0 = 0x8CE0,
+    SAT__GL_DEPTH_ATTACHMENT = 0x8D00,
+    SAT__GL_COLOR = 0x1800,
+    SAT__GL_DEPTH = 0x1801,
+    SAT__GL_TIME_ELAPSED = 0x88BF,
+    SAT__GL_QUERY_RESULT = 0x8866,
+    SAT__GL_QUERY_RESULT_AVAILABLE = 0x8867,
+    SAT__GL_READ_ONLY = 0x88B8,
+    SAT__GL_WRITE_ONLY = 0x88B9,
+    SAT__GL_READ_WRITE = 0x88BA,
+    SAT__GL_IMAGE_BINDING_NAME = 0x8F3A,
+    SAT__GL_IMAGE_BINDING_LEVEL = 0x8F3B,
+    SAT__GL_IMAGE_BINDING_LAYERED = 0x8F3C,
+    SAT__GL_IMAGE_BINDING_LAYER = 0x8F3D,
+    SAT__GL_IMAGE_BINDING_ACCESS = 0x8F3E,
+    SAT__GL_IMAGE_BINDING_FORMAT = 0x906E,
+    SAT__GL_TEXTURE_FETCH_BARRIER_BIT = 0x0008,
+    SAT__GL_SHADER_IMAGE_ACCESS_BARRIER_BIT = 0x0020,
+    SAT__GL_TEXTURE_UPDATE_BARRIER_BIT = 0x0100,
+    SAT__GL_FRAMEBUFFER_BARRIER_BIT = 0x0400
 };
 
 /* Every function of the table, once: X(result, name without gl, arguments). These are required ... */
@@ -1318,7 +1463,8 @@ static inline sat_result sat__gl_open(sat__gl *gl, sat_gl_get_proc *get_proc)
     renderer = (const char *)gl->GetString(SAT__GL_RENDERER); /* llvmpipe's timer is wrong at times */
     gl->has_timer = !gl->is_es && !(renderer && strstr(renderer, "llvmpipe")) && gl->GenQueries && gl->DeleteQueries &&
                     gl->BeginQuery && gl->EndQuery && gl->GetQueryObjectui64v;
-    gl->has_compute = !gl->is_es && gl->version >= 43 && gl->BindImageTexture && gl->DispatchCompute && gl->MemoryBarrier;
+    gl->has_compute =
+        !gl->is_es && gl->version >= 43 && gl->BindImageTexture && gl->DispatchCompute && gl->MemoryBarrier;
     gl->GetIntegerv(SAT__GL_MAX_TEXTURE_SIZE, &gl->max_size);
     sat__gl_clear_errors(gl);
     gl->GenVertexArrays(1, &gl->vertex_array);
@@ -1391,12 +1537,15 @@ static inline void sat__gl_explain(sat__gl *gl, const char *const *parts, int co
 }
 
 /* One shader, or 0 with the log and the source in the message. */
-static inline unsigned sat__gl_compile(sat__gl *gl, unsigned type, const sat__gl_shaders *shaders, const char *const *text)
+static inline unsigned sat__gl_compile(sat__gl *gl, unsigned type, const sat__gl_shaders *shaders,
+                                       const char *const *text)
 {
     static const char es_precision[] = "precision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
                                        "precision highp isampler2D;\nprecision highp usampler2D;\n"
                                        "precision highp sampler2DArray;\n";
-    const char *stage = type == SAT__GL_VERTEX_SHADER ? "vertex" : type == SAT__GL_COMPUTE_SHADER ? "compute" : "fragment";
+    const char *stage = type == SAT__GL_VERTEX_SHADER    ? "vertex"
+                        : type == SAT__GL_COMPUTE_SHADER ? "compute"
+                                                         : "fragment";
     const char *parts[64];
     int count = 0, ok = 0;
     unsigned shader = gl->CreateShader(type);
@@ -1544,7 +1693,8 @@ static inline sat_result sat__gl_texture(sat__gl *gl, unsigned *texture, unsigne
 }
 
 /* Replaces all pixels. */
-static inline void sat__gl_upload(sat__gl *gl, unsigned texture, unsigned internal, int width, int height, const void *pixels)
+static inline void sat__gl_upload(sat__gl *gl, unsigned texture, unsigned internal, int width, int height,
+                                  const void *pixels)
 {
     unsigned format = 0, type = 0;
     sat__gl_transfer(internal, &format, &type);
@@ -1554,7 +1704,8 @@ static inline void sat__gl_upload(sat__gl *gl, unsigned texture, unsigned intern
 }
 
 /* Binds a framebuffer and gives it `count` colour attachments and, unless 0, a depth texture. */
-static inline sat_result sat__gl_attach(sat__gl *gl, unsigned framebuffer, const unsigned *textures, int count, unsigned depth)
+static inline sat_result sat__gl_attach(sat__gl *gl, unsigned framebuffer, const unsigned *textures, int count,
+                                        unsigned depth)
 {
     unsigned buffers[SAT__GL_TARGETS], status;
     char number[24];
@@ -1590,7 +1741,8 @@ static inline sat_result sat__gl_framebuffer(sat__gl *gl, unsigned *framebuffer,
 }
 
 /* Copies a texture into packed rows; waits for the GPU. Some ES drivers read only RGBA back. */
-static inline sat_result sat__gl_read(sat__gl *gl, void *pixels, unsigned texture, unsigned internal, int width, int height)
+static inline sat_result sat__gl_read(sat__gl *gl, void *pixels, unsigned texture, unsigned internal, int width,
+                                      int height)
 {
     unsigned format = 0, type = 0;
     sat_result result = sat__gl_attach(gl, gl->framebuffer, &texture, 1, 0);
@@ -1693,9 +1845,9 @@ typedef struct sat__gl_state {
 static inline const unsigned *sat__gl_capability_names(const sat__gl *gl, int *count)
 {
     static const unsigned names[SAT__GL_CAPABILITIES] = {
-        SAT__GL_BLEND, SAT__GL_DEPTH_TEST, SAT__GL_CULL_FACE, SAT__GL_SCISSOR_TEST, SAT__GL_STENCIL_TEST, SAT__GL_DITHER,
-        SAT__GL_RASTERIZER_DISCARD, SAT__GL_SAMPLE_ALPHA_TO_COVERAGE, SAT__GL_SAMPLE_COVERAGE,
-        SAT__GL_COLOR_LOGIC_OP, SAT__GL_FRAMEBUFFER_SRGB, SAT__GL_PROGRAM_POINT_SIZE};
+        SAT__GL_BLEND,           SAT__GL_DEPTH_TEST,     SAT__GL_CULL_FACE,          SAT__GL_SCISSOR_TEST,
+        SAT__GL_STENCIL_TEST,    SAT__GL_DITHER,         SAT__GL_RASTERIZER_DISCARD, SAT__GL_SAMPLE_ALPHA_TO_COVERAGE,
+        SAT__GL_SAMPLE_COVERAGE, SAT__GL_COLOR_LOGIC_OP, SAT__GL_FRAMEBUFFER_SRGB,   SAT__GL_PROGRAM_POINT_SIZE};
     *count = gl->is_es ? SAT__GL_CAPABILITIES - 3 : SAT__GL_CAPABILITIES;
     return names;
 }
@@ -1713,8 +1865,9 @@ static inline const unsigned *sat__gl_store_names(const sat__gl *gl, int *count)
 
 static inline const unsigned *sat__gl_blend_names(void)
 {
-    static const unsigned names[6] = {SAT__GL_BLEND_SRC_RGB, SAT__GL_BLEND_DST_RGB, SAT__GL_BLEND_SRC_ALPHA,
-                                      SAT__GL_BLEND_DST_ALPHA, SAT__GL_BLEND_EQUATION_RGB, SAT__GL_BLEND_EQUATION_ALPHA};
+    static const unsigned names[6] = {SAT__GL_BLEND_SRC_RGB,      SAT__GL_BLEND_DST_RGB,
+                                      SAT__GL_BLEND_SRC_ALPHA,    SAT__GL_BLEND_DST_ALPHA,
+                                      SAT__GL_BLEND_EQUATION_RGB, SAT__GL_BLEND_EQUATION_ALPHA};
     return names;
 }
 
@@ -1730,8 +1883,9 @@ static inline const unsigned *sat__gl_buffer_names(void)
 
 static inline const unsigned *sat__gl_image_names(void)
 {
-    static const unsigned names[6] = {SAT__GL_IMAGE_BINDING_NAME, SAT__GL_IMAGE_BINDING_LEVEL, SAT__GL_IMAGE_BINDING_LAYERED,
-                                      SAT__GL_IMAGE_BINDING_LAYER, SAT__GL_IMAGE_BINDING_ACCESS, SAT__GL_IMAGE_BINDING_FORMAT};
+    static const unsigned names[6] = {SAT__GL_IMAGE_BINDING_NAME,    SAT__GL_IMAGE_BINDING_LEVEL,
+                                      SAT__GL_IMAGE_BINDING_LAYERED, SAT__GL_IMAGE_BINDING_LAYER,
+                                      SAT__GL_IMAGE_BINDING_ACCESS,  SAT__GL_IMAGE_BINDING_FORMAT};
     return names;
 }
 
@@ -1814,7 +1968,8 @@ static inline void sat__gl_restore_textures(sat__gl *gl, const sat__gl_state *st
     gl->ActiveTexture((unsigned)state->active_texture);
     for (i = 0; gl->has_compute && i < SAT__GL_IMAGES; i++) {
         const int *v = state->images[i];
-        gl->BindImageTexture((unsigned)i, (unsigned)v[0], v[1], (unsigned char)v[2], v[3], (unsigned)v[4], (unsigned)v[5]);
+        gl->BindImageTexture((unsigned)i, (unsigned)v[0], v[1], (unsigned char)v[2], v[3], (unsigned)v[4],
+                             (unsigned)v[5]);
     }
 }
 
@@ -1848,8 +2003,8 @@ static inline void sat__gl_restore_buffers(sat__gl *gl, const sat__gl_state *sta
     names = sat__gl_store_names(gl, &count);
     for (i = 0; i < count; i++) gl->PixelStorei(names[i], state->stores[i]);
     if (state->feedback && state->feedback_size > 0)
-        gl->BindBufferRange(SAT__GL_TRANSFORM_FEEDBACK_BUFFER, 0, (unsigned)state->feedback, (ptrdiff_t)state->feedback_start,
-                            (ptrdiff_t)state->feedback_size);
+        gl->BindBufferRange(SAT__GL_TRANSFORM_FEEDBACK_BUFFER, 0, (unsigned)state->feedback,
+                            (ptrdiff_t)state->feedback_start, (ptrdiff_t)state->feedback_size);
     else gl->BindBufferBase(SAT__GL_TRANSFORM_FEEDBACK_BUFFER, 0, (unsigned)state->feedback);
     for (i = 0; i < 4; i++) gl->BindBuffer(sat__gl_buffer_names()[2 * i], (unsigned)state->buffers[i]);
 }
@@ -1945,7 +2100,8 @@ SAT_DEF sat_scan_options sat_scan_defaults(void)
 SAT_DEF const char *sat_explain_scan(char *text, size_t size, const sat_scan_options *options)
 {
     sat__text t = sat__text_begin(text, size);
-    const sat__field *wrong = options ? sat__fields_check(options, sat__scan_fields, SAT__COUNT(sat__scan_fields)) : NULL;
+    const sat__field *wrong =
+        options ? sat__fields_check(options, sat__scan_fields, SAT__COUNT(sat__scan_fields)) : NULL;
     if (wrong) sat__text_field(&t, wrong, options);
     return text;
 }
@@ -2008,7 +2164,8 @@ static void sat__scan_doubling(int begin, int end, int worker, void *context)
         size_t terms = i / offset + 1;
         if (terms > (size_t)scan->k) terms = (size_t)scan->k;
         if (i >= offset) {
-            sat__scan_fold(scan, scan->out + i * scan->size, NULL, scan->in + (i - (terms - 1) * offset) * scan->size, terms, offset, worker);
+            sat__scan_fold(scan, scan->out + i * scan->size, NULL, scan->in + (i - (terms - 1) * offset) * scan->size,
+                           terms, offset, worker);
             continue;
         }
         memcpy(scan->out + i * scan->size, scan->in + i * scan->size, scan->size);
@@ -2024,7 +2181,8 @@ static void sat__scan_recursive_doubling(sat__scan *scan, unsigned char *out, un
 {
     unsigned char *from = out, *to = scratch, *swap;
     size_t passes = 0, offset;
-    for (offset = 1; offset < scan->n; passes++) offset = offset > SIZE_MAX / (size_t)scan->k ? SIZE_MAX : offset * (size_t)scan->k;
+    for (offset = 1; offset < scan->n; passes++)
+        offset = offset > SIZE_MAX / (size_t)scan->k ? SIZE_MAX : offset * (size_t)scan->k;
     if (passes % 2) {
         from = scratch;
         to = out;
@@ -2066,7 +2224,8 @@ static void sat__scan_expand(int begin, int end, int worker, void *context)
     for (; g < stop; g++) {
         const unsigned char *uncle = g ? scan->uncles + (g - 1) * scan->size : NULL;
         for (d = scan->n - g * k < k ? scan->n - g * k : k; d-- > 0;)
-            sat__scan_fold(scan, scan->out + (g * k + d) * scan->size, uncle, scan->in + g * k * scan->size, d + 1, 1, worker);
+            sat__scan_fold(scan, scan->out + (g * k + d) * scan->size, uncle, scan->in + g * k * scan->size, d + 1, 1,
+                           worker);
     }
 }
 
@@ -2123,7 +2282,8 @@ static sat_result sat__scan_check(sat_scan_options *resolved, sat_allocator *all
                                   size_t n, const sat_scan_options *options)
 {
     *resolved = options ? *options : sat_scan_defaults();
-    if ((n && (!out || !in)) || sat__fields_check(resolved, sat__scan_fields, SAT__COUNT(sat__scan_fields))) return SAT_ERR_ARGUMENT;
+    if ((n && (!out || !in)) || sat__fields_check(resolved, sat__scan_fields, SAT__COUNT(sat__scan_fields)))
+        return SAT_ERR_ARGUMENT;
     sat__resolve_allocator(allocator, &resolved->allocator);
     if (n / SAT__SCAN_BLOCK >= (size_t)0x7fffffff) return SAT_ERR_SIZE;
     if (resolved->counters) memset(resolved->counters, 0, sizeof *resolved->counters);
@@ -2140,7 +2300,8 @@ SAT_DEF sat_result sat_scan_any(void *out, const void *in, size_t n, size_t elem
     unsigned char *scratch;
     sat_result result = sat__scan_check(&resolved, &allocator, out, in, n, options);
     if (result) return result;
-    if (!combine || element_size < 1 || element_size > 4096 || (resolved.exclusive && !identity)) return SAT_ERR_ARGUMENT;
+    if (!combine || element_size < 1 || element_size > 4096 || (resolved.exclusive && !identity))
+        return SAT_ERR_ARGUMENT;
     if (n == 0) return SAT_OK;
 
     memset(&scan, 0, sizeof scan);
@@ -2157,8 +2318,10 @@ SAT_DEF sat_result sat_scan_any(void *out, const void *in, size_t n, size_t elem
     scan.temporaries = scratch;
     scratch += 2 * (size_t)sat__worker_count(&resolved.threads) * element_size;
 
-    if (resolved.algorithm == SAT_SCAN_RECURSIVE_DOUBLING) sat__scan_recursive_doubling(&scan, (unsigned char *)out, scratch, in);
-    else if (resolved.algorithm == SAT_SCAN_BALANCED_TREE) sat__scan_balanced_tree(&scan, (unsigned char *)out, scratch, (const unsigned char *)in);
+    if (resolved.algorithm == SAT_SCAN_RECURSIVE_DOUBLING)
+        sat__scan_recursive_doubling(&scan, (unsigned char *)out, scratch, in);
+    else if (resolved.algorithm == SAT_SCAN_BALANCED_TREE)
+        sat__scan_balanced_tree(&scan, (unsigned char *)out, scratch, (const unsigned char *)in);
     else sat__scan_sequential(&scan, (unsigned char *)out, (const unsigned char *)in);
 
     if (resolved.exclusive) {
@@ -2345,7 +2508,8 @@ static int sat__options_are_valid(const sat_options *o)
     return sat__explain_options(&ignored, o);
 }
 
-SAT_DEF const char *sat_explain(char *text, size_t size, int width, int height, int channels, const sat_options *options)
+SAT_DEF const char *sat_explain(char *text, size_t size, int width, int height, int channels,
+                                const sat_options *options)
 {
     sat__text t = sat__text_begin(text, size);
     if (sat__explain_size(&t, width, height, channels) && options) sat__explain_options(&t, options);
@@ -2359,28 +2523,32 @@ SAT_DEF const char *sat_explain_image(char *text, size_t size, const sat_image *
     else if (!image->pixels) sat__text_add(&t, "image.pixels is NULL");
     else if (image->width < 1) sat__text_range(&t, "image.width", image->width, 1, 2147483647, ' ');
     else if (image->height < 1) sat__text_range(&t, "image.height", image->height, 1, 2147483647, ' ');
-    else if (image->channels < 1 || image->channels > 4) sat__text_range(&t, "image.channels", image->channels, 1, 4, ' ');
-    else if ((unsigned)image->format > (unsigned)SAT_F16) sat__text_range(&t, "image.format", image->format, 0, SAT_F16, ' ');
-    else if ((uintptr_t)image->pixels % sat__format_size(image->format)) sat__text_add(&t, "image.pixels is not aligned for its format");
-    else if (image->stride % (ptrdiff_t)sat__format_size(image->format)) sat__text_add(&t, "image.stride is not a multiple of its format's bytes");
+    else if (image->channels < 1 || image->channels > 4)
+        sat__text_range(&t, "image.channels", image->channels, 1, 4, ' ');
+    else if ((unsigned)image->format > (unsigned)SAT_F16)
+        sat__text_range(&t, "image.format", image->format, 0, SAT_F16, ' ');
+    else if ((uintptr_t)image->pixels % sat__format_size(image->format))
+        sat__text_add(&t, "image.pixels is not aligned for its format");
+    else if (image->stride % (ptrdiff_t)sat__format_size(image->format))
+        sat__text_add(&t, "image.stride is not a multiple of its format's bytes");
     else if (!sat__image_is_valid(image)) sat__text_add(&t, "image.stride is shorter than a row");
     return text;
 }
 
 /* ---- tables: tiles of integers
 
-   A tile sums its pixels in integers modulo 2^32, rounded to a quantum of its own: the power of two for which the sum of the
-   magnitudes just fits, so that any box inside the tile is right to quantum / 2 a pixel, whatever lies elsewhere and in
-   whatever order the sums were made. What would coarsen the quantum is kept apart:
+   A tile sums its pixels in integers modulo 2^32, rounded to a quantum of its own: the power of two for which the sum
+   of the magnitudes just fits, so that any box inside the tile is right to quantum / 2 a pixel, whatever lies elsewhere
+   and in whatever order the sums were made. What would coarsen the quantum is kept apart:
 
      spikes    up to 8 pixels that hold most of the tile's sum, added to the boxes that contain them
-     giants    infinity and pixels beyond 1e20, in a list a tile row; one that finds it full is clamped to the largest of its
-               tile's other pixels, and counted
-     wide      a tile that mixes two ranges for good has 64-bit cells beside it, from a pool of about one a tile column for
-               every super tile row
+     giants    infinity and pixels beyond 1e20, in a list a tile row; one that finds it full is clamped to the largest
+               of its tile's other pixels, and counted
+     wide      a tile that mixes two ranges for good has 64-bit cells beside it, from a pool of about one a tile column
+               for every super tile row
 
-   Cells are inclusive sums within the tile, so nothing is stored for borders. Boxes of at most 3 x 3 tiles are the sum of
-   their tiles' own differences. Larger ones use sums of whole tiles that restart in every super tile of 1024 pixels:
+   Cells are inclusive sums within the tile, so nothing is stored for borders. Boxes of at most 3 x 3 tiles are the sum
+   of their tiles' own differences. Larger ones use sums of whole tiles that restart in every super tile of 1024 pixels:
 
      left[y][tile]    the tiles of its tile row up to this one, rows up to y
      above[band][x]   the tile rows up to this one, columns of the tile up to x
@@ -2432,7 +2600,8 @@ static size_t sat__lay_out_tiled(sat_table *t, unsigned char *base)
     t->wide_quota = t->tiles_x + 2;
     t->wide_stride = (size_t)sat__min_int(t->width, t->options.tile);
     t->giant_room = sat__clamp_int(t->width, 8, 64);
-    if (!sat__multiply_size(&t->plane, t->stride, (size_t)t->rows) || !sat__multiply_size(&cells, t->plane, channels)) return 0;
+    if (!sat__multiply_size(&t->plane, t->stride, (size_t)t->rows) || !sat__multiply_size(&cells, t->plane, channels))
+        return 0;
     if (!sat__multiply_size(&tiles, bands, (size_t)t->tiles_x)) return 0;
     pool = (size_t)sat__min_int(t->wide_quota, 0x7fffffff / sat__supers(t) / 4) * (size_t)sat__supers(t) * channels;
     t->sums = (unsigned char *)sat__carve(&arena, cells, sizeof(uint32_t));
@@ -2469,19 +2638,23 @@ static size_t sat__lay_out(sat_table *t, unsigned char *base)
     t->columns_stride = (corners + line) / line * line * t->element;
     t->columns = (unsigned char *)sat__carve(&arena, channels, t->columns_stride);
     t->pixels = (float *)sat__carve(&arena, workers * SAT__MAX_STRIP, sizeof(float));
-    t->integers = sat__is_fixed(t->options.kind) ? (uint64_t *)sat__carve(&arena, workers * SAT__MAX_STRIP, sizeof(uint64_t)) : NULL;
+    t->integers = sat__is_fixed(t->options.kind)
+                      ? (uint64_t *)sat__carve(&arena, workers * SAT__MAX_STRIP, sizeof(uint64_t))
+                      : NULL;
     t->tallies = (sat__tally *)sat__carve(&arena, (size_t)t->bands * channels, sizeof(sat__tally));
     return arena.overflow ? 0 : arena.used;
 }
 
 /* rows: corner rows to store, and tile_rows: strips above to store. */
-static sat_result sat__table_create(sat_table **out, int width, int height, int rows, int tile_rows, int ring, int channels, const sat_options *options)
+static sat_result sat__table_create(sat_table **out, int width, int height, int rows, int tile_rows, int ring,
+                                    int channels, const sat_options *options)
 {
     sat_table t, *table;
     unsigned char *base;
     memset(&t, 0, sizeof t);
     t.options = options ? *options : sat_defaults();
-    if (width < 1 || height < 1 || channels < 1 || channels > 4 || !sat__options_are_valid(&t.options)) return SAT_ERR_ARGUMENT;
+    if (width < 1 || height < 1 || channels < 1 || channels > 4 || !sat__options_are_valid(&t.options))
+        return SAT_ERR_ARGUMENT;
     if (!sat__resolve_allocator(&t.allocator, &t.options.allocator)) return SAT_ERR_ARGUMENT;
     if (width == 0x7fffffff || height == 0x7fffffff) return SAT_ERR_SIZE;
     t.width = width;
@@ -2516,7 +2689,8 @@ SAT_DEF sat_result sat_create(sat_table **out, int width, int height, int channe
     if (tile < 1 || height < 1) return SAT_ERR_ARGUMENT;
     if (height == 0x7fffffff) return SAT_ERR_ARGUMENT;
     tiled = !options || options->kind == SAT_KIND_TILED;
-    return sat__table_create(out, width, height, tiled ? height : height + 1, (height - 1) / tile + 1, 0, channels, options);
+    return sat__table_create(out, width, height, tiled ? height : height + 1, (height - 1) / tile + 1, 0, channels,
+                             options);
 }
 
 SAT_DEF void sat_destroy(sat_table *table)
@@ -2752,9 +2926,11 @@ static inline sat__vec_f32 sat__prefix_f32(sat__vec_f32 v)
 
 #ifdef SAT__AVX2
 /* The one loop where eight lanes pay: halves are prefixed side by side, then the lower half's sum goes to the upper. */
-static float sat__sum_row_f32(float *out, float *column, const float *in, int n, float first, int stream, int32_t *signs)
+static float sat__sum_row_f32(float *out, float *column, const float *in, int n, float first, int stream,
+                              int32_t *signs)
 {
-    __m256 carry = _mm256_set1_ps(first), zero = _mm256_setzero_ps(), all = _mm256_castsi256_ps(_mm256_set1_epi32(*signs)), v, pixels, low;
+    __m256 carry = _mm256_set1_ps(first), zero = _mm256_setzero_ps(),
+           all = _mm256_castsi256_ps(_mm256_set1_epi32(*signs)), v, pixels, low;
     int i = 0;
     for (; i + 8 <= n; i += 8) {
         pixels = _mm256_loadu_ps(in + i);
@@ -2801,14 +2977,16 @@ static int sat__is_tame(const float *p, int n, float limit)
 #ifdef SAT__VECTOR
     sat__i32x4 beyond4 = sat__i32x4_set1(0), limit4 = sat__i32x4_set1((int32_t)limit_bits);
     for (; i + 4 <= n; i += 4)
-        beyond4 = sat__i32x4_or(beyond4, sat__i32x4_greater(sat__f32x4_bits(sat__f32x4_abs(sat__f32x4_load(p + i))), limit4));
+        beyond4 =
+            sat__i32x4_or(beyond4, sat__i32x4_greater(sat__f32x4_bits(sat__f32x4_abs(sat__f32x4_load(p + i))), limit4));
     beyond = (uint32_t)sat__i32x4_any(beyond4);
 #endif
     for (; i < n; i++) beyond |= (uint32_t)((sat__float_bits(p[i]) & 0x7fffffffu) > limit_bits);
     return !beyond;
 }
 
-/* The rule for values no sum can hold: NaN becomes 0, infinity +-limit; with SAT__CLAMP_ALL so does what lies beyond. */
+/* The rule for values no sum can hold: NaN becomes 0, infinity +-limit; with SAT__CLAMP_ALL so does what lies
+   beyond. */
 static void sat__replace(float *p, int n, float limit, int care, sat__tally *tally)
 {
     int i;
@@ -2827,8 +3005,8 @@ static void sat__replace(float *p, int n, float limit, int care, sat__tally *tal
 }
 
 /* Pixels [x0, x0 + n) of a row as floats: a pointer into the image where nothing has to change. */
-static const float *sat__prepare(const sat_table *t, const sat_image *image, int y, int x0, int n, int channel, int worker,
-                                 int care, sat__tally *tally)
+static const float *sat__prepare(const sat_table *t, const sat_image *image, int y, int x0, int n, int channel,
+                                 int worker, int care, sat__tally *tally)
 {
     float *scratch = t->pixels + (size_t)worker * SAT__MAX_STRIP, mean = t->mean[channel];
     const float *p = scratch;
@@ -2870,7 +3048,8 @@ static void sat__quantise(const sat_table *t, uint64_t *out, const float *in, in
     (void)exponent;
     memcpy(&magic_bits, &magic, sizeof magic);
 #ifdef SAT__SSE2
-    if (!wide && frexp(inverse, &exponent) <= 0.5 && exponent > -100 && exponent < 100) { /* the product is exact in float, too */
+    if (!wide && frexp(inverse, &exponent) <= 0.5 && exponent > -100 &&
+        exponent < 100) { /* the product is exact in float, too */
         __m128 scale = _mm_set1_ps((float)inverse);
         for (; i + 4 <= n; i += 4)
             _mm_storeu_si128((__m128i *)(void *)(out32 + i), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(in + i), scale)));
@@ -2919,12 +3098,14 @@ static inline size_t sat__tile_index(const sat_table *t, int channel, int band, 
 /* Row `y` of a tile row. */
 static inline uint32_t *sat__cells(const sat_table *t, int channel, int band, int y)
 {
-    return (uint32_t *)(void *)t->sums + (size_t)channel * t->plane + (((size_t)sat__band_slot(t, band) << t->shift) + (size_t)y) * t->stride;
+    return (uint32_t *)(void *)t->sums + (size_t)channel * t->plane +
+           (((size_t)sat__band_slot(t, band) << t->shift) + (size_t)y) * t->stride;
 }
 
 static inline double *sat__left(const sat_table *t, int channel, int band, int y)
 {
-    return t->left + (size_t)channel * t->left_plane + (((size_t)sat__band_slot(t, band) << t->shift) + (size_t)y) * (size_t)t->tiles_x;
+    return t->left + (size_t)channel * t->left_plane +
+           (((size_t)sat__band_slot(t, band) << t->shift) + (size_t)y) * (size_t)t->tiles_x;
 }
 
 static inline double *sat__above(const sat_table *t, int channel, int band)
@@ -2932,7 +3113,10 @@ static inline double *sat__above(const sat_table *t, int channel, int band)
     return t->above + ((size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band)) * (size_t)t->width;
 }
 
-static inline uint64_t *sat__wide_cells(const sat_table *t, int slot) { return t->wide + ((((size_t)slot - 1) * t->wide_stride) << t->shift); }
+static inline uint64_t *sat__wide_cells(const sat_table *t, int slot)
+{
+    return t->wide + ((((size_t)slot - 1) * t->wide_stride) << t->shift);
+}
 
 static double sat__spike_sum(const sat_table *t, size_t index, int x0, int y0, int x1, int y1)
 {
@@ -2946,7 +3130,8 @@ static double sat__spike_sum(const sat_table *t, size_t index, int x0, int y0, i
 
 static double sat__wide_part(const sat_table *t, const sat__tile *tile, int x0, int y0, int x1, int y1)
 {
-    const uint64_t *high = sat__wide_cells(t, tile->slot) + (size_t)(y1 - 1) * t->wide_stride, *low = y0 ? high - (size_t)(y1 - y0) * t->wide_stride : NULL;
+    const uint64_t *high = sat__wide_cells(t, tile->slot) + (size_t)(y1 - 1) * t->wide_stride,
+                   *low = y0 ? high - (size_t)(y1 - y0) * t->wide_stride : NULL;
     uint64_t d = high[x1 - 1];
     if (x0) d -= high[x0 - 1];
     if (low) d -= low[x1 - 1];
@@ -3021,7 +3206,8 @@ static double sat__run_above(const sat_table *t, int channel, const sat__span *y
     double sum = 0;
     while (b < y->run1) {
         int stop = sat__min_int(y->run1, (b | (super - 1)) + 1);
-        const double *high = sat__above(t, channel, stop - 1) + x, *low = b & (super - 1) ? sat__above(t, channel, b - 1) + x : NULL;
+        const double *high = sat__above(t, channel, stop - 1) + x,
+                     *low = b & (super - 1) ? sat__above(t, channel, b - 1) + x : NULL;
         double s = x0 ? high[x1 - 1] - high[x0 - 1] : high[x1 - 1];
         if (low) s -= x0 ? low[x1 - 1] - low[x0 - 1] : low[x1 - 1];
         sum += s;
@@ -3037,7 +3223,8 @@ static double sat__run_whole(const sat_table *t, int channel, const sat__span *x
     while (b < y->run1) {
         int stop = sat__min_int(y->run1, (b | (super - 1)) + 1);
         double s = sat__run(t->whole + sat__tile_index(t, channel, stop - 1, 0), 1, x->run0, x->run1, super);
-        if (b & (super - 1)) s -= sat__run(t->whole + sat__tile_index(t, channel, b - 1, 0), 1, x->run0, x->run1, super);
+        if (b & (super - 1))
+            s -= sat__run(t->whole + sat__tile_index(t, channel, b - 1, 0), 1, x->run0, x->run1, super);
         sum += s;
         b = stop;
     }
@@ -3052,10 +3239,12 @@ static double sat__run_sum(const sat_table *t, int channel, const sat__span *x, 
     if (x->run1 > x->run0)
         for (i = 0; i < y->count; i++) {
             sum += sat__run(sat__left(t, channel, y->tile[i], y->end[i] - 1), 1, x->run0, x->run1, super);
-            if (y->begin[i]) sum -= sat__run(sat__left(t, channel, y->tile[i], y->begin[i] - 1), 1, x->run0, x->run1, super);
+            if (y->begin[i])
+                sum -= sat__run(sat__left(t, channel, y->tile[i], y->begin[i] - 1), 1, x->run0, x->run1, super);
         }
     if (y->run1 > y->run0)
-        for (i = 0; i < x->count; i++) sum += sat__run_above(t, channel, y, x->tile[i] << t->shift, x->begin[i], x->end[i]);
+        for (i = 0; i < x->count; i++)
+            sum += sat__run_above(t, channel, y, x->tile[i] << t->shift, x->begin[i], x->end[i]);
     if (x->run1 > x->run0 && y->run1 > y->run0) sum += sat__run_whole(t, channel, x, y);
     return sum;
 }
@@ -3098,8 +3287,9 @@ SAT__APART static double sat__tiles_sum(const sat_table *t, int channel, int x0,
     return sum;
 }
 
-/* The same where at most 2 x 2 tiles are touched, as nearly all boxes up to a tile's side: always four tiles, of which those
-   that are not there are masked. Whether a border lies in the box is chance, and a wrong guess costs more than all of this. */
+/* The same where at most 2 x 2 tiles are touched, as nearly all boxes up to a tile's side: always four tiles, of which
+   those that are not there are masked. Whether a border lies in the box is chance, and a wrong guess costs more than
+   all of this. */
 static inline double sat__tiled_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
 {
     const int shift = t->shift, inner = (1 << shift) - 1, xe = x1 - 1, ye = y1 - 1, tx = x0 >> shift, ty = y0 >> shift;
@@ -3107,13 +3297,17 @@ static inline double sat__tiled_sum(const sat_table *t, int channel, int x0, int
     double sum;
     if ((right | below) > 1) sum = sat__tiles_sum(t, channel, x0, y0, x1, y1);
     else {
-        const sat__tile *a = t->tiles + ((size_t)channel * (size_t)t->tiles_y + (size_t)ty) * (size_t)t->tiles_x + (size_t)tx;
+        const sat__tile *a =
+            t->tiles + ((size_t)channel * (size_t)t->tiles_y + (size_t)ty) * (size_t)t->tiles_x + (size_t)tx;
         const sat__tile *b = a + right, *c = a + (t->tiles_x & -below), *d = c + right;
         const uint32_t *cells = (const uint32_t *)(const void *)t->sums + (size_t)channel * t->plane;
-        const uint32_t keep_right = 0u - (uint32_t)right, keep_below = 0u - (uint32_t)below, keep_left = 0u - (uint32_t)left, keep_top = 0u - (uint32_t)top;
-        const int xm = xe - ((xe - (x0 | inner)) & -right), ym = ye - ((ye - (y0 | inner)) & -below), yh = ym + ((y0 - 1 - ym) & -top);
+        const uint32_t keep_right = 0u - (uint32_t)right, keep_below = 0u - (uint32_t)below,
+                       keep_left = 0u - (uint32_t)left, keep_top = 0u - (uint32_t)top;
+        const int xm = xe - ((xe - (x0 | inner)) & -right), ym = ye - ((ye - (y0 | inner)) & -below),
+                  yh = ym + ((y0 - 1 - ym) & -top);
         const size_t xl = (size_t)(x0 - left);
-        const uint32_t *high = cells + (size_t)yh * t->stride, *middle = cells + (size_t)ym * t->stride, *low = cells + (size_t)ye * t->stride;
+        const uint32_t *high = cells + (size_t)yh * t->stride, *middle = cells + (size_t)ym * t->stride,
+                       *low = cells + (size_t)ye * t->stride;
         uint32_t da = (middle[xm] - (middle[xl] & keep_left)) - ((high[xm] - (high[xl] & keep_left)) & keep_top);
         uint32_t db = (middle[xe] - (high[xe] & keep_top)) & keep_right;
         uint32_t dc = (low[xm] - (low[xl] & keep_left)) & keep_below, dd = low[xe] & keep_right & keep_below;
@@ -3152,7 +3346,8 @@ static inline void sat__gauge_row(sat__gauge *g, const float *p, int n)
 {
     int i, j;
 #ifdef SAT__VECTOR
-    sat__f32x4 sum = sat__f32x4_load(g->sum), largest = sat__f32x4_load(g->largest), smallest = sat__f32x4_load(g->smallest);
+    sat__f32x4 sum = sat__f32x4_load(g->sum), largest = sat__f32x4_load(g->largest),
+               smallest = sat__f32x4_load(g->smallest);
     (void)j;
     for (i = 0; i < n; i += 4) {
         sat__f32x4 v = sat__f32x4_abs(sat__f32x4_load(p + i));
@@ -3202,7 +3397,8 @@ static int sat__find_above(const float *p, int n, float threshold, int *at, int 
     int i, j, count = 0;
     for (i = 0; i < n && count <= most; i += 4) {
 #ifdef SAT__VECTOR
-        if (!sat__i32x4_any(sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_abs(sat__f32x4_load(p + i))))) continue;
+        if (!sat__i32x4_any(sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_abs(sat__f32x4_load(p + i)))))
+            continue;
 #endif
         for (j = 0; j < 4; j++)
             if (fabsf(p[i + j]) > threshold && count++ < most) at[count - 1] = i + j;
@@ -3218,8 +3414,10 @@ static int sat__count_below(const float *p, int n, float threshold, int most)
 #ifdef SAT__VECTOR
         const sat__f32x4 limit = sat__f32x4_set1(threshold);
         for (; i + 16 <= n; i += 16) {
-            sat__f32x4 a = sat__f32x4_min(sat__f32x4_abs(sat__f32x4_load(p + i)), sat__f32x4_abs(sat__f32x4_load(p + i + 4)));
-            sat__f32x4 b = sat__f32x4_min(sat__f32x4_abs(sat__f32x4_load(p + i + 8)), sat__f32x4_abs(sat__f32x4_load(p + i + 12)));
+            sat__f32x4 a =
+                sat__f32x4_min(sat__f32x4_abs(sat__f32x4_load(p + i)), sat__f32x4_abs(sat__f32x4_load(p + i + 4)));
+            sat__f32x4 b =
+                sat__f32x4_min(sat__f32x4_abs(sat__f32x4_load(p + i + 8)), sat__f32x4_abs(sat__f32x4_load(p + i + 12)));
             if (sat__i32x4_any(sat__f32x4_less(sat__f32x4_min(a, b), limit))) break;
         }
         if (i >= n) break;
@@ -3347,7 +3545,8 @@ static void sat__tile_integers(uint32_t *out, const float *p, int n, double quan
 }
 
 /* A row of a tile, rounded and summed onto the rows above it; returns the last sum. `integers`: scratch. */
-static inline uint32_t sat__sum_tile_row(uint32_t *out, uint32_t *column, uint32_t *integers, const float *p, int n, double quantum, int stream)
+static inline uint32_t sat__sum_tile_row(uint32_t *out, uint32_t *column, uint32_t *integers, const float *p, int n,
+                                         double quantum, int stream)
 {
     int32_t signs = 0;
 #ifdef SAT__SSE2
@@ -3357,7 +3556,8 @@ static inline uint32_t sat__sum_tile_row(uint32_t *out, uint32_t *column, uint32
         int i;
         for (i = 0; i < n; i += 8) {
             a = _mm_add_epi32(SAT__LOAD_u32(column + i), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(p + i), scale)));
-            b = _mm_add_epi32(SAT__LOAD_u32(column + i + 4), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(p + i + 4), scale)));
+            b = _mm_add_epi32(SAT__LOAD_u32(column + i + 4),
+                              _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(p + i + 4), scale)));
             SAT__STORE_u32(column + i, a);
             SAT__STORE_u32(column + i + 4, b);
             a = sat__prefix_u32(a);
@@ -3401,12 +3601,14 @@ static void sat__settle_tile(const sat_table *t, sat__tile *tile, const sat__sou
     tile->quantum = sat__tile_quantum((double)e.sum, 31);
     tile->wants = 0;
     if (!(e.sum > 0) || !(e.smallest < threshold)) return;
-    for (y = 0; y < rows && count < 8; y++) count += sat__count_below(from->p + y * from->step, t->options.tile, threshold, 8 - count);
+    for (y = 0; y < rows && count < 8; y++)
+        count += sat__count_below(from->p + y * from->step, t->options.tile, threshold, 8 - count);
     tile->wants = count >= 8;
 }
 
 /* Takes a tile apart: scratch memory then holds what its cells sum. */
-static sat__extent sat__take_apart(const sat_table *t, float *p, int n, size_t index, int left, sat__giant *list, sat__tally *tally)
+static sat__extent sat__take_apart(const sat_table *t, float *p, int n, size_t index, int left, sat__giant *list,
+                                   sat__tally *tally)
 {
     sat__tile *tile = &t->tiles[index];
     sat__extent e;
@@ -3421,9 +3623,11 @@ static sat__extent sat__take_apart(const sat_table *t, float *p, int n, size_t i
 }
 
 /* The cells of a tile, and in `left` what it alone adds. */
-static void sat__sum_tile(const sat_table *t, const sat__source *from, int channel, int band, int tx, int rows, int worker, int stream)
+static void sat__sum_tile(const sat_table *t, const sat__source *from, int channel, int band, int tx, int rows,
+                          int worker, int stream)
 {
-    uint32_t *integers = t->tile_integers + (size_t)worker * 2 * SAT__MAX_TILE_SIDE, *column = integers + SAT__MAX_TILE_SIDE;
+    uint32_t *integers = t->tile_integers + (size_t)worker * 2 * SAT__MAX_TILE_SIDE,
+             *column = integers + SAT__MAX_TILE_SIDE;
     size_t index = sat__tile_index(t, channel, band, tx);
     const sat__tile *tile = &t->tiles[index];
     int y, side = t->options.tile, x0 = tx << t->shift, w = sat__min_int(side, t->width - x0);
@@ -3431,27 +3635,33 @@ static void sat__sum_tile(const sat_table *t, const sat__source *from, int chann
     double *left = sat__left(t, channel, band, 0) + tx, quantum = tile->quantum;
     memset(column, 0, (size_t)side * sizeof *column);
     for (y = 0; y < rows; y++) {
-        uint32_t sum = sat__sum_tile_row(cells + (size_t)y * t->stride, column, integers, from->p + y * from->step, w, quantum, stream);
-        left[(size_t)y * (size_t)t->tiles_x] = (double)(int32_t)sum * quantum + (tile->spikes ? sat__spike_sum(t, index, 0, 0, side, y + 1) : 0);
+        uint32_t sum = sat__sum_tile_row(cells + (size_t)y * t->stride, column, integers, from->p + y * from->step, w,
+                                         quantum, stream);
+        left[(size_t)y * (size_t)t->tiles_x] =
+            (double)(int32_t)sum * quantum + (tile->spikes ? sat__spike_sum(t, index, 0, 0, side, y + 1) : 0);
     }
 }
 
-/* Tile row `band` (row y0 of the image on), a panel of tiles at a time: their pixels are gauged row by row, as memory likes it,
-   and are still in the cache when each tile is summed. */
-static void sat__settle_band(const sat_table *t, const sat_image *image, int channel, int band, int y0, int worker, int stream)
+/* Tile row `band` (row y0 of the image on), a panel of tiles at a time: their pixels are gauged row by row, as memory
+   likes it, and are still in the cache when each tile is summed. */
+static void sat__settle_band(const sat_table *t, const sat_image *image, int channel, int band, int y0, int worker,
+                             int stream)
 {
     sat__gauge gauge[SAT__PANEL / 8];
     float *p = t->pixels + ((size_t)worker << 2 * t->shift);
     size_t at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
     sat__tally *tally = &t->tallies[at];
-    int panel, tx, y, side = t->options.tile, rows = sat__min_int(side, image->height - y0), step = SAT__PANEL >> t->shift;
+    int panel, tx, y, side = t->options.tile, rows = sat__min_int(side, image->height - y0),
+                      step = SAT__PANEL >> t->shift;
     memset(tally, 0, sizeof *tally);
     for (panel = 0; panel < t->tiles_x; panel += step) {
-        int stop = sat__min_int(panel + step, t->tiles_x), direct = sat__is_direct(image) ? sat__min_int(stop, t->width >> t->shift) : 0;
+        int stop = sat__min_int(panel + step, t->tiles_x),
+            direct = sat__is_direct(image) ? sat__min_int(stop, t->width >> t->shift) : 0;
         for (tx = panel; tx < direct; tx++) sat__gauge_clear(&gauge[tx - panel]);
         for (y = 0; y < rows; y++) {
             const float *row = (const float *)sat__image_row(image, y0 + y);
-            for (tx = panel; tx < direct; tx++) sat__gauge_row(&gauge[tx - panel], row + ((size_t)tx << t->shift), side);
+            for (tx = panel; tx < direct; tx++)
+                sat__gauge_row(&gauge[tx - panel], row + ((size_t)tx << t->shift), side);
         }
         for (tx = panel; tx < stop; tx++) {
             size_t index = sat__tile_index(t, channel, band, tx);
@@ -3483,14 +3693,17 @@ static void sat__assign_wide(const sat_table *t, int channel, int band, int tx, 
     int super = SAT__SUPER >> t->shift, supers = sat__supers(t);
     sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
     tile->slot = 0;
-    if (tile->wants && *used < t->wide_quota) tile->slot = (channel * supers + band / super % supers) * t->wide_quota + ++*used;
+    if (tile->wants && *used < t->wide_quota)
+        tile->slot = (channel * supers + band / super % supers) * t->wide_quota + ++*used;
 }
 
 /* 64-bit cells of one tile, from pixels that are taken apart once more. */
-static void sat__wide_tile(const sat_table *t, const sat_image *image, int channel, int band, int tx, int y0, int worker)
+static void sat__wide_tile(const sat_table *t, const sat_image *image, int channel, int band, int tx, int y0,
+                           int worker)
 {
     float *p = t->pixels + ((size_t)worker << 2 * t->shift);
-    size_t index = sat__tile_index(t, channel, band, tx), at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
+    size_t index = sat__tile_index(t, channel, band, tx),
+           at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
     sat__tile *tile = &t->tiles[index];
     uint64_t *cells = sat__wide_cells(t, tile->slot);
     double inverse = 1 / sat__wide_quantum(tile);
@@ -3503,14 +3716,17 @@ static void sat__wide_tile(const sat_table *t, const sat_image *image, int chann
         again.giants = first;
         sat__take_giants(t, p, n, tx << t->shift, t->giants + at * (size_t)t->giant_room, &again);
     }
-    for (i = 0; i < tile->spikes; i++) p[(t->spikes[index * SAT__SPIKES + (size_t)i].y << t->shift) + t->spikes[index * SAT__SPIKES + (size_t)i].x] = 0;
+    for (i = 0; i < tile->spikes; i++)
+        p[(t->spikes[index * SAT__SPIKES + (size_t)i].y << t->shift) + t->spikes[index * SAT__SPIKES + (size_t)i].x] =
+            0;
     for (y = 0; y < n >> t->shift; y++) {
         uint64_t run = 0, *out = cells + (size_t)y * t->wide_stride;
         for (x = 0; x < (int)t->wide_stride; x++) {
             run += (uint64_t)llrint((double)p[(y << t->shift) + x] * inverse);
             out[x] = y ? out[x - (int)t->wide_stride] + run : run;
         }
-        sat__left(t, channel, band, y)[tx] = sat__tile_part(t, channel, band, tx, 0, 0, sat__min_int(side, t->width - (tx << t->shift)), y + 1);
+        sat__left(t, channel, band, y)[tx] =
+            sat__tile_part(t, channel, band, tx, 0, 0, sat__min_int(side, t->width - (tx << t->shift)), y + 1);
     }
 }
 
@@ -3541,7 +3757,8 @@ static void sat__build_above(const sat_table *t, int channel, int band, int rows
 {
     int tx, x, super = SAT__SUPER >> t->shift, first = (band & (super - 1)) == 0;
     double *above = sat__above(t, channel, band), *whole = t->whole + sat__tile_index(t, channel, band, 0), run = 0;
-    const double *up = first ? NULL : sat__above(t, channel, band - 1), *whole_up = first ? NULL : t->whole + sat__tile_index(t, channel, band - 1, 0);
+    const double *up = first ? NULL : sat__above(t, channel, band - 1),
+                 *whole_up = first ? NULL : t->whole + sat__tile_index(t, channel, band - 1, 0);
     for (tx = 0; tx < t->tiles_x; tx++) {
         const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
         int x0 = tx << t->shift, w = sat__min_int(t->options.tile, t->width - x0);
@@ -3611,8 +3828,8 @@ static int sat__assign_supers(const sat__build *b)
     return moved;
 }
 
-/* Tile rows anew, then the strips below them to the end of their super tile row. Where a 64-bit tile elsewhere has to move,
-   whole super tile rows are built. */
+/* Tile rows anew, then the strips below them to the end of their super tile row. Where a 64-bit tile elsewhere has to
+   move, whole super tile rows are built. */
 static void sat__build_tiled(sat__build *b)
 {
     const sat_table *t = b->table;
@@ -3644,12 +3861,13 @@ typedef union sat__carry {
 } sat__carry;
 
 /* Row sums of pixels [x0, x0 + n) into a row of a flat table. */
-static void sat__flat_piece(const sat_table *t, const sat_image *image, int channel, int y, int x0, int n, unsigned char *row,
-                            sat__carry *carry, int worker, int care, sat__tally *tally, int stream)
+static void sat__flat_piece(const sat_table *t, const sat_image *image, int channel, int y, int x0, int n,
+                            unsigned char *row, sat__carry *carry, int worker, int care, sat__tally *tally, int stream)
 {
     const float *in = sat__prepare(t, image, y, x0, n, channel, worker, care, tally);
     uint64_t *integers = t->integers ? t->integers + (size_t)worker * SAT__MAX_STRIP : NULL;
-    void *out = row + ((size_t)x0 + 1) * t->element, *column = t->columns + (size_t)channel * t->columns_stride + (size_t)x0 * t->element;
+    void *out = row + ((size_t)x0 + 1) * t->element,
+         *column = t->columns + (size_t)channel * t->columns_stride + (size_t)x0 * t->element;
     int32_t signs = 0;
     if (integers) sat__quantise(t, integers, in, n);
     switch (t->options.kind) {
@@ -3657,8 +3875,13 @@ static void sat__flat_piece(const sat_table *t, const sat_image *image, int chan
         carry->f64 = sat__sum_row_f64((double *)out, (double *)column, in, n, carry->f64, stream, &signs);
         tally->overflow |= !sat__is_finite_double(carry->f64);
         break;
-    case SAT_KIND_FIXED32: carry->u32 = sat__sum_row_u32((uint32_t *)out, (uint32_t *)column, (uint32_t *)(void *)integers, n, carry->u32, stream, &signs); break;
-    case SAT_KIND_FIXED64: carry->u64 = sat__sum_row_u64((uint64_t *)out, (uint64_t *)column, integers, n, carry->u64, stream, &signs); break;
+    case SAT_KIND_FIXED32:
+        carry->u32 = sat__sum_row_u32((uint32_t *)out, (uint32_t *)column, (uint32_t *)(void *)integers, n, carry->u32,
+                                      stream, &signs);
+        break;
+    case SAT_KIND_FIXED64:
+        carry->u64 = sat__sum_row_u64((uint64_t *)out, (uint64_t *)column, integers, n, carry->u64, stream, &signs);
+        break;
     case SAT_KIND_TILED: break;
     case SAT_KIND_FLOAT:
         carry->f32 = sat__sum_row_f32((float *)out, (float *)column, in, n, carry->f32, stream, &signs);
@@ -3678,8 +3901,9 @@ static void sat__flat_block(const sat__build *b, int strip0, int strip1, int y0,
         sat__carry carry;
         memcpy(&carry, row + (size_t)strip0 * SAT__STRIP * t->element, t->element);
         for (strip = strip0; strip < strip1; strip++)
-            sat__flat_piece(t, b->image, b->channel, y, strip * SAT__STRIP, sat__min_int(SAT__STRIP, t->width - strip * SAT__STRIP),
-                            row, &carry, worker, b->care, t->tallies + b->channel * t->bands + strip, b->stream);
+            sat__flat_piece(t, b->image, b->channel, y, strip * SAT__STRIP,
+                            sat__min_int(SAT__STRIP, t->width - strip * SAT__STRIP), row, &carry, worker, b->care,
+                            t->tallies + b->channel * t->bands + strip, b->stream);
     }
 }
 
@@ -3693,8 +3917,8 @@ static void sat__build_diagonal(int begin, int end, int worker, void *context)
     }
 }
 
-/* Flat tables. One worker goes down the rows. Several take the blocks of one anti-diagonal after the other, each of which
-   needs only blocks of the diagonal before. Same additions, same bits. */
+/* Flat tables. One worker goes down the rows. Several take the blocks of one anti-diagonal after the other, each of
+   which needs only blocks of the diagonal before. Same additions, same bits. */
 static void sat__build_flat(sat__build *b)
 {
     const sat_table *t = b->table;
@@ -3710,7 +3934,8 @@ static void sat__build_flat(sat__build *b)
         }
         for (b->diagonal = 0; b->diagonal < t->bands + blocks - 1; b->diagonal++) {
             b->first_strip = sat__max_int(0, b->diagonal - blocks + 1);
-            sat__parallel_for(&t->options.threads, sat__min_int(b->diagonal + 1, t->bands) - b->first_strip, sat__build_diagonal, b);
+            sat__parallel_for(&t->options.threads, sat__min_int(b->diagonal + 1, t->bands) - b->first_strip,
+                              sat__build_diagonal, b);
         }
     }
 }
@@ -3724,7 +3949,8 @@ static void sat__tally_flat(sat_table *t, const sat_image *image)
         sat__tally *total = &t->total[channel];
         if (!total->negative) {
             const unsigned char *corner = sat__row(t, channel, t->height) + (size_t)t->width * t->element;
-            total->sum_abs = t->options.kind == SAT_KIND_FLOAT ? (double)*(const float *)(const void *)corner : *(const double *)(const void *)corner;
+            total->sum_abs = t->options.kind == SAT_KIND_FLOAT ? (double)*(const float *)(const void *)corner
+                                                               : *(const double *)(const void *)corner;
             continue;
         }
         for (y = 0; y < t->height; y++)
@@ -3792,7 +4018,8 @@ static sat_result sat__resolve(sat_table *t, const sat_image *image)
 /* Integers cannot show that they overflowed, and a stated largest value is to be kept. */
 static int sat__first_care(const sat_table *t)
 {
-    return sat__is_fixed(t->options.kind) || t->options.max_value > 0 || t->options.subtract_mean ? SAT__CLAMP_ALL : SAT__TRUST;
+    return sat__is_fixed(t->options.kind) || t->options.max_value > 0 || t->options.subtract_mean ? SAT__CLAMP_ALL
+                                                                                                  : SAT__TRUST;
 }
 
 /* Hensley 2005: the mean of each channel, as the float that every pixel is lowered by. */
@@ -3869,7 +4096,8 @@ static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_b
     if (t->options.kind == SAT_KIND_TILED) {
         sat__build_tiled(&b);
         sat__total(t);
-        for (t->has_giants = channel = 0; channel < t->channels; channel++) t->has_giants |= t->total[channel].giants > 0;
+        for (t->has_giants = channel = 0; channel < t->channels; channel++)
+            t->has_giants |= t->total[channel].giants > 0;
     } else {
         for (; b.care <= SAT__CLAMP_ALL; b.care++) {
             sat__build_flat(&b);
@@ -3881,7 +4109,8 @@ static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_b
 #endif
     t->refused = 0;
     for (channel = 0; channel < t->channels; channel++)
-        if (t->total[channel].nan || t->total[channel].infinite) t->refused = t->options.non_finite == SAT_NON_FINITE_REFUSE;
+        if (t->total[channel].nan || t->total[channel].infinite)
+            t->refused = t->options.non_finite == SAT_NON_FINITE_REFUSE;
     if (t->refused) sat__clear(t);
     else if (t->options.kind == SAT_KIND_FLOAT || t->options.kind == SAT_KIND_DOUBLE) sat__tally_flat(t, image);
     return t->refused ? SAT_ERR_NON_FINITE : SAT_OK;
@@ -3944,9 +4173,10 @@ static sat__rows sat__rows_at(const sat_table *t, int channel, int y0, int y1)
     return r;
 }
 
-/* Integer differences wrap around, and the true sum is the representative near zero. `kind` is the table's: loops pass it
-   as a constant. */
-static inline double sat__rows_sum(const sat_table *t, sat_kind kind, const sat__rows *r, int channel, int x0, int x1, int height)
+/* Integer differences wrap around, and the true sum is the representative near zero. `kind` is the table's: loops pass
+   it as a constant. */
+static inline double sat__rows_sum(const sat_table *t, sat_kind kind, const sat__rows *r, int channel, int x0, int x1,
+                                   int height)
 {
     double sum = 0;
     switch (kind) {
@@ -4106,10 +4336,12 @@ SAT_DEF double sat_mean_border(const sat_table *table, int channel, double x0, d
 {
     sat__pieces px, py;
     double area;
-    if (!table || (unsigned)border_x > (unsigned)SAT_BORDER_WRAP || (unsigned)border_y > (unsigned)SAT_BORDER_WRAP) return 0;
+    if (!table || (unsigned)border_x > (unsigned)SAT_BORDER_WRAP || (unsigned)border_y > (unsigned)SAT_BORDER_WRAP)
+        return 0;
     if (!(x0 < x1) || !(y0 < y1)) return 0;
     if (!(fabs(x0) < 1e15) || !(fabs(x1) < 1e15) || !(fabs(y0) < 1e15) || !(fabs(y1) < 1e15)) return 0;
-    area = sat__border_pieces(&px, x0, x1, table->width, border_x) * sat__border_pieces(&py, y0, y1, table->height, border_y);
+    area = sat__border_pieces(&px, x0, x1, table->width, border_x) *
+           sat__border_pieces(&py, y0, y1, table->height, border_y);
     return area > 0 ? sat__sum_pieces(table, channel, &px, &py) / area : 0;
 }
 
@@ -4124,12 +4356,14 @@ typedef struct sat__filter {
 } sat__filter;
 
 /* One output row: box means of `height` rows between two corner rows. */
-static inline void sat__filter_kind(float *out, const sat_table *t, sat_kind kind, const sat__rows *rows, int channel, int radius, int height)
+static inline void sat__filter_kind(float *out, const sat_table *t, sat_kind kind, const sat__rows *rows, int channel,
+                                    int radius, int height)
 {
     int x, step = t->channels, width = t->width;
     for (x = 0; x < width; x++) {
         int x0 = x > radius ? x - radius : 0, x1 = width - x > radius ? x + radius + 1 : width;
-        out[(size_t)x * (size_t)step] = (float)(sat__rows_sum(t, kind, rows, channel, x0, x1, height) / ((double)(x1 - x0) * (double)height));
+        out[(size_t)x * (size_t)step] =
+            (float)(sat__rows_sum(t, kind, rows, channel, x0, x1, height) / ((double)(x1 - x0) * (double)height));
     }
 }
 
@@ -4161,7 +4395,8 @@ static void sat__tile_columns(double *v, const sat_table *t, int channel, const 
             for (i = 0; i < n; i++) v[i] += sat__wide_part(t, tile, 0, y->begin[j], x + i + 1, y->end[j]);
         else {
             const uint32_t *high = sat__cells(t, channel, y->tile[j], y->end[j] - 1) + ((size_t)tx << t->shift) + x;
-            sat__add_cells(v, high, y->begin[j] ? high - (size_t)(y->end[j] - y->begin[j]) * t->stride : NULL, n, tile->quantum);
+            sat__add_cells(v, high, y->begin[j] ? high - (size_t)(y->end[j] - y->begin[j]) * t->stride : NULL, n,
+                           tile->quantum);
         }
     }
     while (b < y->run1) {
@@ -4174,7 +4409,8 @@ static void sat__tile_columns(double *v, const sat_table *t, int channel, const 
 }
 
 /* Spikes of one tile onto the boxes of n output pixels from x on. */
-static void sat__add_spikes(double *sum, const sat_table *t, int channel, const sat__span *y, int tx, int radius, int x, int n)
+static void sat__add_spikes(double *sum, const sat_table *t, int channel, const sat__span *y, int tx, int radius, int x,
+                            int n)
 {
     int i, j, k;
     for (j = 0; j < y->count; j++) {
@@ -4200,11 +4436,13 @@ static double sat__line_edge(sat__filter_line *f, int tx)
 {
     const sat_table *t = f->table;
     for (; f->edge_end <= tx; f->edge_end++)
-        sat__tile_columns(&f->edge[f->edge_end & 511], t, f->channel, &f->y, f->edge_end, sat__min_int(t->options.tile, t->width - (f->edge_end << t->shift)) - 1, 1);
+        sat__tile_columns(&f->edge[f->edge_end & 511], t, f->channel, &f->y, f->edge_end,
+                          sat__min_int(t->options.tile, t->width - (f->edge_end << t->shift)) - 1, 1);
     if (f->edge_end - tx <= 512) return f->edge[tx & 511];
     else {
         double e;
-        sat__tile_columns(&e, t, f->channel, &f->y, tx, sat__min_int(t->options.tile, t->width - (tx << t->shift)) - 1, 1);
+        sat__tile_columns(&e, t, f->channel, &f->y, tx, sat__min_int(t->options.tile, t->width - (tx << t->shift)) - 1,
+                          1);
         return e;
     }
 }
@@ -4233,11 +4471,13 @@ static void sat__line_sums(double *sum, sat__filter_line *f, int x, int n, int f
     for (tx = first; tx <= last; tx++) sat__add_spikes(sum, t, f->channel, &f->y, tx, r, x, n);
     /* spikes of whole tile rows are in the strips already */
     if (f->giants)
-        for (i = 0; i < n; i++) sum[i] += sat__giant_sum(t, f->channel, sat__max_int(x + i - r, 0), f->y0, sat__min_int(x + i + r + 1, t->width), f->y1);
+        for (i = 0; i < n; i++)
+            sum[i] += sat__giant_sum(t, f->channel, sat__max_int(x + i - r, 0), f->y0,
+                                     sat__min_int(x + i + r + 1, t->width), f->y1);
 }
 
-/* The same of a tiled table, from its rows [y0, y1): a vertical difference in each tile, then a loop over the pixels whose boxes
-   touch the same tiles. */
+/* The same of a tiled table, from its rows [y0, y1): a vertical difference in each tile, then a loop over the pixels
+   whose boxes touch the same tiles. */
 static void sat__filter_tiled(float *out, const sat_table *t, int channel, int radius, int y0, int y1)
 {
     sat__filter_line f;
@@ -4307,8 +4547,9 @@ static void sat__filter_variable_rows(int begin, int end, int worker, void *cont
             double reach = radii[x] > 0 ? (double)radii[x] + 0.5 : 0.5, limit = (double)t->width + t->height;
             if (!(reach < limit)) reach = sat__is_nan(radii[x]) ? 0.5 : limit;
             for (channel = 0; channel < t->channels; channel++)
-                out[x * t->channels + channel] = (float)sat_mean_border(t, channel, x + 0.5 - reach, y + 0.5 - reach, x + 0.5 + reach,
-                                                                        y + 0.5 + reach, SAT_BORDER_CLIP, SAT_BORDER_CLIP);
+                out[x * t->channels + channel] =
+                    (float)sat_mean_border(t, channel, x + 0.5 - reach, y + 0.5 - reach, x + 0.5 + reach,
+                                           y + 0.5 + reach, SAT_BORDER_CLIP, SAT_BORDER_CLIP);
         }
     }
 }
@@ -4323,7 +4564,8 @@ static int sat__stride_is_valid(const sat_table *t, ptrdiff_t stride, int channe
 SAT_DEF sat_result sat_box_filter(float *out, ptrdiff_t out_stride, const sat_table *table, int radius)
 {
     sat__filter f;
-    if (!out || !table || radius < 0 || !sat__stride_is_valid(table, out_stride, table->channels)) return SAT_ERR_ARGUMENT;
+    if (!out || !table || radius < 0 || !sat__stride_is_valid(table, out_stride, table->channels))
+        return SAT_ERR_ARGUMENT;
     memset(&f, 0, sizeof f);
     f.table = table;
     f.out = (unsigned char *)out;
@@ -4382,8 +4624,8 @@ SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_widt
     return sat__sum_bound(table, &table->total[channel], w, h) / (w * h);
 }
 
-/* The last rounding of each corner is independent of the others, and so are those that the corners of a box do not share:
-   squares add. The factors are fitted to measured errors (bench_sat, table "Expected error"). */
+/* The last rounding of each corner is independent of the others, and so are those that the corners of a box do not
+   share: squares add. The factors are fitted to measured errors (bench_sat, table "Expected error"). */
 SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width, int box_height)
 {
     const double u = 5.9604644775390625e-8, v = 1.1102230246251565e-16; /* 2^-24, 2^-53 */
@@ -4429,13 +4671,15 @@ static void sat__survey(sat_table *t, const sat_image *image, double *tile_sums,
 static sat_result sat__plan(sat_kind *kind, int whole, const sat_image *image, int box_width, int box_height,
                             double max_relative_error, size_t max_bytes, const sat_options *options)
 {
-    static const sat_kind cheapest_first[] = {SAT_KIND_FLOAT, SAT_KIND_FIXED32, SAT_KIND_TILED, SAT_KIND_DOUBLE, SAT_KIND_FIXED64};
+    static const sat_kind cheapest_first[] = {SAT_KIND_FLOAT, SAT_KIND_FIXED32, SAT_KIND_TILED, SAT_KIND_DOUBLE,
+                                              SAT_KIND_FIXED64};
     sat_options resolved = options ? *options : sat_defaults();
     sat_table *survey, t;
     double allowed, area, best = -1, *tile_sums, largest_tile = 0;
     sat_result result;
     int i;
-    if (!kind || !sat__image_is_valid(image) || box_width < 1 || box_height < 1 || !(max_relative_error >= 0)) return SAT_ERR_ARGUMENT;
+    if (!kind || !sat__image_is_valid(image) || box_width < 1 || box_height < 1 || !(max_relative_error >= 0))
+        return SAT_ERR_ARGUMENT;
     resolved.kind = SAT_KIND_DOUBLE;
     resolved.subtract_mean = 0;
     /* a one-row table holds all the scratch memory this needs; its row takes the tile sums */
@@ -4500,8 +4744,8 @@ SAT_DEF sat_result sat_plan_options(sat_options *out, const sat_image *image, in
 
 /* ---- moments
 
-   A tile holds local sums of d = x - m and of products d d', m the tile's mean as a float. A box takes from each tile that it
-   touches the count, the means and the co-moment; (n, mean, M) are joined pairwise (Chan, Golub, LeVeque 1983):
+   A tile holds local sums of d = x - m and of products d d', m the tile's mean as a float. A box takes from each tile
+   that it touches the count, the means and the co-moment; (n, mean, M) are joined pairwise (Chan, Golub, LeVeque 1983):
 
      M = M1 + M2 + delta_x delta_y n1 n2 / (n1 + n2) */
 
@@ -4533,10 +4777,12 @@ SAT_DEF sat_moments_options sat_moments_defaults(void)
     return options;
 }
 
-SAT_DEF const char *sat_explain_moments(char *text, size_t size, int width, int height, int channels, const sat_moments_options *options)
+SAT_DEF const char *sat_explain_moments(char *text, size_t size, int width, int height, int channels,
+                                        const sat_moments_options *options)
 {
     sat__text t = sat__text_begin(text, size);
-    const sat__field *wrong = options ? sat__fields_check(options, sat__moments_fields, SAT__COUNT(sat__moments_fields)) : NULL;
+    const sat__field *wrong =
+        options ? sat__fields_check(options, sat__moments_fields, SAT__COUNT(sat__moments_fields)) : NULL;
     if (sat__explain_size(&t, width, height, channels) && wrong) sat__text_field(&t, wrong, options);
     return text;
 }
@@ -4549,7 +4795,9 @@ static size_t sat__moments_lay_out(sat_moments *m, unsigned char *base)
     arena.used = 0;
     arena.overflow = 0;
     m->stride = (size_t)m->width;
-    if (!sat__multiply_size(&m->plane, m->stride, (size_t)m->height) || !sat__multiply_size(&count, m->plane, (size_t)m->planes)) return 0;
+    if (!sat__multiply_size(&m->plane, m->stride, (size_t)m->height) ||
+        !sat__multiply_size(&count, m->plane, (size_t)m->planes))
+        return 0;
     m->sums = (double *)sat__carve(&arena, count, sizeof(double));
     m->means = (float *)sat__carve(&arena, (size_t)m->tiles_x * (size_t)m->tiles_y * channels, sizeof(float));
     m->pixels = (float *)sat__carve(&arena, workers * channels * SAT__MOMENT_TILE * SAT__MOMENT_TILE, sizeof(float));
@@ -4557,7 +4805,8 @@ static size_t sat__moments_lay_out(sat_moments *m, unsigned char *base)
     return arena.overflow ? 0 : arena.used;
 }
 
-SAT_DEF sat_result sat_moments_create(sat_moments **out, int width, int height, int channels, const sat_moments_options *options)
+SAT_DEF sat_result sat_moments_create(sat_moments **out, int width, int height, int channels,
+                                      const sat_moments_options *options)
 {
     sat_moments m;
     unsigned char *base;
@@ -4623,7 +4872,8 @@ static float sat__moment_mean(float *p, int w, int h, size_t *bad)
 }
 
 /* Local sums of (p - mean_p), or of (p - mean_p)(q - mean_q) where there is a q. */
-static void sat__moment_sums(double *out, size_t stride, const float *p, double mean_p, const float *q, double mean_q, int w, int h)
+static void sat__moment_sums(double *out, size_t stride, const float *p, double mean_p, const float *q, double mean_q,
+                             int w, int h)
 {
     int x, y;
     for (y = 0; y < h; y++, out += stride, p += SAT__MOMENT_TILE, q += q ? SAT__MOMENT_TILE : 0) {
@@ -4659,10 +4909,11 @@ static void sat__moments_rows(int begin, int end, int worker, void *context)
                 for (y = 0; y < h; y++) sat__read_row(tile + c * AREA + y * SIDE, b->image, y0 + y, x0, x0 + w, c);
                 mean[c] = sat__moment_mean(tile + c * AREA, w, h, &m->bad[ty]);
                 m->means[(size_t)c * tiles + (size_t)ty * (size_t)m->tiles_x + (size_t)tx] = mean[c];
-                sat__moment_sums(m->sums + (size_t)c * m->plane + at, m->stride, tile + c * AREA, (double)mean[c], NULL, 0, w, h);
+                sat__moment_sums(m->sums + (size_t)c * m->plane + at, m->stride, tile + c * AREA, (double)mean[c], NULL,
+                                 0, w, h);
                 for (other = m->options.covariance ? 0 : c; other <= c; other++)
-                    sat__moment_sums(m->sums + (size_t)sat__moment_plane(m, other, c) * m->plane + at, m->stride, tile + c * AREA,
-                                     (double)mean[c], tile + other * AREA, (double)mean[other], w, h);
+                    sat__moment_sums(m->sums + (size_t)sat__moment_plane(m, other, c) * m->plane + at, m->stride,
+                                     tile + c * AREA, (double)mean[c], tile + other * AREA, (double)mean[other], w, h);
             }
         }
     }
@@ -4674,19 +4925,22 @@ SAT_DEF sat_result sat_moments_build(sat_moments *moments, const sat_image *imag
     size_t bad = 0;
     int i;
     if (!moments || !sat__image_is_valid(image)) return SAT_ERR_ARGUMENT;
-    if (image->width != moments->width || image->height != moments->height || image->channels != moments->channels) return SAT_ERR_MISMATCH;
+    if (image->width != moments->width || image->height != moments->height || image->channels != moments->channels)
+        return SAT_ERR_MISMATCH;
     b.moments = moments;
     b.image = image;
     sat__parallel_for(&moments->options.threads, moments->tiles_y, sat__moments_rows, &b);
     for (i = 0; i < moments->tiles_y; i++) bad += moments->bad[i];
     if (!bad || moments->options.non_finite != SAT_NON_FINITE_REFUSE) return SAT_OK;
     memset(moments->sums, 0, moments->plane * (size_t)moments->planes * sizeof(double));
-    memset(moments->means, 0, (size_t)moments->tiles_x * (size_t)moments->tiles_y * (size_t)moments->channels * sizeof(float));
+    memset(moments->means, 0,
+           (size_t)moments->tiles_x * (size_t)moments->tiles_y * (size_t)moments->channels * sizeof(float));
     return SAT_ERR_NON_FINITE;
 }
 
 /* Four corners inside one tile; x0, y0 are the tile's own where a corner lies on its border. */
-static inline double sat__moment_corners(const double *p, size_t stride, int left, int top, int x0, int y0, int x1, int y1)
+static inline double sat__moment_corners(const double *p, size_t stride, int left, int top, int x0, int y0, int x1,
+                                         int y1)
 {
     const double *high = p + (size_t)(y1 - 1) * stride, *low = high - (size_t)(y1 - y0) * stride;
     double sum = high[x1 - 1];
@@ -4699,16 +4953,23 @@ typedef struct sat__moment {
     double n, a, b, co; /* count, means, co-moment */
 } sat__moment;
 
-static inline void sat__moment_join(sat__moment *m, const sat_moments *t, int channel, int other, int plane, int tx, int ty, const int box[4])
+static inline void sat__moment_join(sat__moment *m, const sat_moments *t, int channel, int other, int plane, int tx,
+                                    int ty, const int box[4])
 {
     size_t tiles = (size_t)t->tiles_x * (size_t)t->tiles_y, tile = (size_t)ty * (size_t)t->tiles_x + (size_t)tx;
     int left = tx * SAT__MOMENT_TILE, top = ty * SAT__MOMENT_TILE;
     int x0 = sat__max_int(box[0], left), y0 = sat__max_int(box[1], top);
-    int x1 = sat__min_int(box[2] - left, SAT__MOMENT_TILE) + left, y1 = sat__min_int(box[3] - top, SAT__MOMENT_TILE) + top;
+    int x1 = sat__min_int(box[2] - left, SAT__MOMENT_TILE) + left,
+        y1 = sat__min_int(box[3] - top, SAT__MOMENT_TILE) + top;
     double n = (double)(x1 - x0) * (double)(y1 - y0), both = m->n + n, a, b, co, delta_a, delta_b;
     a = sat__moment_corners(t->sums + (size_t)channel * t->plane, t->stride, x0 == left, y0 == top, x0, y0, x1, y1);
-    b = other == channel ? a : sat__moment_corners(t->sums + (size_t)other * t->plane, t->stride, x0 == left, y0 == top, x0, y0, x1, y1);
-    co = plane < 0 ? 0 : sat__moment_corners(t->sums + (size_t)plane * t->plane, t->stride, x0 == left, y0 == top, x0, y0, x1, y1) - a * b / n;
+    b = other == channel
+            ? a
+            : sat__moment_corners(t->sums + (size_t)other * t->plane, t->stride, x0 == left, y0 == top, x0, y0, x1, y1);
+    co = plane < 0 ? 0
+                   : sat__moment_corners(t->sums + (size_t)plane * t->plane, t->stride, x0 == left, y0 == top, x0, y0,
+                                         x1, y1) -
+                         a * b / n;
     if (other == channel && !(co > 0)) co = 0;
     delta_a = (double)t->means[(size_t)channel * tiles + tile] + a / n - m->a;
     delta_b = other == channel ? delta_a : (double)t->means[(size_t)other * tiles + tile] + b / n - m->b;
@@ -4719,7 +4980,8 @@ static inline void sat__moment_join(sat__moment *m, const sat_moments *t, int ch
 }
 
 /* plane < 0: means only. */
-static sat__moment sat__moment_box(const sat_moments *t, int channel, int other, int plane, int x0, int y0, int x1, int y1)
+static sat__moment sat__moment_box(const sat_moments *t, int channel, int other, int plane, int x0, int y0, int x1,
+                                   int y1)
 {
     sat__moment m;
     int box[4], tx, ty;
@@ -4743,7 +5005,9 @@ static int sat__moment_pair_is_valid(const sat_moments *m, int channel, int othe
 
 SAT_DEF double sat_moments_mean(const sat_moments *moments, int channel, int x0, int y0, int x1, int y1)
 {
-    return sat__moment_pair_is_valid(moments, channel, channel) ? sat__moment_box(moments, channel, channel, -1, x0, y0, x1, y1).a : 0;
+    return sat__moment_pair_is_valid(moments, channel, channel)
+               ? sat__moment_box(moments, channel, channel, -1, x0, y0, x1, y1).a
+               : 0;
 }
 
 SAT_DEF double sat_covariance(const sat_moments *moments, int channel, int other, int x0, int y0, int x1, int y1)
@@ -4776,20 +5040,23 @@ static void sat__moments_filter_rows(int begin, int end, int worker, void *conte
         float *out = (float *)(void *)(f->out + (ptrdiff_t)y * f->stride);
         float *mean = f->mean ? (float *)(void *)(f->mean + (ptrdiff_t)y * f->stride) : NULL;
         for (x = 0; x < t->width; x++) {
-            sat__moment m = sat__moment_box(t, f->channel, f->other, plane, x > r ? x - r : 0, y > r ? y - r : 0,
-                                            t->width - x > r ? x + r + 1 : t->width, t->height - y > r ? y + r + 1 : t->height);
+            sat__moment m =
+                sat__moment_box(t, f->channel, f->other, plane, x > r ? x - r : 0, y > r ? y - r : 0,
+                                t->width - x > r ? x + r + 1 : t->width, t->height - y > r ? y + r + 1 : t->height);
             out[x] = (float)(m.co / m.n);
             if (mean) mean[x] = (float)m.a;
         }
     }
 }
 
-SAT_DEF sat_result sat_moments_filter(float *out, float *mean, ptrdiff_t out_stride, const sat_moments *moments, int channel, int other, int radius)
+SAT_DEF sat_result sat_moments_filter(float *out, float *mean, ptrdiff_t out_stride, const sat_moments *moments,
+                                      int channel, int other, int radius)
 {
     sat__moments_filter f;
     size_t step = out_stride < 0 ? (size_t)0 - (size_t)out_stride : (size_t)out_stride;
     if (!out || !moments || radius < 0 || !sat__moment_pair_is_valid(moments, channel, other)) return SAT_ERR_ARGUMENT;
-    if (step % sizeof(float) || (moments->height > 1 && step / sizeof(float) < (size_t)moments->width)) return SAT_ERR_ARGUMENT;
+    if (step % sizeof(float) || (moments->height > 1 && step / sizeof(float) < (size_t)moments->width))
+        return SAT_ERR_ARGUMENT;
     memset(&f, 0, sizeof f);
     f.moments = moments;
     f.out = (unsigned char *)out;
@@ -4826,9 +5093,11 @@ SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, 
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (resolved.kind == SAT_KIND_TILED && radius > SAT__MAX_STREAM_RADIUS) return SAT_ERR_SIZE;
-    if (radius < 0 || radius > 0x3fffffff - 2 || resolved.subtract_mean || !sat__options_are_valid(&resolved)) return SAT_ERR_ARGUMENT;
+    if (radius < 0 || radius > 0x3fffffff - 2 || resolved.subtract_mean || !sat__options_are_valid(&resolved))
+        return SAT_ERR_ARGUMENT;
     if (sat__is_fixed(resolved.kind)) {
-        if (!(resolved.quantum > 0) && !(resolved.max_value > 0)) return SAT_ERR_ARGUMENT; /* the largest pixel is not known yet */
+        if (!(resolved.quantum > 0) && !(resolved.max_value > 0))
+            return SAT_ERR_ARGUMENT; /* the largest pixel is not known yet */
         if (!(resolved.max_box_area > 0)) resolved.max_box_area = (2.0 * radius + 1) * (2.0 * radius + 1);
     }
     memset(&resolved.threads, 0, sizeof resolved.threads);
@@ -4838,7 +5107,9 @@ SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, 
     memset(stream, 0, sizeof *stream);
     stream->radius = radius;
     bands = (2 * radius + 1) / resolved.tile + 3;
-    if (resolved.kind == SAT_KIND_TILED) result = sat__table_create(&stream->table, width, 2 * radius + 2, bands * resolved.tile, bands, 1, channels, &resolved);
+    if (resolved.kind == SAT_KIND_TILED)
+        result = sat__table_create(&stream->table, width, 2 * radius + 2, bands * resolved.tile, bands, 1, channels,
+                                   &resolved);
     else result = sat__table_create(&stream->table, width, 2 * radius + 2, 2 * radius + 2, 1, 0, channels, &resolved);
     if (result) sat__release(&allocator, stream, sizeof *stream);
     else *out = stream;
@@ -4854,10 +5125,13 @@ SAT_DEF void sat_stream_destroy(sat_stream *stream)
     }
 }
 
-static int sat__ring_row(const sat_stream *s, uint64_t corner_row) { return (int)(corner_row % (uint64_t)s->table->rows); }
+static int sat__ring_row(const sat_stream *s, uint64_t corner_row)
+{
+    return (int)(corner_row % (uint64_t)s->table->rows);
+}
 
-/* Tile rows and pixel rows of a tiled ring are counted modulo this many tile rows, so that an int holds them and all that
-   repeats (slots, super tile rows, their pools) stays in step. */
+/* Tile rows and pixel rows of a tiled ring are counted modulo this many tile rows, so that an int holds them and all
+   that repeats (slots, super tile rows, their pools) stays in step. */
 static int sat__ring_period(const sat_table *t) { return t->tiles_y * (SAT__SUPER >> t->shift) * sat__supers(t); }
 
 /* The tile row that the rows taken last fill, or the last rows of the image. */
@@ -4884,7 +5158,8 @@ static void sat__stream_take(sat_stream *s, const sat_image *row)
     sat_table *t = s->table;
     uint64_t corner_row = s->taken + 1;
     int channel, x, slot = sat__ring_row(s, corner_row);
-    int care = sat__first_care(t) == SAT__TRUST ? SAT__REPLACE_NON_FINITE : SAT__CLAMP_ALL; /* no row can be built again */
+    int care =
+        sat__first_care(t) == SAT__TRUST ? SAT__REPLACE_NON_FINITE : SAT__CLAMP_ALL; /* no row can be built again */
     if (t->options.kind == SAT_KIND_TILED) {
         float *rows = t->ring_pixels + (size_t)(s->taken - s->built) * (size_t)t->width * (size_t)t->channels;
         for (channel = 0; channel < t->channels; channel++)
@@ -4903,7 +5178,8 @@ static void sat__stream_take(sat_stream *s, const sat_image *row)
         memset(sums, 0, t->element);
         memset(&carry, 0, sizeof carry);
         for (x = 0; x < t->width; x += SAT__STRIP)
-            sat__flat_piece(t, row, channel, 0, x, sat__min_int(SAT__STRIP, t->width - x), sums, &carry, 0, care, &t->total[channel], 0);
+            sat__flat_piece(t, row, channel, 0, x, sat__min_int(SAT__STRIP, t->width - x), sums, &carry, 0, care,
+                            &t->total[channel], 0);
     }
     s->taken++;
 }
@@ -4937,7 +5213,8 @@ SAT_DEF sat_result sat_stream_push(sat_stream *stream, float *out_row, int *rows
         sat__rows rows;
         if (t->options.kind == SAT_KIND_TILED) {
             uint64_t period = (uint64_t)sat__ring_period(t) << t->shift;
-            sat__filter_tiled(out_row + channel, t, channel, stream->radius, (int)(low % period), (int)(low % period + (high - low)));
+            sat__filter_tiled(out_row + channel, t, channel, stream->radius, (int)(low % period),
+                              (int)(low % period + (high - low)));
             continue;
         }
         rows = sat__rows_at(t, channel, sat__ring_row(stream, low), sat__ring_row(stream, high));
@@ -4970,10 +5247,10 @@ extern "C" {
 /* ---- shaders */
 
 /* Two-float sums: with the larger term first, the rounding error of a sum is exact (Dekker 1971). A compiler that takes
-   sums for associative would lose it, and GLSL 3.30 has no `precise`: so every rounded sum is multiplied by a 1 that the
-   compiler cannot see. An R32F table reads as two-floats with a low part of zero. Lookups follow Slomp 2012, eq 4.2 to
-   4.4: zero left and above, clamped right and below; they take differences of neighbours first. A fractional box is nine
-   boxes: the cells that its border cuts, weighted, and what lies between them. */
+   sums for associative would lose it, and GLSL 3.30 has no `precise`: so every rounded sum is multiplied by a 1 that
+   the compiler cannot see. An R32F table reads as two-floats with a low part of zero. Lookups follow Slomp 2012, eq 4.2
+   to 4.4: zero left and above, clamped right and below; they take differences of neighbours first. A fractional box is
+   nine boxes: the cells that its border cuts, weighted, and what lies between them. */
 static const char sat__glsl_lookups[] =
     "#ifndef SAT_GLSL\n"
     "#define SAT_GLSL\n"
@@ -5064,7 +5341,8 @@ static const char sat__glsl_lookups[] =
 SAT_DEF const char *sat_gl_glsl(void) { return sat__glsl_lookups; }
 
 /* What the passes share. INPUT: 0 reads sums, 1 the caller's float texture, 2 the caller's unsigned one. The bits are
-   asked for NaN, because compilers may assume that there is none. Rounding to nearest, ties to even, as the CPU does. */
+   asked for NaN, because compilers may assume that there is none. Rounding to nearest, ties to even, as the CPU
+   does. */
 static const char sat__glsl_values[] =
     "#if FORMAT == 0\n"
     "#define VALUE vec2\n"
@@ -5241,7 +5519,8 @@ struct sat_gl {
 
 static const sat__field sat__gl_fields[] = {
     SAT__FIELD(sat_gl_options, 'i', format, 0, 0, SAT_GL_FIXED32, ' '),
-    SAT__FIELD(sat_gl_options, 'i', algorithm, SAT_SCAN_BALANCED_TREE, SAT_SCAN_RECURSIVE_DOUBLING, SAT_SCAN_BALANCED_TREE, ' '),
+    SAT__FIELD(sat_gl_options, 'i', algorithm, SAT_SCAN_BALANCED_TREE, SAT_SCAN_RECURSIVE_DOUBLING,
+               SAT_SCAN_BALANCED_TREE, ' '),
     SAT__FIELD(sat_gl_options, 'i', k, 4, 2, 64, ' '),
     SAT__FIELD(sat_gl_options, 'i', compute, 0, 0, 1, ' '),
     SAT__FIELD(sat_gl_options, 'i', channel, 0, 0, 3, ' '),
@@ -5264,7 +5543,8 @@ static int sat__explain_gl_options(sat__text *t, const sat_gl_options *o)
     int exponent;
     const sat__field *wrong = sat__fields_check(o, sat__gl_fields, SAT__COUNT(sat__gl_fields));
     if (wrong) sat__text_field(t, wrong, o);
-    else if (o->unsigned_input && o->format != SAT_GL_FIXED32) sat__text_add(t, "unsigned_input is 1; only SAT_GL_FIXED32 takes it");
+    else if (o->unsigned_input && o->format != SAT_GL_FIXED32)
+        sat__text_add(t, "unsigned_input is 1; only SAT_GL_FIXED32 takes it");
     else if (o->quantum > 0 && frexp(o->quantum, &exponent) > 0.5) sat__text_add(t, "quantum is not a power of two");
     else return 1;
     return 0;
@@ -5340,7 +5620,8 @@ static sat_result sat__gl_make_kernels(sat_gl *g)
             result = sat__gl_make_kernel(g, &g->doubling[i], "sat: recursive doubling", sat__glsl_double, i, format, k);
         } else {
             result = sat__gl_make_kernel(g, &g->reduce[i], "sat: reduction", sat__glsl_reduce, i, format, k);
-            if (result == SAT_OK) result = sat__gl_make_kernel(g, &g->expand[i], "sat: expansion", expand, i, format, k);
+            if (result == SAT_OK)
+                result = sat__gl_make_kernel(g, &g->expand[i], "sat: expansion", expand, i, format, k);
         }
         if (result == SAT_OK && !o->unsigned_input)
             result = sat__gl_make_kernel(g, &g->mean[i], "sat: mean", sat__glsl_mean, i, SAT_GL_TWO_FLOAT, g->mean_k);
@@ -5530,7 +5811,8 @@ static int sat__gl_doubling_passes(int n, int k)
 }
 
 /* All passes of both axes alternate between two textures so that the last one writes the target. From the third pass
-   along an axis on, the first k^(i-2) elements are left alone: they were complete two passes ago, in the same texture. */
+   along an axis on, the first k^(i-2) elements are left alone: they were complete two passes ago, in the same
+   texture. */
 static void sat__gl_double(sat_gl *g, int axes, sat__gl_target target, unsigned source)
 {
     sat__gl *gl = &g->gl;
@@ -5731,9 +6013,9 @@ SAT__IEEE_END
    are in the file LICENSE.
 
    MIT No Attribution. Copyright 2026 the lightscan authors. Permission is hereby granted, free of charge, to any person
-   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software without
-   restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute, sublicense,
-   and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
+   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software
+   without restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute,
+   sublicense, and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
 
    THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE
    WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR

@@ -48,44 +48,47 @@
      SAT_NO_SIMD, SAT_NO_STDLIB, SAT_ASSERT as in sat.h. A method left out returns SAT_ERR_ARGUMENT.
 
    MEMORY, THREADS, ERRORS
-     A solve with AUTO copies a given matrix of up to 64 million cells. softassign_solve allocates once (ENTROPIC and PUBLISHED twice) and releases; a solver allocates in create only.
-     Lists take 12 x neighbours bytes a row: 3.2 MB in all for 900 x 8192, 27 MB for 8192 x 65536 (the matrix: 30, 2147 MB).
-     One solver, one thread at a time; different solvers at once. sat_threads speeds up lists, sweeps and checks.
-     Errors name a row or a column in the report and leave column_of_row as it was: NaN and -infinity SAT_ERR_NON_FINITE,
-     too large SAT_ERR_ARGUMENT, more rows than places or forbidden pairs that leave no choice SAT_ERR_LIMIT.
+     A solve with AUTO copies a given matrix of up to 64 million cells. softassign_solve allocates once (ENTROPIC and
+     PUBLISHED twice) and releases; a solver allocates in create only. Lists take 12 x neighbours bytes a row: 3.2 MB in
+     all for 900 x 8192, 27 MB for 8192 x 65536 (the matrix: 30, 2147 MB). One solver, one thread at a time; different
+     solvers at once. sat_threads speeds up lists, sweeps and checks. Errors name a row or a column in the report and
+     leave column_of_row as it was: NaN and -infinity SAT_ERR_NON_FINITE, too large SAT_ERR_ARGUMENT, more rows than
+     places or forbidden pairs that leave no choice SAT_ERR_LIMIT.
 
    NUMERICS
-     Costs are floats, prices and path lengths doubles, sums compensated. A pair has one cost, always rounded the same way.
-     lower_bound is below every assignment's cost, rounding included; after EXACT the gap is that rounding, about 1e-15.
-     The optimum is proven by complementary slackness with differences of twice the width; where doubles do not hold what
-     the costs span (1e-45 to 1e30 in one problem), the last paths are searched in fixed point of 320 bits, so that no
-     cost that is not used spoils the proof (report.exact_repair). Softassign stays finite
+     Costs are floats, prices and path lengths doubles, sums compensated. A pair has one cost, always rounded the same
+     way. lower_bound is below every assignment's cost, rounding included; after EXACT the gap is that rounding, about
+     1e-15. The optimum is proven by complementary slackness with differences of twice the width; where doubles do not
+     hold what the costs span (1e-45 to 1e30 in one problem), the last paths are searched in fixed point of 320 bits, so
+     that no cost that is not used spoils the proof (report.exact_repair). Softassign stays finite
      down to temperatures of 1e-12. Ties: free columns first, then the smaller index.
      Same bits for any number of workers. A compiler that contracts a*b+c may change the last bit of distances.
 
    METHOD (EXACT)
      Column prices v <= 0 give the bound sum_i min_j (c_ij - v_j) + sum_j v_j. A list holds the columns of smallest
-     c_ij - v_j of a row and a limit for all others. Since prices only fall in the path search, the limit stays true, and a
-     list that runs out is not lengthened but made anew at the prices of the moment: short lists are enough. Making one
-     costs 16 numbers a column: projections on the main directions bound the distance from below, and the
-     others are never computed (report.distances_computed). Sparse softassign with inequality columns finds the prices, shortest augmenting paths the
-     assignment, and columns that were left with a price below 0 are raised back along a reverse path (finish).
-     Given matrices, and all problems up to 100 000 cells, go to a dense solver without lists: column reduction (square),
-     augmenting row reduction, shortest paths with vector scans; AUTO leaves it for lists where a wide matrix competes.
-     One thread, over scipy's time, 400^2 and 1000^2: uniform 0.38, 0.22; integers to n 0.39, 0.35; points in a plane 0.63,
-     0.43; low rank 0.52, 0.50; i * j shuffled 0.80, 0.45; 5 % cheap pairs 0.54, 0.28; zeros and ones 0.97, 0.96.
+     c_ij - v_j of a row and a limit for all others. Since prices only fall in the path search, the limit stays true,
+     and a list that runs out is not lengthened but made anew at the prices of the moment: short lists are enough.
+     Making one costs 16 numbers a column: projections on the main directions bound the distance from below, and the
+     others are never computed (report.distances_computed). Sparse softassign with inequality columns finds the prices,
+     shortest augmenting paths the assignment, and columns that were left with a price below 0 are raised back along a
+     reverse path (finish). Given matrices, and all problems up to 100 000 cells, go to a dense solver without lists:
+     column reduction (square), augmenting row reduction, shortest paths with vector scans; AUTO leaves it for lists
+     where a wide matrix competes. One thread, over scipy's time, 400^2 and 1000^2: uniform 0.38, 0.22; integers to n
+     0.39, 0.35; points in a plane 0.63, 0.43; low rank 0.52, 0.50; i * j shuffled 0.80, 0.45; 5 % cheap pairs 0.54,
+     0.28; zeros and ones 0.97, 0.96.
 
    COST (one thread, measured by tests/bench/bench_softassign.c on real photographs and tiles)
      time from features to the proven answer, as a ratio to scipy's linear_sum_assignment and to a plain LAPJV, both
      without the time of their matrix:           900 x 8192 (six photos)           2048 x 8192 (three photos)
        EXACT                                     0.09 to 0.17; LAPJV 0.11 to 0.31   0.06, 0.07; LAPJV 0.09, 0.10
        FAST, gap 0.1 %                           0.05 to 0.12; LAPJV 0.09 to 0.22   0.05, 0.06; LAPJV 0.08, 0.09
-     A picture whose cells hardly compete (stream) is easy for all: EXACT 0.54 and 0.21, FAST 0.37 and 0.16 of scipy, which
-     needs 0.14 s; there a plain LAPJV wins at 900 x 8192, if its matrix is free. 100 x 100, dense: 0.9 of LAPJV, checks and bound included.
-     8192 x 65536: the optimum in a minute on two cores, 4 % of the distances. Video, 30 x 30 of 8192, an eighth of a cell
-     a frame: 0.07 of LAPJV from prices; a switching bonus of 0.05 changes 39 % of the tiles (74 % without) at +0.9 % cost.
-     Beside the optimum the published methods cost, 100x100 to 400x1500: greedy +3 to 10 %, greedy and 2-opt +0.4 to 0.7 %,
-     annealing 0 to +0.2 %, softassign as printed +1.5 to 7 % (its outlier and alpha decide), ants +2 to 3 %.
+     A picture whose cells hardly compete (stream) is easy for all: EXACT 0.54 and 0.21, FAST 0.37 and 0.16 of scipy,
+     which needs 0.14 s; there a plain LAPJV wins at 900 x 8192, if its matrix is free. 100 x 100, dense: 0.9 of LAPJV,
+     checks and bound included. 8192 x 65536: the optimum in a minute on two cores, 4 % of the distances. Video, 30 x 30
+     of 8192, an eighth of a cell a frame: 0.07 of LAPJV from prices; a switching bonus of 0.05 changes 39 % of the
+     tiles (74 % without) at +0.9 % cost. Beside the optimum the published methods cost, 100x100 to 400x1500: greedy +3
+     to 10 %, greedy and 2-opt +0.4 to 0.7 %, annealing 0 to +0.2 %, softassign as printed +1.5 to 7 % (its outlier and
+     alpha decide), ants +2 to 3 %.
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SOFTASSIGN_IMPLEMENTATION)
@@ -133,7 +136,8 @@ typedef enum softassign_method {
     SOFTASSIGN_AUTO,        /* the optimum: a given matrix densely (wide ones whose rows compete: on lists), others as
                                SOFTASSIGN_EXACT above 100 000 cells */
     SOFTASSIGN_EXACT,       /* the optimum: softassign prices on lists, shortest augmenting paths, finish */
-    SOFTASSIGN_FAST,        /* auction on lists; certified to options.gap. Capacities other than 1: SOFTASSIGN_EXACT, and report.method says so */
+    SOFTASSIGN_FAST,        /* auction on lists; certified to options.gap. Capacities other than 1: SOFTASSIGN_EXACT,
+                               and report.method says so */
     SOFTASSIGN_ENTROPIC,    /* softassign with inequality columns over the whole matrix, rounded by paths */
     SOFTASSIGN_PUBLISHED,   /* Slomp 2012, section 3.6, as printed */
     SOFTASSIGN_GREEDY,      /* Slomp 2012, section 3.4.2 */
@@ -158,15 +162,19 @@ typedef struct softassign_problem {
     const float *column_features;          /* columns x feature_count, packed */
     int feature_count;
     const int *capacity;                   /* per column, >= 0; NULL: options.capacity_default */
-    const int *minimum_use;                /* per column, 0..capacity: so many rows must get it; NULL: 0. AUTO, EXACT and FAST
-                                              of softassign_solve */
-    const int *previous;                   /* per row, the column of the last frame or -1; NULL: none. See options.switching */
-    int maximise;                          /* 1: the largest total; -infinity forbids a pair, report.lower_bound is an upper one */
-    float unassigned_cost;                 /* > 0: a row may stay without a column (-1) at this price, and never takes a dearer one
-                                              (maximise: at this gain); 0: every row gets a column. These two: as minimum_use */
+    const int *minimum_use;                /* per column, 0..capacity: so many rows must get it; NULL: 0. AUTO, EXACT
+                                              and FAST of softassign_solve */
+    const int *previous;                   /* per row, the column of the last frame or -1; NULL: none. See
+                                              options.switching */
+    int maximise;                          /* 1: the largest total; -infinity forbids a pair, report.lower_bound is an
+                                              upper one */
+    float unassigned_cost;                 /* > 0: a row may stay without a column (-1) at this price, and never takes a
+                                              dearer one (maximise: at this gain); 0: every row gets a column. These
+                                              two: as minimum_use */
 } softassign_problem;
 
-/* What a call found out. gap = (cost - lower_bound) / cost holds at any moment: no assignment costs less than lower_bound. */
+/* What a call found out. gap = (cost - lower_bound) / cost holds at any moment: no assignment costs less than
+   lower_bound. */
 typedef struct softassign_report {
     double cost;               /* of column_of_row, without the switching bonus */
     double lower_bound;
@@ -187,7 +195,8 @@ typedef struct softassign_report {
     int switched;              /* rows that differ from problem.previous */
     double soft_cost;          /* PUBLISHED: the lowest sum of Q */
     double column_sum_max;     /* PUBLISHED, ENTROPIC: largest column sum of the soft matrix */
-    int exact_repair;          /* 1: doubles could not prove the optimum, and the last paths were searched in exact arithmetic */
+    int exact_repair;          /* 1: doubles could not prove the optimum, and the last paths were searched in exact
+                                  arithmetic */
     int duplicate_rows;        /* PUBLISHED: rows whose largest element was another row's column already */
 } softassign_report;
 
@@ -200,19 +209,21 @@ typedef struct softassign_options {
     int capacity_default;      /* 1; 0..2147483647; uses of a column where problem.capacity is NULL */
     int neighbours;            /* 160; 4..256; length of a row's list. 64 is a third faster where few rows want the same
                                   columns, and five times slower where many do */
-    int certify;               /* 1; 0..1; GREEDY to ANTS and PUBLISHED buy their bound from the auction; 0: from row minima */
+    int certify;               /* 1; 0..1; GREEDY to ANTS and PUBLISHED buy their bound from the auction; 0: from row
+                                  minima */
     uint64_t seed;             /* 1; any; ANNEALING, ANTS, PUBLISHED */
 
     /* schedules: defaults of AUTO; softassign_method_defaults() has those of each method */
-    double temperature;        /* 0.3; 0..1e30; ENTROPIC, ANNEALING: the first, times the mean row minimum; PUBLISHED: times the
-                                  largest cost */
+    double temperature;        /* 0.3; 0..1e30; ENTROPIC, ANNEALING: the first, times the mean row minimum; PUBLISHED:
+                                  times the largest cost */
     double cooling;            /* 0.5; 0..1; factor from one temperature to the next */
-    int iterations[3];         /* 6, 10, 10; 0..2147483647; ENTROPIC: temperatures, sweeps at each; PUBLISHED: temperatures,
-                                  stabilisations, Sinkhorn iterations; ANNEALING: temperatures, moves a row; ANTS: iterations;
-                                  2OPT: passes */
+    int iterations[3];         /* 6, 10, 10; 0..2147483647; ENTROPIC: temperatures, sweeps at each; PUBLISHED:
+                                  temperatures, stabilisations, Sinkhorn iterations; ANNEALING: temperatures, moves a
+                                  row; ANTS: iterations; 2OPT: passes */
     double alpha;              /* 1; -1e30..1e30; PUBLISHED: bias of eq 3.9, times the largest cost */
     double outlier;            /* 1e6; 0..1e30; PUBLISHED: element of the outlier row */
-    int outlier_evolves;       /* 0; 0..1; PUBLISHED: 0 constant in the Sinkhorn loop, as printed; 1 normalised as a row of M */
+    int outlier_evolves;       /* 0; 0..1; PUBLISHED: 0 constant in the Sinkhorn loop, as printed; 1 normalised as a row
+                                  of M */
     int gold;                  /* 0; 0..1; PUBLISHED: 1: M = exp(-(D - alpha) / t), the update of Gold et al. 1997 */
     int double_precision;      /* 0; 0..1; PUBLISHED: 0 float, exponents clamped to +-70; 1 double, +-650 */
     int gather;                /* 4; 2..64; values a reduction step sums */
@@ -224,9 +235,11 @@ typedef struct softassign_options {
     int grid_width;            /* 0; 0..2147483647; rows are cells of a grid so wide, for min_distance */
     double min_distance;       /* 0; 0..1e9; smallest distance of two cells with the same column, in cells */
 
-    double *row_price;         /* NULL; AUTO, EXACT: receive the dual prices u, v of the optimum: u_i + v_j <= cost_ij (less */
-    double *column_price;      /* NULL; the bonus), equal where i got j; v_j <= 0, and 0 where j has room, unless rows = columns.
-                                  cost_ij - u_i - v_j bounds what forcing the pair would add. Not with minimum_use */
+    double *row_price;         /* NULL; AUTO, EXACT: receive the dual prices u, v of the optimum: u_i + v_j <= cost_ij
+                                  (less */
+    double *column_price;      /* NULL; the bonus), equal where i got j; v_j <= 0, and 0 where j has room, unless rows =
+                                  columns. cost_ij - u_i - v_j bounds what forcing the pair would add. Not with
+                                  minimum_use */
     float *soft;               /* NULL; ENTROPIC, PUBLISHED: receives the soft matrix, rows x columns */
     ptrdiff_t soft_stride;     /* in floats */
     sat_allocator allocator;   /* malloc */
@@ -257,9 +270,9 @@ SOFTASSIGN_DEF sat_result softassign_features(float *out, const sat_image *image
 /* Draws the mosaic: 8-bit pixels, grid_width * tile width x grid_height * tile height. tiles: SAT_U8, tiles of
    tile_width x tile_height in a sheet without gaps, numbered row by row. blend 0..1 tints every tile towards the mean
    of target's cell (NULL or 0: not at all). */
-SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride, const sat_image *tiles, int tile_width,
-                                            int tile_height, const int *column_of_row, int grid_width, int grid_height,
-                                            const sat_image *target, float blend);
+SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride, const sat_image *tiles,
+                                            int tile_width, int tile_height, const int *column_of_row, int grid_width,
+                                            int grid_height, const sat_image *target, float blend);
 
 /* ------------------------------------------------------------------------------------------------
    Full calls: anytime, and frame after frame
@@ -276,10 +289,10 @@ SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row
 SOFTASSIGN_DEF void softassign_next_frame(softassign *solver);
 SOFTASSIGN_DEF void softassign_destroy(softassign *solver); /* NULL is fine */
 
-/* One sentence that names what is refused with SAT_ERR_ARGUMENT, and its range; "" when nothing is. Written into text (cut
-   to size, always ended); returns text. The first: options of softassign_solve, softassign_create and
-   softassign_gl_create; the second: a problem with the options it is solved with (NULL: the defaults) by softassign_solve.
-   Costs and features are not read; the report names their row. */
+/* One sentence that names what is refused with SAT_ERR_ARGUMENT, and its range; "" when nothing is. Written into text
+   (cut to size, always ended); returns text. The first: options of softassign_solve, softassign_create and
+   softassign_gl_create; the second: a problem with the options it is solved with (NULL: the defaults) by
+   softassign_solve. Costs and features are not read; the report names their row. */
 SOFTASSIGN_DEF const char *softassign_explain(char *text, size_t size, const softassign_options *options);
 SOFTASSIGN_DEF const char *softassign_explain_problem(char *text, size_t size, const softassign_problem *problem,
                                                 const softassign_options *options);
@@ -302,30 +315,35 @@ extern "C" {
 #endif
 
 /* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL
-   state as it was (but for pending errors, which are lost). Columns and rows up to the largest texture; capacities of 1. */
+   state as it was (but for pending errors, which are lost). Columns and rows up to the largest texture; capacities of
+   1. */
 typedef struct softassign_gl softassign_gl;
 
 /* On an OpenGL error *out only answers softassign_gl_message, and is to be destroyed; on the others it is NULL.
    Options read: alpha, temperature, cooling, iterations, outlier, outlier_evolves, gather, seed, allocator; NULL means
    softassign_defaults(), the published schedule is softassign_method_defaults(SOFTASSIGN_PUBLISHED). */
-SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc, const softassign_options *options);
+SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc,
+                                               const softassign_options *options);
 SOFTASSIGN_DEF void softassign_gl_destroy(softassign_gl *gl); /* NULL is fine */
 /* What the last SAT_ERR_GL_... or SAT_ERR_ARGUMENT of set_costs was about; never NULL. */
 SOFTASSIGN_DEF const char *softassign_gl_message(const softassign_gl *gl);
 
-/* The distance matrix: uploaded, or by a pass from features (eq 3.1). Costs must be finite or +infinity, |cost| <= 1e30.
-   capacity, minimum_use, previous, maximise and unassigned_cost are refused; the message names them. */
+/* The distance matrix: uploaded, or by a pass from features (eq 3.1). Costs must be finite or +infinity, |cost| <=
+   1e30. capacity, minimum_use, previous, maximise and unassigned_cost are refused; the message names them. */
 SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softassign_problem *problem);
 
 /* Slomp 2012, section 3.7: the whole schedule of the options, as SOFTASSIGN_PUBLISHED in float. soft: rows x columns
    floats, soft_stride apart, or NULL; soft_cost: the lowest sum of Q, or NULL. Waits for one texel a temperature. */
-SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft, ptrdiff_t soft_stride, double *soft_cost);
+SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft, ptrdiff_t soft_stride,
+                                                  double *soft_cost);
 
 /* `sweeps` sweeps of softassign with inequality columns at one temperature (in units of cost), from the prices given,
    one a column and all <= 0; they are replaced. lower_bound: of the last sweep's start, less its rounding; or NULL. */
-SOFTASSIGN_DEF sat_result softassign_gl_sweep(softassign_gl *gl, float *price, double *lower_bound, double temperature, int sweeps);
+SOFTASSIGN_DEF sat_result softassign_gl_sweep(softassign_gl *gl, float *price, double *lower_bound, double temperature,
+                                              int sweeps);
 
-/* GLSL (3.30 or ES 3.00) of one step of the entropic reduction, for shaders of your own; put it behind the #version line:
+/* GLSL (3.30 or ES 3.00) of one step of the entropic reduction, for shaders of your own; put it behind the #version
+   line:
 
        vec2 softassign_join(vec2 a, vec2 b, float inverse_temperature)   of (minimum, sum of exp((minimum - x) / t)) */
 SOFTASSIGN_DEF const char *softassign_gl_glsl(void);
@@ -360,7 +378,8 @@ extern "C" {
 #define SOFTASSIGN__LARGEST_FEATURE 1e16f
 #define SOFTASSIGN__DENSE_CELLS 100000 /* below, lists do not pay */
 #define SOFTASSIGN__MATRIX_CELLS 67108864 /* a given matrix up to this is tried without lists */
-#define SOFTASSIGN__DIMS 16            /* coordinates of the cheap bound; the last is the norm of what the others leave */
+#define SOFTASSIGN__DIMS 16            /* coordinates of the cheap bound; the last is the norm of what the others
+                                          leave */
 #define SOFTASSIGN__BOUND_FEATURES 1024 /* features beyond these are left out of the cheap bound */
 #define SOFTASSIGN__BLOCK 16           /* columns that share a block minimum */
 
@@ -402,7 +421,10 @@ static inline uint64_t softassign__random(uint64_t *state)
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
     return z ^ (z >> 31);
 }
-static inline double softassign__uniform(uint64_t *state) { return (double)(softassign__random(state) >> 11) * 1.1102230246251565e-16; }
+static inline double softassign__uniform(uint64_t *state)
+{
+    return (double)(softassign__random(state) >> 11) * 1.1102230246251565e-16;
+}
 
 /* ------------------------------------------------------------------------------------------------
    The solver's memory
@@ -423,7 +445,16 @@ typedef struct softassign__scratch {
     size_t distances;
 } softassign__scratch;
 
-enum { SOFTASSIGN__START, SOFTASSIGN__LISTS, SOFTASSIGN__PRICES, SOFTASSIGN__RELIST, SOFTASSIGN__PATHS, SOFTASSIGN__FINISH, SOFTASSIGN__REPAIR, SOFTASSIGN__DONE };
+enum {
+    SOFTASSIGN__START,
+    SOFTASSIGN__LISTS,
+    SOFTASSIGN__PRICES,
+    SOFTASSIGN__RELIST,
+    SOFTASSIGN__PATHS,
+    SOFTASSIGN__FINISH,
+    SOFTASSIGN__REPAIR,
+    SOFTASSIGN__DONE
+};
 
 typedef struct softassign__fixed softassign__fixed;
 
@@ -474,7 +505,8 @@ struct softassign {
     float *column_sum, *soft_row;
 
     softassign__scratch *scratch;
-    int *kept, *leader, *shown, *shown_column; /* slots of rows: best so far, best ant, for the caller; columns of those */
+    int *kept, *leader, *shown, *shown_column; /* slots of rows: best so far, best ant, for the caller; columns of
+                                                  those */
     int phase, next, left, prices_known;
     double temperature, bound;
     double excess;         /* of the proof, see softassign__prove */
@@ -484,7 +516,10 @@ struct softassign {
     softassign_report report;
 };
 
-static inline int softassign__column(const softassign *s, int slot) { return slot < s->columns ? slot : s->slot_column[slot]; }
+static inline int softassign__column(const softassign *s, int slot)
+{
+    return slot < s->columns ? slot : s->slot_column[slot];
+}
 
 static inline void softassign__set_price(softassign *s, int slot, double price)
 {
@@ -597,7 +632,9 @@ static void softassign__dense_keys(const softassign *s, int row, softassign__scr
     int j, l;
     for (j = 0; j < s->slot_count; j++) {
         float cost = softassign__cost(s, row, j), price = s->price_f[j];
-        w->keys[j] = cost < SOFTASSIGN__INFINITY && s->capacity[j] > 0 ? (cost - price) - (fabsf(cost) + fabsf(price)) * 3e-7f : SOFTASSIGN__INFINITY;
+        w->keys[j] = cost < SOFTASSIGN__INFINITY && s->capacity[j] > 0
+                         ? (cost - price) - (fabsf(cost) + fabsf(price)) * 3e-7f
+                         : SOFTASSIGN__INFINITY;
     }
     w->distances += (size_t)s->slot_count;
     for (; j < s->padded; j++) w->keys[j] = SOFTASSIGN__INFINITY;
@@ -612,7 +649,8 @@ static void softassign__dense_keys(const softassign *s, int row, softassign__scr
 static void softassign__hide_closed(const softassign *s, softassign__scratch *w)
 {
     int b, j;
-    for (b = s->all_open ? s->slot_count / SOFTASSIGN__BLOCK * SOFTASSIGN__BLOCK : 0; b < s->padded; b += SOFTASSIGN__BLOCK) {
+    for (b = s->all_open ? s->slot_count / SOFTASSIGN__BLOCK * SOFTASSIGN__BLOCK : 0; b < s->padded;
+         b += SOFTASSIGN__BLOCK) {
         float least = SOFTASSIGN__INFINITY;
         for (j = b; j < b + SOFTASSIGN__BLOCK; j++) {
             if (j >= s->slot_count || s->capacity[j] == 0) w->keys[j] = SOFTASSIGN__INFINITY;
@@ -681,7 +719,8 @@ static void softassign__find_basis(softassign *s, int n, int directions)
     for (step = 0; step < 4; step++) {
         for (k = 0; k < directions * n; k++) next[k] = 0;
         for (i = 0; i < samples; i++) {
-            const float *f = p->column_features + (size_t)((int64_t)i * p->columns / samples) * (size_t)p->feature_count;
+            const float *f =
+                p->column_features + (size_t)((int64_t)i * p->columns / samples) * (size_t)p->feature_count;
             for (a = 0; a < directions; a++) {
                 const double *u = s->basis + (size_t)a * (size_t)n;
                 double *v = next + (size_t)a * (size_t)n, dot = 0;
@@ -729,12 +768,13 @@ static void softassign__project_range(int begin, int end, int worker, void *cont
         double norm;
         int is_row = i >= s->slot_count, j = i - s->slot_count;
         if (is_row)
-            norm = softassign__project(s, s->problem.row_features + (size_t)j * (size_t)wide, p->features, p->directions,
-                                       s->row_coarse + (size_t)j * (size_t)d, 1);
+            norm = softassign__project(s, s->problem.row_features + (size_t)j * (size_t)wide, p->features,
+                                       p->directions, s->row_coarse + (size_t)j * (size_t)d, 1);
         else
             norm = softassign__project(s, s->problem.column_features + (size_t)softassign__column(s, i) * (size_t)wide,
                                        p->features, p->directions,
-                                       s->coarse + (size_t)(i / SOFTASSIGN__BLOCK) * (size_t)(d * SOFTASSIGN__BLOCK) + i % SOFTASSIGN__BLOCK,
+                                       s->coarse + (size_t)(i / SOFTASSIGN__BLOCK) * (size_t)(d * SOFTASSIGN__BLOCK) +
+                                           i % SOFTASSIGN__BLOCK,
                                        SOFTASSIGN__BLOCK);
         if (norm > p->norm[2 * worker + is_row]) p->norm[2 * worker + is_row] = norm;
     }
@@ -763,7 +803,8 @@ static void softassign__start_bound(softassign *s)
     s->slack = (float)((p.norm[0] + p.norm[1]) * 4.8e-7 + 1e-18 * sqrt((double)s->problem.feature_count + 4));
     for (a = s->slot_count; a < s->padded; a++) /* the last block reads as zeros behind the slots */
         for (w = 0; w < s->dims; w++)
-            s->coarse[(a / SOFTASSIGN__BLOCK) * s->dims * SOFTASSIGN__BLOCK + w * SOFTASSIGN__BLOCK + a % SOFTASSIGN__BLOCK] = 0;
+            s->coarse[(a / SOFTASSIGN__BLOCK) * s->dims * SOFTASSIGN__BLOCK + w * SOFTASSIGN__BLOCK +
+                      a % SOFTASSIGN__BLOCK] = 0;
 }
 
 /* ------------------------------------------------------------------------------------------------
@@ -932,7 +973,8 @@ static double softassign__list_least(const softassign *s, int row)
    start for the paths, which are exact from any start.
    ------------------------------------------------------------------------------------------------ */
 
-/* exp for x <= 0 with a relative error of 3e-7; below -87 about 1e-38 (Cody and Waite reduction, minimax of degree 5) */
+/* exp for x <= 0 with a relative error of 3e-7; below -87 about 1e-38 (Cody and Waite reduction, minimax of degree
+   5) */
 static inline float softassign__exp(float x)
 {
     float z, k, r, p;
@@ -1167,7 +1209,8 @@ static void softassign__relax_list(softassign *s, softassign__search *q, int row
     }
     shift = base - (own_cost - own_price);
     for (; at < end; at++) {
-        if ((double)s->list_value[at] + shift - (fabs((double)s->list_value[at]) + fabs(shift)) * 4e-16 > q->nearest) break; /* sorted */
+        if ((double)s->list_value[at] + shift - (fabs((double)s->list_value[at]) + fabs(shift)) * 4e-16 > q->nearest)
+            break; /* sorted */
         softassign__relax(s, q, row, s->list_slot[at], s->list_cost[at], base, own_cost, own_price);
     }
     if (s->list_limit[row] >= (double)SOFTASSIGN__INFINITY) return;
@@ -1364,7 +1407,8 @@ static int softassign__two_smallest(const float *cost, const double *price, int 
     int j = 0, best = -1;
 #ifdef SAT__SSE2
     double low[2], high[2], index[2];
-    __m128d a = _mm_set1_pd((double)SOFTASSIGN__INFINITY), b = a, at = _mm_set1_pd(-1), here = _mm_set_pd(1, 0), two = _mm_set1_pd(2);
+    __m128d a = _mm_set1_pd((double)SOFTASSIGN__INFINITY), b = a, at = _mm_set1_pd(-1), here = _mm_set_pd(1, 0),
+            two = _mm_set1_pd(2);
     for (; j + 2 <= n; j += 2) {
         __m128d v = _mm_sub_pd(softassign__load_two(cost + j), _mm_loadu_pd(price + j)), less = _mm_cmplt_pd(v, a);
         b = _mm_min_pd(b, _mm_max_pd(v, a));
@@ -1430,7 +1474,9 @@ static void softassign__certify(softassign *s)
         if (!s->raised[j] || s->capacity[j] == 0 || s->dense_paths) continue;
         s->scratch[0].distances += (size_t)s->rows;
         for (i = 0; i < s->rows; i++) {
-            double value = (double)(s->proving ? softassign__cost(s, i, j) : softassign__pair(&s->problem, i, softassign__column(s, j))) - s->price[j];
+            double value = (double)(s->proving ? softassign__cost(s, i, j)
+                                               : softassign__pair(&s->problem, i, softassign__column(s, j))) -
+                           s->price[j];
             if (value < least[i]) least[i] = value;
         }
     }
@@ -1578,14 +1624,15 @@ static int softassign__reduce_rows(softassign *s, int *rows, int count)
 
 /* Relaxes all slots from `row` and returns the nearest open one; free slots win ties. A closed slot has an infinite
    distance here and a price of minus infinity, so that nothing is below either. */
-static int softassign__relax_dense(const float *cost, int n, double base, double own_cost, double own_price, const double *price,
-                                   double *distance, int *pred, const int *first_row, int row)
+static int softassign__relax_dense(const float *cost, int n, double base, double own_cost, double own_price,
+                                   const double *price, double *distance, int *pred, const int *first_row, int row)
 {
     double nearest = (double)SOFTASSIGN__INFINITY;
     int j = 0, at = -1;
 #ifdef SAT__SSE2
     double lanes[2];
-    __m128d c0 = _mm_set1_pd(own_cost), p0 = _mm_set1_pd(own_price), from = _mm_set1_pd(base), least = _mm_set1_pd(nearest), least2 = least;
+    __m128d c0 = _mm_set1_pd(own_cost), p0 = _mm_set1_pd(own_price), from = _mm_set1_pd(base),
+            least = _mm_set1_pd(nearest), least2 = least;
     for (; j + 4 <= n; j += 4) {
         __m128 four = _mm_loadu_ps(cost + j);
         __m128d x = _mm_sub_pd(_mm_cvtps_pd(four), c0), y = _mm_sub_pd(_mm_cvtps_pd(_mm_movehl_ps(four, four)), c0);
@@ -1635,7 +1682,8 @@ static int softassign__relax_dense(const float *cost, int n, double base, double
 static int softassign__augment_dense(softassign *s, int root)
 {
     const float *cost = s->matrix + (size_t)root * (size_t)s->columns;
-    double *d = s->distance, *open_price = s->dense_price, own_cost = 0, own_price = 0, base = 0, least = (double)SOFTASSIGN__INFINITY;
+    double *d = s->distance, *open_price = s->dense_price, own_cost = 0, own_price = 0, base = 0,
+           least = (double)SOFTASSIGN__INFINITY;
     int *pred = s->parent, closed = 0, row = root, j, k, end;
     s->report.paths++;
     for (j = 0; j < s->slot_count; j++) {
@@ -1650,7 +1698,8 @@ static int softassign__augment_dense(softassign *s, int root)
     }
     for (;;) {
         s->report.work++;
-        end = softassign__relax_dense(cost, s->slot_count, base, own_cost, own_price, open_price, d, pred, s->first_row, row);
+        end = softassign__relax_dense(cost, s->slot_count, base, own_cost, own_price, open_price, d, pred, s->first_row,
+                                      row);
         if (end < 0) return 0;
         if (d[end] > base) base = d[end]; /* else rounding */
         if (s->first_row[end] < 0) break;
@@ -1694,8 +1743,8 @@ static void softassign__dense_publish(softassign *s)
 
    Prices are sums of costs: with costs from 1e-45 to 1e30 in one problem no double holds them. Where the proof in
    doubles is not tight (softassign__prove), the rest of the work is done in fixed point of 320 bits, in which every
-   cost, path length and price is exact; a mandatory slot then costs 2^136, above every sum of costs, and drowns nothing.
-   ------------------------------------------------------------------------------------------------ */
+   cost, path length and price is exact; a mandatory slot then costs 2^136, above every sum of costs, and drowns
+   nothing. ------------------------------------------------------------------------------------------------ */
 
 /* Two's complement, least word first, in units of 2^-149: what floats are multiples of. */
 struct softassign__fixed {
@@ -1838,7 +1887,9 @@ static void softassign__relax_exact(softassign *s, int row, const softassign__fi
         int known = s->stamp[j] - 4 * s->epoch;
         softassign__fixed w;
         float cost;
-        if (s->capacity[j] == 0 || known == SOFTASSIGN__CLOSED || !((cost = softassign__cost(s, row, j)) < SOFTASSIGN__INFINITY)) continue;
+        if (s->capacity[j] == 0 || known == SOFTASSIGN__CLOSED ||
+            !((cost = softassign__cost(s, row, j)) < SOFTASSIGN__INFINITY))
+            continue;
         w = softassign__fixed_value(s, (double)cost, j);
         w = softassign__fixed_sum(&w, &shift);
         if (known == SOFTASSIGN__OPEN && !softassign__fixed_less(&w, &s->exact_distance[j])) continue;
@@ -1880,7 +1931,8 @@ static int softassign__augment_exact(softassign *s, int root)
         for (i = s->first_row[j]; i >= 0; i = s->next_row[i]) softassign__relax_exact(s, i, &s->exact_distance[j]);
     }
     for (k = 0; k < closed; k++) {
-        softassign__fixed change = softassign__fixed_difference(&s->exact_distance[s->closed[k]], &s->exact_distance[j]);
+        softassign__fixed change =
+            softassign__fixed_difference(&s->exact_distance[s->closed[k]], &s->exact_distance[j]);
         s->exact_price[s->closed[k]] = softassign__fixed_sum(&s->exact_price[s->closed[k]], &change);
     }
     for (;;) {
@@ -1949,7 +2001,8 @@ static double softassign__row_excess(const softassign *s, int row)
     return -least;
 }
 
-/* Sets s->excess; 1 when it is small beside the costs that are used. The rounding of row minima is enough nearly always. */
+/* Sets s->excess; 1 when it is small beside the costs that are used. The rounding of row minima is enough nearly
+   always. */
 static int softassign__prove(softassign *s)
 {
     double *least = s->row_distance, used = 0, quick = 0;
@@ -2093,7 +2146,8 @@ static sat_result softassign__dense_phase(softassign *s)
         s->paths_from = s->report.work;
     }
     spent = s->report.work - s->paths_from;
-    if (large && (spent > 40 * (size_t)s->rows || (s->left > s->rows / 4 && s->next >= 16 && spent > 4 * (size_t)s->next))) {
+    if (large &&
+        (spent > 40 * (size_t)s->rows || (s->left > s->rows / 4 && s->next >= 16 && spent > 4 * (size_t)s->next))) {
         softassign__leave_dense(s);
         return SAT_OK;
     }
@@ -2152,7 +2206,8 @@ static sat_result softassign__advance(softassign *s, size_t budget)
     size_t stop = s->report.work + budget;
     sat_result result = SAT_OK;
     while (s->phase != SOFTASSIGN__DONE && s->report.work < stop && result == SAT_OK) {
-        if (s->phase == SOFTASSIGN__LISTS || s->phase == SOFTASSIGN__RELIST) result = softassign__list_phase(s, stop - s->report.work);
+        if (s->phase == SOFTASSIGN__LISTS || s->phase == SOFTASSIGN__RELIST)
+            result = softassign__list_phase(s, stop - s->report.work);
         else if (s->phase == SOFTASSIGN__PRICES) result = softassign__price_phase(s);
         else if (s->phase == SOFTASSIGN__PATHS) result = softassign__path_phase(s);
         else if (s->phase == SOFTASSIGN__FINISH) result = softassign__finish_phase(s);
@@ -2167,7 +2222,8 @@ static sat_result softassign__advance(softassign *s, size_t budget)
 
 static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
 {
-    size_t rows = (size_t)s->rows, cells = 0, seats = (size_t)s->max_slots, padded = (size_t)s->padded, list = rows * (size_t)s->list;
+    size_t rows = (size_t)s->rows, cells = 0, seats = (size_t)s->max_slots, padded = (size_t)s->padded,
+           list = rows * (size_t)s->list;
     size_t shared = seats * (sizeof(softassign__fixed) / sizeof(float));
     int workers = sat__worker_count(&s->options.threads), w;
     if (s->dense && !sat__multiply_size(&cells, rows, (size_t)s->columns)) a->overflow = 1;
@@ -2184,7 +2240,8 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->coarse = (float *)sat__carve(a, padded * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
     s->row_coarse = (float *)sat__carve(a, rows * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
     s->cost_of_row = (float *)sat__carve(a, rows, sizeof(float));
-    s->exact_price = (softassign__fixed *)sat__carve(a, list > shared ? list : shared, sizeof(float)); /* the repair needs no lists */
+    s->exact_price = (softassign__fixed *)sat__carve(a, list > shared ? list : shared,
+                                                     sizeof(float)); /* the repair needs no lists */
     s->exact_distance = (softassign__fixed *)sat__carve(a, list > shared ? list : shared, sizeof(float));
     s->list_cost = (float *)(void *)s->exact_price;
     s->list_value = (float *)(void *)s->exact_distance;
@@ -2420,7 +2477,8 @@ static void softassign__anneal(softassign *s, int *best)
     softassign__keep_best(s, best);
     for (step = 0; step < o->iterations[0]; step++, temperature *= o->cooling) {
         for (n = 0; n < count; n++) {
-            int row = (int)(softassign__uniform(&seed) * s->rows), slot = (int)(softassign__uniform(&seed) * s->slot_count), other;
+            int row = (int)(softassign__uniform(&seed) * s->rows),
+                slot = (int)(softassign__uniform(&seed) * s->slot_count), other;
             float here, back = 0;
             double change;
             s->report.iterations++;
@@ -2634,7 +2692,8 @@ static void softassign__sweep_range(int begin, int end, int worker, void *contex
     (void)worker;
     for (chunk = begin; chunk < end; chunk++) {
         float *sum = w->columns + (size_t)chunk * (size_t)n, *e = w->rows + (size_t)chunk * (size_t)n;
-        int first = (int)((int64_t)s->rows * chunk / SOFTASSIGN__CHUNKS), last = (int)((int64_t)s->rows * (chunk + 1) / SOFTASSIGN__CHUNKS);
+        int first = (int)((int64_t)s->rows * chunk / SOFTASSIGN__CHUNKS),
+            last = (int)((int64_t)s->rows * (chunk + 1) / SOFTASSIGN__CHUNKS);
         for (j = 0; j < n; j++) sum[j] = 0;
         w->bound[chunk] = 0;
         for (i = first; i < last; i++) {
@@ -2721,8 +2780,8 @@ static void softassign__entropic(softassign *s, softassign__sweep *w, double *be
        repeat: M = M ./ (sum_cols(M) + outlier);  M = M ./ sum_rows(M)
        once a temperature: cost = sum_all(Q); if (cost < lowest) S = M
 
-   Sums are trees of k gathers as in section 3.7. Forbidden elements are 0. Extraction, which the source leaves open: the
-   largest element of each row of S, rows in order; a row whose column is taken gets the nearest free column.
+   Sums are trees of k gathers as in section 3.7. Forbidden elements are 0. Extraction, which the source leaves open:
+   the largest element of each row of S, rows in order; a row whose column is taken gets the nearest free column.
    ------------------------------------------------------------------------------------------------ */
 
 typedef struct softassign__published {
@@ -2952,7 +3011,8 @@ static void softassign__tell_prices(const softassign *s)
 {
     const softassign_options *o = &s->options;
     double sign = s->problem.maximise ? -1 : 1;
-    int i, j, columns = s->columns - (s->problem.unassigned_cost > 0), nobody = columns < s->columns && s->used[columns] == s->rows;
+    int i, j, columns = s->columns - (s->problem.unassigned_cost > 0),
+              nobody = columns < s->columns && s->used[columns] == s->rows;
     if (s->report.complete && (o->row_price || o->column_price) && s->slot_count == s->columns) {
         for (j = 0; o->column_price && j < columns; j++) o->column_price[j] = nobody ? 0 : sign * s->price[j];
         for (i = 0; o->row_price && i < s->rows; i++) {
@@ -3033,7 +3093,8 @@ static int softassign__explain_options(sat__text *t, const softassign_options *o
 {
     const sat__field *wrong = sat__fields_check(o, softassign__fields, SAT__COUNT(softassign__fields));
     if (wrong) sat__text_field(t, wrong, o);
-    else if (o->min_distance > 0 && o->grid_width < 1) sat__text_add(t, "grid_width is 0; min_distance above 0 needs the grid");
+    else if (o->min_distance > 0 && o->grid_width < 1)
+        sat__text_add(t, "grid_width is 0; min_distance above 0 needs the grid");
     else if ((o->row_price || o->column_price) && (int)o->method > (int)SOFTASSIGN_EXACT)
         sat__text_add(t, "row_price or column_price is given; only AUTO and EXACT have them");
     else return 1;
@@ -3074,7 +3135,8 @@ static int softassign__explain_costs(sat__text *t, const softassign_problem *p)
         sat__text_add(t, "stride is shorter than a row of the matrix");
     else if (!p->cost && !p->cost_fn && !p->row_features) sat__text_add(t, "cost, cost_fn and row_features are NULL");
     else if (!p->cost && !p->cost_fn && !p->column_features) sat__text_add(t, "column_features is NULL");
-    else if (!p->cost && !p->cost_fn && p->feature_count < 1) sat__text_range(t, "feature_count", p->feature_count, 1, 2147483647, ' ');
+    else if (!p->cost && !p->cost_fn && p->feature_count < 1)
+        sat__text_range(t, "feature_count", p->feature_count, 1, 2147483647, ' ');
     else if (p->maximise < 0 || p->maximise > 1) sat__text_range(t, "maximise", p->maximise, 0, 1, ' ');
     else if (!(p->unassigned_cost >= 0 && p->unassigned_cost <= SOFTASSIGN__LARGEST_COST))
         sat__text_range(t, "unassigned_cost", (double)p->unassigned_cost, 0, 1e30, ' ');
@@ -3199,8 +3261,8 @@ static sat_result softassign__check_costs(softassign *s)
    Starting a problem
    ------------------------------------------------------------------------------------------------ */
 
-/* What a mandatory slot starts at: four times the widest difference of costs. A chain of moves may save more than that and
-   leave the slot free; the exact repair knows no such limit. */
+/* What a mandatory slot starts at: four times the widest difference of costs. A chain of moves may save more than that
+   and leave the slot free; the exact repair knows no such limit. */
 static double softassign__mandatory_price(const softassign *s)
 {
     const softassign_problem *p = &s->problem;
@@ -3211,7 +3273,8 @@ static double softassign__mandatory_price(const softassign *s)
             const float *f = i < s->rows ? p->row_features + (size_t)i * (size_t)p->feature_count
                                          : p->column_features + (size_t)(i - s->rows) * (size_t)p->feature_count;
             double norm = 0, *largest = i < s->rows ? &low : &high;
-            for (j = 0; j < p->feature_count; j++) norm += ((double)f[j] - (double)p->column_features[j]) * ((double)f[j] - (double)p->column_features[j]);
+            for (j = 0; j < p->feature_count; j++)
+                norm += ((double)f[j] - (double)p->column_features[j]) * ((double)f[j] - (double)p->column_features[j]);
             if (norm > *largest) *largest = norm;
         }
         return 4 * (sqrt(low) + sqrt(high)) + 1e-30;
@@ -3233,7 +3296,8 @@ static sat_result softassign__make_slots(softassign *s)
     s->slot_count = s->columns;
     s->all_open = 1;
     for (j = 0; j < s->columns; j++) {
-        int capacity = p->capacity ? p->capacity[j] : s->options.capacity_default, least = p->minimum_use ? p->minimum_use[j] : 0;
+        int capacity = p->capacity ? p->capacity[j] : s->options.capacity_default,
+            least = p->minimum_use ? p->minimum_use[j] : 0;
         if (least > capacity) {
             s->report.column_error = j;
             return SAT_ERR_ARGUMENT;
@@ -3262,7 +3326,8 @@ static float softassign__switching_bonus(const softassign *s)
     int i, count = 0;
     if (!s->problem.previous || !(s->options.switching > 0)) return 0;
     for (i = 0; i < s->rows; i++) {
-        float cost = s->problem.previous[i] < 0 ? SOFTASSIGN__INFINITY : softassign__pair(&s->problem, i, s->problem.previous[i]);
+        float cost = s->problem.previous[i] < 0 ? SOFTASSIGN__INFINITY
+                                                : softassign__pair(&s->problem, i, s->problem.previous[i]);
         if (!(fabsf(cost) <= SOFTASSIGN__LARGEST_COST)) continue;
         softassign__add(&sum, fabs((double)cost));
         count++;
@@ -3302,7 +3367,8 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     s->next = 0;
     s->dense_paths = s->dense && s->unit_capacities && s->options.method == SOFTASSIGN_AUTO;
     s->phase = s->dense_paths ? SOFTASSIGN__PATHS : SOFTASSIGN__LISTS;
-    for (j = 0; known && !(s->dense_paths && s->rows == s->columns) && j < s->slot_count; j++) /* a square matrix lets prices rise above 0 */
+    for (j = 0; known && !(s->dense_paths && s->rows == s->columns) && j < s->slot_count;
+         j++) /* a square matrix lets prices rise above 0 */
         if (s->price[j] > s->top[j]) softassign__set_price(s, j, s->top[j]);
     return SAT_OK;
 }
@@ -3351,7 +3417,8 @@ static sat_result softassign__allocate(softassign **out, int rows, int columns, 
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
     if (!sat__resolve_allocator(&allocator, &options->allocator)) return SAT_ERR_ARGUMENT;
-    if (columns > 2147483647 / 2 - 64 || rows > 2147483647 / 2 - 64 || extra > 2147483647 / 2 - 64 - columns) return SAT_ERR_SIZE;
+    if (columns > 2147483647 / 2 - 64 || rows > 2147483647 / 2 - 64 || extra > 2147483647 / 2 - 64 - columns)
+        return SAT_ERR_SIZE;
     memset(&measure, 0, sizeof measure);
     measure.options = *options;
     measure.allocator = allocator;
@@ -3360,7 +3427,8 @@ static sat_result softassign__allocate(softassign **out, int rows, int columns, 
     measure.max_slots = columns + extra;
     measure.padded = (measure.max_slots + SOFTASSIGN__BLOCK - 1) / SOFTASSIGN__BLOCK * SOFTASSIGN__BLOCK;
     measure.dense = method == SOFTASSIGN_ENTROPIC || method == SOFTASSIGN_PUBLISHED ||
-                    (method == SOFTASSIGN_AUTO && (int64_t)rows * columns <= (matrix ? SOFTASSIGN__MATRIX_CELLS : SOFTASSIGN__DENSE_CELLS));
+                    (method == SOFTASSIGN_AUTO &&
+                     (int64_t)rows * columns <= (matrix ? SOFTASSIGN__MATRIX_CELLS : SOFTASSIGN__DENSE_CELLS));
     measure.has_lists = 1;
     measure.list = sat__min_int(options->neighbours, measure.max_slots);
     sat__carve(&arena, 1, sizeof *s);
@@ -3388,7 +3456,9 @@ SOFTASSIGN_DEF sat_result softassign_create(softassign **out, int rows, int colu
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     o = options ? *options : softassign_defaults();
-    if (!softassign__options_are_valid(&o) || rows < 1 || columns < 1 || (unsigned)o.method > (unsigned)SOFTASSIGN_EXACT) return SAT_ERR_ARGUMENT;
+    if (!softassign__options_are_valid(&o) || rows < 1 || columns < 1 ||
+        (unsigned)o.method > (unsigned)SOFTASSIGN_EXACT)
+        return SAT_ERR_ARGUMENT;
     dense = o.method == SOFTASSIGN_AUTO && (int64_t)rows * columns <= SOFTASSIGN__DENSE_CELLS;
     return softassign__allocate(out, rows, columns, 0, dense ? 0 : SOFTASSIGN__BOUND_FEATURES, 0, &o);
 }
@@ -3573,7 +3643,8 @@ static sat_result softassign__solve_published(softassign *s, softassign__publish
     p->evolves = s->options.outlier_evolves;
     p->largest = 0;
     for (k = 0; k < cells; k++)
-        if (s->matrix[k] < SOFTASSIGN__INFINITY && fabs((double)s->matrix[k]) > p->largest) p->largest = fabs((double)s->matrix[k]);
+        if (s->matrix[k] < SOFTASSIGN__INFINITY && fabs((double)s->matrix[k]) > p->largest)
+            p->largest = fabs((double)s->matrix[k]);
     if (!(p->largest > 1e-30)) p->largest = 1;
     softassign__list_all(s);
     softassign__certify(s);
@@ -3654,7 +3725,8 @@ static void softassign__separate(softassign *s)
         softassign__scratch *w = &s->scratch[0];
         float best = SOFTASSIGN__INFINITY;
         int to = -1;
-        if (s->slot_of_row[i] >= s->columns || !softassign__conflicts(s, i, s->slot_of_row[i], -1)) continue; /* mandatory ones stay */
+        if (s->slot_of_row[i] >= s->columns || !softassign__conflicts(s, i, s->slot_of_row[i], -1))
+            continue; /* mandatory ones stay */
         softassign__keys(s, i, w);
         for (j = 0; j < s->slot_count; j++) {
             float cost;
@@ -3789,14 +3861,16 @@ static int softassign__over_used(const softassign_problem *p, const softassign_o
     return -1;
 }
 
-static sat_result softassign__solve_plain(int *column_of_row, const softassign_problem *problem, const softassign_options *options,
-                                          int matrix, softassign_report *report)
+static sat_result softassign__solve_plain(int *column_of_row, const softassign_problem *problem,
+                                          const softassign_options *options, int matrix, softassign_report *report)
 {
     softassign__matrix_work work;
     softassign *s;
     sat_result result;
-    int i, features = problem->cost || problem->cost_fn ? 0 : sat__min_int(problem->feature_count, SOFTASSIGN__BOUND_FEATURES);
-    result = softassign__allocate(&s, problem->rows, problem->columns, softassign__mandatory_count(problem), features, matrix, options);
+    int i, features =
+               problem->cost || problem->cost_fn ? 0 : sat__min_int(problem->feature_count, SOFTASSIGN__BOUND_FEATURES);
+    result = softassign__allocate(&s, problem->rows, problem->columns, softassign__mandatory_count(problem), features,
+                                  matrix, options);
     if (result != SAT_OK) return result;
     memset(&work, 0, sizeof work);
 #ifndef SOFTASSIGN_NO_MATRIX
@@ -3813,15 +3887,17 @@ static sat_result softassign__solve_plain(int *column_of_row, const softassign_p
     return result;
 }
 
-static sat_result softassign__solve_wrapped(int *column_of_row, const softassign_problem *problem, const softassign_options *options,
-                                            softassign_report *report)
+static sat_result softassign__solve_wrapped(int *column_of_row, const softassign_problem *problem,
+                                            const softassign_options *options, softassign_report *report)
 {
     softassign_problem stated = *problem, p = *problem;
     sat_allocator allocator;
     sat_result result;
     int j, *capacity, optional = problem->unassigned_cost > 0;
     size_t size;
-    if (problem->columns > 2147483647 / 2 - 65 || !sat__multiply_size(&size, (size_t)problem->columns + 1, 2 * sizeof(int))) return SAT_ERR_SIZE;
+    if (problem->columns > 2147483647 / 2 - 65 ||
+        !sat__multiply_size(&size, (size_t)problem->columns + 1, 2 * sizeof(int)))
+        return SAT_ERR_SIZE;
     if (!sat__resolve_allocator(&allocator, &options->allocator)) return SAT_ERR_ARGUMENT;
     capacity = (int *)sat__alloc(&allocator, size);
     if (!capacity) return SAT_ERR_MEMORY;
@@ -3830,7 +3906,9 @@ static sat_result softassign__solve_wrapped(int *column_of_row, const softassign
     p.cost_user = &stated;
     p.columns += optional;
     for (j = 0; j < p.columns; j++) {
-        capacity[j] = j == problem->columns ? problem->rows : problem->capacity ? problem->capacity[j] : options->capacity_default;
+        capacity[j] = j == problem->columns ? problem->rows
+                      : problem->capacity   ? problem->capacity[j]
+                                            : options->capacity_default;
         capacity[p.columns + j] = problem->minimum_use && j < problem->columns ? problem->minimum_use[j] : 0;
     }
     p.capacity = capacity;
@@ -3855,7 +3933,8 @@ SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_
         if (report) report->column_error = softassign__over_used(problem, &o);
         return SAT_ERR_ARGUMENT;
     }
-    if (problem->maximise || problem->unassigned_cost > 0) return softassign__solve_wrapped(column_of_row, problem, &o, report);
+    if (problem->maximise || problem->unassigned_cost > 0)
+        return softassign__solve_wrapped(column_of_row, problem, &o, report);
     return softassign__solve_plain(column_of_row, problem, &o, problem->cost != NULL, report);
 }
 
@@ -3873,7 +3952,8 @@ SOFTASSIGN_DEF sat_result softassign_features(float *out, const sat_image *image
     sat_result result;
     size_t size;
     int cx, cy, u, v, c, channels;
-    if (!out || !sat__image_is_valid(image) || grid_width < 1 || grid_height < 1 || parts_x < 1 || parts_y < 1) return SAT_ERR_ARGUMENT;
+    if (!out || !sat__image_is_valid(image) || grid_width < 1 || grid_height < 1 || parts_x < 1 || parts_y < 1)
+        return SAT_ERR_ARGUMENT;
     if ((int64_t)grid_width * parts_x > 2147483647 || (int64_t)grid_height * parts_y > 2147483647) return SAT_ERR_SIZE;
     channels = image->channels;
     if (!sat__multiply_size(&size, (size_t)(grid_width * parts_x), (size_t)(grid_height * parts_y)) ||
@@ -3889,7 +3969,8 @@ SOFTASSIGN_DEF sat_result softassign_features(float *out, const sat_image *image
         for (cx = 0; cx < grid_width; cx++)
             for (v = 0; v < parts_y; v++)
                 for (u = 0; u < parts_x; u++) {
-                    double step_x = (double)image->width / (grid_width * parts_x), step_y = (double)image->height / (grid_height * parts_y);
+                    double step_x = (double)image->width / (grid_width * parts_x),
+                           step_y = (double)image->height / (grid_height * parts_y);
                     double x0 = (cx * parts_x + u) * step_x, y0 = (cy * parts_y + v) * step_y;
                     double x1 = (cx * parts_x + u + 1) * step_x, y1 = (cy * parts_y + v + 1) * step_y;
                     for (c = 0; c < channels; c++)
@@ -3903,7 +3984,8 @@ SOFTASSIGN_DEF sat_result softassign_features(float *out, const sat_image *image
 static float softassign__cell_mean(const sat_image *image, int grid_width, int grid_height, int x, int y, int channel)
 {
     int x0 = (int)((int64_t)image->width * x / grid_width), x1 = (int)((int64_t)image->width * (x + 1) / grid_width);
-    int y0 = (int)((int64_t)image->height * y / grid_height), y1 = (int)((int64_t)image->height * (y + 1) / grid_height);
+    int y0 = (int)((int64_t)image->height * y / grid_height),
+        y1 = (int)((int64_t)image->height * (y + 1) / grid_height);
     double sum = 0;
     int i, j;
     if (x1 <= x0) x1 = x0 + 1;
@@ -3919,14 +4001,16 @@ static float softassign__cell_mean(const sat_image *image, int grid_width, int g
 
 static unsigned char softassign__to_byte(float v) { return (unsigned char)(v < 0 ? 0 : v > 255 ? 255 : v + 0.5f); }
 
-SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride, const sat_image *tiles, int tile_width,
-                                            int tile_height, const int *column_of_row, int grid_width, int grid_height,
-                                            const sat_image *target, float blend)
+SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride, const sat_image *tiles,
+                                            int tile_width, int tile_height, const int *column_of_row, int grid_width,
+                                            int grid_height, const sat_image *target, float blend)
 {
     int across, count, cell, y, k, channels, tint = target && blend > 0;
     ptrdiff_t row;
-    if (!out || !sat__image_is_valid(tiles) || tiles->format != SAT_U8 || !column_of_row || tile_width < 1 || tile_height < 1 ||
-        grid_width < 1 || grid_height < 1 || grid_width > 2147483647 / grid_height || !(blend >= 0 && blend <= 1)) return SAT_ERR_ARGUMENT;
+    if (!out || !sat__image_is_valid(tiles) || tiles->format != SAT_U8 || !column_of_row || tile_width < 1 ||
+        tile_height < 1 || grid_width < 1 || grid_height < 1 || grid_width > 2147483647 / grid_height ||
+        !(blend >= 0 && blend <= 1))
+        return SAT_ERR_ARGUMENT;
     channels = tiles->channels;
     if (target && (!sat__image_is_valid(target) || target->channels != channels)) return SAT_ERR_MISMATCH;
     across = tiles->width / tile_width;
@@ -3938,9 +4022,11 @@ SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride
     for (cell = 0; cell < grid_width * grid_height; cell++) {
         int cx = cell % grid_width, cy = cell / grid_width, tile = column_of_row[cell], n = tile_width * channels;
         float mean[4] = {0, 0, 0, 0};
-        for (k = 0; tint && k < channels; k++) mean[k] = softassign__cell_mean(target, grid_width, grid_height, cx, cy, k);
+        for (k = 0; tint && k < channels; k++)
+            mean[k] = softassign__cell_mean(target, grid_width, grid_height, cx, cy, k);
         for (y = 0; y < tile_height; y++) {
-            const unsigned char *from = (const unsigned char *)sat__image_row(tiles, tile / across * tile_height + y) + (ptrdiff_t)(tile % across) * n;
+            const unsigned char *from = (const unsigned char *)sat__image_row(tiles, tile / across * tile_height + y) +
+                                        (ptrdiff_t)(tile % across) * n;
             unsigned char *to = out + ((ptrdiff_t)cy * tile_height + y) * stride + (ptrdiff_t)cx * n;
             for (k = 0; k < n; k++)
                 to[k] = tint ? softassign__to_byte((float)from[k] * (1 - blend) + mean[k % channels] * blend) : from[k];
@@ -4097,15 +4183,38 @@ static const char softassign__glsl_copy[] = "void main() { result = vec4(at(sour
 /* ---- the object */
 
 enum {
-    SOFTASSIGN__DISTANCE, SOFTASSIGN__UPDATE_Q, SOFTASSIGN__UPDATE_M, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__SUM_ACROSS,
-    SOFTASSIGN__MAX_DOWN, SOFTASSIGN__MAX_ACROSS,
-    SOFTASSIGN__DIVIDE_COLUMNS, SOFTASSIGN__DIVIDE_ROWS, SOFTASSIGN__OUTLIER, SOFTASSIGN__ROWS_FIRST, SOFTASSIGN__ROWS_NEXT,
-    SOFTASSIGN__COLUMNS, SOFTASSIGN__UPDATE_PRICES, SOFTASSIGN__COPY, SOFTASSIGN__PROGRAMS
+    SOFTASSIGN__DISTANCE,
+    SOFTASSIGN__UPDATE_Q,
+    SOFTASSIGN__UPDATE_M,
+    SOFTASSIGN__SUM_DOWN,
+    SOFTASSIGN__SUM_ACROSS,
+    SOFTASSIGN__MAX_DOWN,
+    SOFTASSIGN__MAX_ACROSS,
+    SOFTASSIGN__DIVIDE_COLUMNS,
+    SOFTASSIGN__DIVIDE_ROWS,
+    SOFTASSIGN__OUTLIER,
+    SOFTASSIGN__ROWS_FIRST,
+    SOFTASSIGN__ROWS_NEXT,
+    SOFTASSIGN__COLUMNS,
+    SOFTASSIGN__UPDATE_PRICES,
+    SOFTASSIGN__COPY,
+    SOFTASSIGN__PROGRAMS
 };
 
 enum {
-    SOFTASSIGN__D, SOFTASSIGN__M, SOFTASSIGN__A, SOFTASSIGN__S, SOFTASSIGN__DOWN, SOFTASSIGN__DOWN_2, SOFTASSIGN__ACROSS,
-    SOFTASSIGN__ACROSS_2, SOFTASSIGN__OUTLIERS, SOFTASSIGN__OUTLIERS_2, SOFTASSIGN__V, SOFTASSIGN__V_2, SOFTASSIGN__TEXTURES
+    SOFTASSIGN__D,
+    SOFTASSIGN__M,
+    SOFTASSIGN__A,
+    SOFTASSIGN__S,
+    SOFTASSIGN__DOWN,
+    SOFTASSIGN__DOWN_2,
+    SOFTASSIGN__ACROSS,
+    SOFTASSIGN__ACROSS_2,
+    SOFTASSIGN__OUTLIERS,
+    SOFTASSIGN__OUTLIERS_2,
+    SOFTASSIGN__V,
+    SOFTASSIGN__V_2,
+    SOFTASSIGN__TEXTURES
 };
 
 typedef struct softassign__gl_program {
@@ -4135,7 +4244,8 @@ static void softassign__gl_delete_textures(softassign_gl *g)
     g->rows = g->columns = 0;
 }
 
-static sat_result softassign__gl_make_program(softassign_gl *g, int which, const char *name, const char *body, int vertical, int first)
+static sat_result softassign__gl_make_program(softassign_gl *g, int which, const char *name, const char *body,
+                                              int vertical, int first)
 {
     softassign__gl_program *p = &g->programs[which];
     const char *library[2], *text[3];
@@ -4189,13 +4299,15 @@ static sat_result softassign__gl_make_programs(softassign_gl *g)
         {SOFTASSIGN__COPY, "softassign: copy", softassign__glsl_copy, 0, 0}};
     int i;
     for (i = 0; i < SOFTASSIGN__PROGRAMS; i++) {
-        sat_result result = softassign__gl_make_program(g, all[i].which, all[i].name, all[i].body, all[i].vertical, all[i].first);
+        sat_result result =
+            softassign__gl_make_program(g, all[i].which, all[i].name, all[i].body, all[i].vertical, all[i].first);
         if (result != SAT_OK) return result;
     }
     return SAT_OK;
 }
 
-SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc, const softassign_options *options)
+SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc,
+                                               const softassign_options *options)
 {
     softassign_options o = options ? *options : softassign_defaults();
     sat_allocator allocator;
@@ -4205,7 +4317,8 @@ SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_p
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (!get_proc || !softassign__options_are_valid(&o) || !sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
+    if (!get_proc || !softassign__options_are_valid(&o) || !sat__resolve_allocator(&allocator, &o.allocator))
+        return SAT_ERR_ARGUMENT;
     g = (softassign_gl *)sat__alloc(&allocator, sizeof *g);
     if (!g) return SAT_ERR_MEMORY;
     memset(g, 0, sizeof *g);
@@ -4264,8 +4377,8 @@ static sat_result softassign__gl_make_textures(softassign_gl *g, int rows, int c
 }
 
 /* One pass into texture `to`; 0 stands for no texture. Textures may be read as bound names. */
-static void softassign__gl_run(softassign_gl *g, int program, int to, int width, int height, unsigned source, unsigned first,
-                               unsigned second, int size_x, int size_y)
+static void softassign__gl_run(softassign_gl *g, int program, int to, int width, int height, unsigned source,
+                               unsigned first, unsigned second, int size_x, int size_y)
 {
     const softassign__gl_program *p = &g->programs[program];
     sat__gl *gl = &g->gl;
@@ -4284,7 +4397,8 @@ static void softassign__gl_run(softassign_gl *g, int program, int to, int width,
     sat__gl_draw(gl);
 }
 
-static void softassign__gl_values(softassign_gl *g, int program, float alpha, float inverse_t, float factor, float scale)
+static void softassign__gl_values(softassign_gl *g, int program, float alpha, float inverse_t, float factor,
+                                  float scale)
 {
     const softassign__gl_program *p = &g->programs[program];
     g->gl.UseProgram(p->program);
@@ -4296,13 +4410,15 @@ static void softassign__gl_values(softassign_gl *g, int program, float alpha, fl
 
 /* ---- sums */
 
-/* Sums (or takes the largest of) a texture of width x height down to one row or column; returns the texture that holds it. */
+/* Sums (or takes the largest of) a texture of width x height down to one row or column; returns the texture that holds
+   it. */
 static int softassign__gl_reduce(softassign_gl *g, int program, int from, int width, int height)
 {
     int k = g->options.gather, vertical = program == SOFTASSIGN__SUM_DOWN || program == SOFTASSIGN__MAX_DOWN;
     int a = vertical ? SOFTASSIGN__DOWN : SOFTASSIGN__ACROSS;
     while ((vertical ? height : width) > 1) {
-        int to = from == a ? a + 1 : a, w = vertical ? width : (width + k - 1) / k, h = vertical ? (height + k - 1) / k : height;
+        int to = from == a ? a + 1 : a, w = vertical ? width : (width + k - 1) / k,
+            h = vertical ? (height + k - 1) / k : height;
         softassign__gl_run(g, program, to, w, h, g->texture[from], 0, 0, width, height);
         from = to;
         width = w;
@@ -4324,7 +4440,8 @@ static sat_result softassign__gl_texel(softassign_gl *g, int from, float *value)
 /* ---- distances from features */
 
 /* Packs features four to a texel, zeros behind. */
-static sat_result softassign__gl_feature_texture(softassign_gl *g, unsigned *texture, const float *features, int count, int n)
+static sat_result softassign__gl_feature_texture(softassign_gl *g, unsigned *texture, const float *features, int count,
+                                                 int n)
 {
     int texels = (n + 3) / 4, i;
     size_t size, width = (size_t)texels * 4 * sizeof(float);
@@ -4335,7 +4452,8 @@ static sat_result softassign__gl_feature_texture(softassign_gl *g, unsigned *tex
     packed = (float *)sat__alloc(&g->allocator, size);
     if (!packed) return SAT_ERR_MEMORY;
     memset(packed, 0, size);
-    for (i = 0; i < count; i++) memcpy(packed + (size_t)i * (size_t)texels * 4, features + (size_t)i * (size_t)n, (size_t)n * sizeof(float));
+    for (i = 0; i < count; i++)
+        memcpy(packed + (size_t)i * (size_t)texels * 4, features + (size_t)i * (size_t)n, (size_t)n * sizeof(float));
     result = sat__gl_texture(&g->gl, texture, SAT__GL_RGBA32F, texels, count, packed);
     sat__release(&g->allocator, packed, size);
     return result;
@@ -4345,9 +4463,11 @@ static sat_result softassign__gl_distances(softassign_gl *g, const softassign_pr
 {
     unsigned rows = 0, columns = 0;
     sat_result result = softassign__gl_feature_texture(g, &rows, p->row_features, p->rows, p->feature_count);
-    if (result == SAT_OK) result = softassign__gl_feature_texture(g, &columns, p->column_features, p->columns, p->feature_count);
     if (result == SAT_OK)
-        softassign__gl_run(g, SOFTASSIGN__DISTANCE, SOFTASSIGN__D, g->columns, g->rows, 0, rows, columns, (p->feature_count + 3) / 4, 1);
+        result = softassign__gl_feature_texture(g, &columns, p->column_features, p->columns, p->feature_count);
+    if (result == SAT_OK)
+        softassign__gl_run(g, SOFTASSIGN__DISTANCE, SOFTASSIGN__D, g->columns, g->rows, 0, rows, columns,
+                           (p->feature_count + 3) / 4, 1);
     if (rows) g->gl.DeleteTextures(1, &rows);
     if (columns) g->gl.DeleteTextures(1, &columns);
     return result;
@@ -4373,11 +4493,14 @@ static sat_result softassign__gl_check_costs(const softassign_problem *p)
     int i, j;
     if (p->cost || p->cost_fn) {
         for (i = 0; i < p->rows && result == SAT_OK; i++)
-            for (j = 0; j < p->columns && result == SAT_OK; j++) result = softassign__check_cost(softassign__pair(p, i, j));
+            for (j = 0; j < p->columns && result == SAT_OK; j++)
+                result = softassign__check_cost(softassign__pair(p, i, j));
         return result;
     }
-    for (k = 0; k < n * (size_t)p->rows && result == SAT_OK; k++) result = softassign__check_feature(p->row_features[k]);
-    for (k = 0; k < n * (size_t)p->columns && result == SAT_OK; k++) result = softassign__check_feature(p->column_features[k]);
+    for (k = 0; k < n * (size_t)p->rows && result == SAT_OK; k++)
+        result = softassign__check_feature(p->row_features[k]);
+    for (k = 0; k < n * (size_t)p->columns && result == SAT_OK; k++)
+        result = softassign__check_feature(p->column_features[k]);
     return result;
 }
 
@@ -4419,7 +4542,8 @@ SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softa
     result = softassign__gl_check_costs(problem);
     if (result != SAT_OK) return result;
     sat__gl_begin(&gl->gl, &state, 3);
-    if (gl->rows != problem->rows || gl->columns != problem->columns) result = softassign__gl_make_textures(gl, problem->rows, problem->columns);
+    if (gl->rows != problem->rows || gl->columns != problem->columns)
+        result = softassign__gl_make_textures(gl, problem->rows, problem->columns);
     if (result == SAT_OK && !problem->cost && !problem->cost_fn) result = softassign__gl_distances(gl, problem);
     else if (result == SAT_OK) {
         size_t size = (size_t)problem->columns * sizeof(float);
@@ -4460,14 +4584,16 @@ static sat_result softassign__gl_start_matrix(softassign_gl *g)
 static void softassign__gl_sinkhorn(softassign_gl *g, int *outlier)
 {
     int w = g->columns, h = g->rows, sums = softassign__gl_reduce(g, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__A, w, h);
-    softassign__gl_run(g, SOFTASSIGN__DIVIDE_COLUMNS, SOFTASSIGN__M, w, h, g->texture[SOFTASSIGN__A], g->texture[sums], g->texture[*outlier], w, h);
+    softassign__gl_run(g, SOFTASSIGN__DIVIDE_COLUMNS, SOFTASSIGN__M, w, h, g->texture[SOFTASSIGN__A], g->texture[sums],
+                       g->texture[*outlier], w, h);
     if (g->options.outlier_evolves) {
         int to = *outlier == SOFTASSIGN__V ? SOFTASSIGN__OUTLIERS_2 : SOFTASSIGN__V;
         softassign__gl_run(g, SOFTASSIGN__OUTLIER, to, w, 1, g->texture[*outlier], g->texture[sums], 0, w, 1);
         *outlier = to;
     }
     sums = softassign__gl_reduce(g, SOFTASSIGN__SUM_ACROSS, SOFTASSIGN__M, w, h);
-    softassign__gl_run(g, SOFTASSIGN__DIVIDE_ROWS, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M], g->texture[sums], 0, w, h);
+    softassign__gl_run(g, SOFTASSIGN__DIVIDE_ROWS, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M], g->texture[sums], 0,
+                       w, h);
 }
 
 /* One temperature; afterwards M holds the matrix and *cost the sum of the last Q. */
@@ -4483,37 +4609,44 @@ static sat_result softassign__gl_cool(softassign_gl *g, double t, float *cost)
     for (steady = 0; steady < o->iterations[1]; steady++) {
         int outlier = SOFTASSIGN__OUTLIERS;
         if (steady == o->iterations[1] - 1) {
-            softassign__gl_run(g, SOFTASSIGN__UPDATE_Q, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M], g->texture[SOFTASSIGN__D], 0, w, h);
+            softassign__gl_run(g, SOFTASSIGN__UPDATE_Q, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M],
+                               g->texture[SOFTASSIGN__D], 0, w, h);
             q = softassign__gl_reduce(g, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__A, w, h);
             q = softassign__gl_reduce(g, SOFTASSIGN__SUM_ACROSS, q, w, 1);
             result = softassign__gl_texel(g, q, cost);
             if (result != SAT_OK) return result;
         }
-        softassign__gl_run(g, SOFTASSIGN__UPDATE_M, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M], g->texture[SOFTASSIGN__D], 0, w, h);
+        softassign__gl_run(g, SOFTASSIGN__UPDATE_M, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M],
+                           g->texture[SOFTASSIGN__D], 0, w, h);
         for (turn = 0; turn < o->iterations[2]; turn++) softassign__gl_sinkhorn(g, &outlier);
         softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__M, w, h, g->texture[SOFTASSIGN__A], 0, 0, w, h);
     }
     return result;
 }
 
-SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft, ptrdiff_t soft_stride, double *soft_cost)
+SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft, ptrdiff_t soft_stride,
+                                                  double *soft_cost)
 {
     softassign_gl *g = gl;
     sat__gl_state state;
     sat_result result;
     double t, lowest = (double)SOFTASSIGN__INFINITY;
     int i;
-    if (!g || !g->rows || (soft && soft_stride < g->columns && soft_stride > -(ptrdiff_t)g->columns)) return SAT_ERR_ARGUMENT;
+    if (!g || !g->rows || (soft && soft_stride < g->columns && soft_stride > -(ptrdiff_t)g->columns))
+        return SAT_ERR_ARGUMENT;
     sat__gl_begin(&g->gl, &state, 3);
     result = softassign__gl_start_matrix(g);
-    softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows, g->texture[SOFTASSIGN__M], 0, 0, g->columns, g->rows);
-    for (t = g->options.temperature, i = 0; result == SAT_OK && i < g->options.iterations[0]; i++, t *= g->options.cooling) {
+    softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows, g->texture[SOFTASSIGN__M], 0, 0,
+                       g->columns, g->rows);
+    for (t = g->options.temperature, i = 0; result == SAT_OK && i < g->options.iterations[0];
+         i++, t *= g->options.cooling) {
         float cost;
         if (!(t > 1e-30)) t = 1e-30;
         result = softassign__gl_cool(g, t, &cost);
         if (result != SAT_OK || !((double)cost < lowest)) continue;
         lowest = (double)cost;
-        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows, g->texture[SOFTASSIGN__M], 0, 0, g->columns, g->rows);
+        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows, g->texture[SOFTASSIGN__M], 0, 0,
+                           g->columns, g->rows);
     }
     if (result == SAT_OK && soft) {
         result = sat__gl_attach(&g->gl, g->gl.framebuffer, &g->texture[SOFTASSIGN__S], 1, 0);
@@ -4566,12 +4699,15 @@ static sat_result softassign__gl_bound(softassign_gl *g, int rows, const float *
     return result;
 }
 
-SOFTASSIGN_DEF sat_result softassign_gl_sweep(softassign_gl *gl, float *price, double *lower_bound, double temperature, int sweeps)
+SOFTASSIGN_DEF sat_result softassign_gl_sweep(softassign_gl *gl, float *price, double *lower_bound, double temperature,
+                                              int sweeps)
 {
     softassign_gl *g = gl;
     sat__gl_state state;
     sat_result result = SAT_OK;
-    int i, v = SOFTASSIGN__V, programs[4] = {SOFTASSIGN__ROWS_FIRST, SOFTASSIGN__ROWS_NEXT, SOFTASSIGN__COLUMNS, SOFTASSIGN__UPDATE_PRICES};
+    int i,
+        v = SOFTASSIGN__V,
+        programs[4] = {SOFTASSIGN__ROWS_FIRST, SOFTASSIGN__ROWS_NEXT, SOFTASSIGN__COLUMNS, SOFTASSIGN__UPDATE_PRICES};
     if (!g || !g->rows || !price || sweeps < 1 || !(temperature > 1e-30 && temperature < 1e30)) return SAT_ERR_ARGUMENT;
     for (i = 0; i < g->columns; i++)
         if (!(price[i] <= 0 && price[i] > -1e36f)) return SAT_ERR_ARGUMENT;
@@ -4579,16 +4715,18 @@ SOFTASSIGN_DEF sat_result softassign_gl_sweep(softassign_gl *gl, float *price, d
     sat__gl_upload(&g->gl, g->texture[v], SAT__GL_R32F, g->columns, 1, price);
     for (i = 0; i < 4; i++) softassign__gl_values(g, programs[i], 0, (float)(1 / temperature), (float)temperature, 0);
     for (i = 0; i < sweeps && result == SAT_OK; i++) {
-        int k = g->options.gather, height = (g->rows + k - 1) / k, next = v == SOFTASSIGN__V ? SOFTASSIGN__V_2 : SOFTASSIGN__V;
+        int k = g->options.gather, height = (g->rows + k - 1) / k,
+            next = v == SOFTASSIGN__V ? SOFTASSIGN__V_2 : SOFTASSIGN__V;
         int rows = softassign__gl_rows(g, v), sums;
         if (i == sweeps - 1 && lower_bound) {
             result = sat__gl_read(&g->gl, price, g->texture[v], SAT__GL_R32F, g->columns, 1);
             if (result == SAT_OK) result = softassign__gl_bound(g, rows, price, lower_bound);
         }
-        softassign__gl_run(g, SOFTASSIGN__COLUMNS, SOFTASSIGN__DOWN, g->columns, height, g->texture[SOFTASSIGN__D], g->texture[rows],
-                           g->texture[v], g->columns, g->rows);
+        softassign__gl_run(g, SOFTASSIGN__COLUMNS, SOFTASSIGN__DOWN, g->columns, height, g->texture[SOFTASSIGN__D],
+                           g->texture[rows], g->texture[v], g->columns, g->rows);
         sums = softassign__gl_reduce(g, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__DOWN, g->columns, height);
-        softassign__gl_run(g, SOFTASSIGN__UPDATE_PRICES, next, g->columns, 1, g->texture[v], g->texture[sums], 0, g->columns, 1);
+        softassign__gl_run(g, SOFTASSIGN__UPDATE_PRICES, next, g->columns, 1, g->texture[v], g->texture[sums], 0,
+                           g->columns, 1);
         v = next;
     }
     if (result == SAT_OK) result = sat__gl_read(&g->gl, price, g->texture[v], SAT__GL_R32F, g->columns, 1);
@@ -4608,9 +4746,9 @@ SAT__IEEE_END
    are in the file LICENSE.
 
    MIT No Attribution. Copyright 2026 the lightscan authors. Permission is hereby granted, free of charge, to any person
-   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software without
-   restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute, sublicense,
-   and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
+   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software
+   without restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute,
+   sublicense, and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
 
    THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE
    WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR

@@ -1,4 +1,5 @@
-/* ssao_sat.h - 0.1.0 - screen-space ambient occlusion from summed-area tables - SPDX-License-Identifier: MIT-0 OR Unlicense
+/* ssao_sat.h - 0.1.0 - screen-space ambient occlusion from summed-area tables - SPDX-License-Identifier: MIT-0 OR
+   Unlicense
 
    Accessibility of ambient light from a depth buffer: no random numbers, no blur pass, right in every depth convention.
 
@@ -16,84 +17,95 @@
        ssao_sat_apply(ao, open, 0, &in, NULL);// again for every frame; allocates nothing
        ssao_sat_destroy(ao);
 
-   Build with `cc -std=c99 program.c -lm`; sat.h must lie beside this file. C99 and C++11. S = rho (L_direct + L_ambient open).
+   Build with `cc -std=c99 program.c -lm`; sat.h must lie beside this file. C99 and C++11. S = rho (L_direct + L_ambient
+   open).
 
    WHAT IT DOES
 
-   - SSAO_SAT_SLABS: the depth range is cut into slabs; tables of count, depth and position give the exact centroid of what each slab
-     holds in 24 cells around a pixel, and the sines of these over the tangent plane are summed with their distance. COST puts its
-     error beside that of others.
-   - SSAO_SAT_PLANE: the table of 5.4.1 with two changes: it holds what is affine on planes (1/z in perspective, z in orthographic
-     views), and the tangent plane is subtracted. A flat wall at any slant then gives exactly nothing.
-   - The three methods of Slomp 2012, chapter 5, with what the text leaves open settled by measurement; `as_printed` keeps its letter.
-   - One matrix decides the convention: linear, hardware or reversed depth, [-1,1] or [0,1], infinite far planes, off-centre,
-     flipped, left-handed, orthographic, jittered, an oblique near plane (mirrors, water). What must be 0 may be the rounding of a
-     matrix product. A depth kind that contradicts the matrix is refused.
-   - No pixel and no small object moves the frame: depth ranges leave out the nearest and farthest 4 of 256 blocks of a sample, and
-     what lies beyond is in the end slabs.
-   - Half-resolution tables (SLABS: of all pixels, so a wire counts at every column) with an upsample that knows planes and never
-     reads sky; bent normals; signed depth unsharp masking; bands of rows for stills of any size; statistics of what was left out and
-     of normals in the wrong space; other sizes and options without a new object; OpenGL 3.3 / ES 3.0, nothing compiled in a frame.
+   - SSAO_SAT_SLABS: the depth range is cut into slabs; tables of count, depth and position give the exact centroid of
+     what each slab holds in 24 cells around a pixel, and the sines of these over the tangent plane are summed with
+     their distance. COST puts its error beside that of others.
+   - SSAO_SAT_PLANE: the table of 5.4.1 with two changes: it holds what is affine on planes (1/z in perspective, z in
+     orthographic views), and the tangent plane is subtracted. A flat wall at any slant then gives exactly nothing.
+   - The three methods of Slomp 2012, chapter 5, with what the text leaves open settled by measurement; `as_printed`
+     keeps its letter.
+   - One matrix decides the convention: linear, hardware or reversed depth, [-1,1] or [0,1], infinite far planes,
+     off-centre, flipped, left-handed, orthographic, jittered, an oblique near plane (mirrors, water). What must be 0
+     may be the rounding of a matrix product. A depth kind that contradicts the matrix is refused.
+   - No pixel and no small object moves the frame: depth ranges leave out the nearest and farthest 4 of 256 blocks of a
+     sample, and what lies beyond is in the end slabs.
+   - Half-resolution tables (SLABS: of all pixels, so a wire counts at every column) with an upsample that knows planes
+     and never reads sky; bent normals; signed depth unsharp masking; bands of rows for stills of any size; statistics
+     of what was left out and of normals in the wrong space; other sizes and options without a new object; OpenGL 3.3 /
+     ES 3.0, nothing compiled in a frame.
 
    WHAT IT DOES NOT
 
-   - It sees what the depth buffer holds: occluders off the screen or behind others do not count. Nothing is assumed about thickness, so
-     thin poles darken a little what lies behind them.
+   - It sees what the depth buffer holds: occluders off the screen or behind others do not count. Nothing is assumed
+     about thickness, so thin poles darken a little what lies behind them.
    - No temporal accumulation: there is no noise to accumulate away. No shading: the accessibility is yours to multiply.
    - On the GPU no bent normals and no signed output. Logarithmic depth is not decoded: give distances.
    - GTAO has a smaller error at small radii (bench_ssao_sat): cells average what samples resolve.
-   - Smooth normals on a coarse mesh are believed: its facets then darken at their edges. Without normals they are taken from depth.
+   - Smooth normals on a coarse mesh are believed: its facets then darken at their edges. Without normals they are taken
+     from depth.
 
    DEVIATIONS from chapter 5, with their reasons
 
-   - 5.4.3 keeps children whose mean is "higher" where 5.4.1 calls higher values farther: nearer ones are kept here, whatever the table
-     holds. No child passes: eq 5.4 is 0/0 there; the parent counts.
+   - 5.4.3 keeps children whose mean is "higher" where 5.4.1 calls higher values farther: nearer ones are kept here,
+     whatever the table holds. No child passes: eq 5.4 is 0/0 there; the parent counts.
    - 5.4.1 makes the region proportional to the depth and smaller with it: half side = radius focal length / depth.
    - 5.4.1 gives sky its own mean only where no object is near; here sky is skipped, and counts as far away for others.
    - 5.4.2 shifts along n.xy; a normal projects to n.xy - n.z (x, y) / z in perspective.
-   - "1 - difference" has a unit: differences are divided by the radius. What 5.7 regrets, that near and far planes change the
-     result, disappears with it.
-   - 5.5 stores tables as half floats, which overflow at 512 x 512. Half floats are accepted as depths; tables are integers modulo 2^32.
-   - Raw depth differences confuse slope with occlusion: fitted to ray tracing, MINIMALIST and its kin want nearly no gain at all.
-     The defaults keep a faint effect; set gain to 3 to 10 for the look of the thesis.
+   - "1 - difference" has a unit: differences are divided by the radius. What 5.7 regrets, that near and far planes
+     change the result, disappears with it.
+   - 5.5 stores tables as half floats, which overflow at 512 x 512. Half floats are accepted as depths; tables are
+     integers modulo 2^32.
+   - Raw depth differences confuse slope with occlusion: fitted to ray tracing, MINIMALIST and its kin want nearly no
+     gain at all. The defaults keep a faint effect; set gain to 3 to 10 for the look of the thesis.
 
    OPTIONS (macros)
 
-     SSAO_SAT_IMPLEMENTATION  off     implementing file   brings the code; LIGHTSCAN_IMPLEMENTATION does so for all six headers
+     SSAO_SAT_IMPLEMENTATION  off     implementing file   brings the code; LIGHTSCAN_IMPLEMENTATION does so for all six
+                              headers
      SSAO_SAT_STATIC          off     everywhere          all functions are private to each file
      SSAO_SAT_DEF             extern  everywhere          replaces the linkage
      SSAO_SAT_GL              off     everywhere          OpenGL; needs no GL header, loader or library
-     SSAO_SAT_NO_SLABS        off     everywhere          without SSAO_SAT_SLABS; the default is then SSAO_SAT_PLANE; implies NO_BENT
+     SSAO_SAT_NO_SLABS        off     everywhere          without SSAO_SAT_SLABS; the default is then SSAO_SAT_PLANE;
+                              implies NO_BENT
      SSAO_SAT_NO_REFINED      off     implementing file   without SSAO_SAT_REFINED
      SSAO_SAT_NO_BENT         off     everywhere          without ssao_sat_apply_bent
      SAT_NO_SIMD, SAT_NO_STDLIB, SAT_ASSERT               as in sat.h
 
    MEMORY, THREADS, ERRORS
 
-   ssao_sat_create makes one allocation; frames make none. Bytes a pixel of the tables: 16 a slab and about 60; so 8 slabs at half
-   resolution take 47 a pixel of the picture. Stack: at most 3 KB. With band_rows the memory is that of band_rows + 2 max_pixels + 8
-   table rows.
-   An object serves one call at a time. The input is only read. Every argument is checked in every build, and on an error nothing is
-   written; ssao_sat_explain and ssao_sat_explain_input say in a sentence what was wrong. NULL options are the defaults.
-   Options may carry a parallel_for: rows, slabs and estimates are shared out by it.
+   ssao_sat_create makes one allocation; frames make none. Bytes a pixel of the tables: 16 a slab and about 60; so 8
+   slabs at half resolution take 47 a pixel of the picture. Stack: at most 3 KB. With band_rows the memory is that of
+   band_rows + 2 max_pixels + 8 table rows.
+   An object serves one call at a time. The input is only read. Every argument is checked in every build, and on an
+   error nothing is written; ssao_sat_explain and ssao_sat_explain_input say in a sentence what was wrong. NULL options
+   are the defaults. Options may carry a parallel_for: rows, slabs and estimates are shared out by it.
 
    NUMERICS
 
-   - Tables are integers modulo 2^32: sums over boxes are exact at every size (the picture may be 32768 wide), so a box mean is wrong
-     by at most half a quantum: 2^-21 of its range (from a quarter of the nearest distance on) or less for regions up to 22 pixels,
-     2^-15 at 128. The same bits for any number of workers and any bands; with and without SIMD to the last bits of the compiler's float contraction.
-   - Depths that are NaN, infinite, <= 0, cleared, or beyond 1e18 are sky: accessibility 1, part of no slab, never an occluder.
-     Normals that are NaN, infinite or zero are taken from depth; any length will do.
-   - The bias (a sine of 0.06) hides the rounding of depths. Conventions agree to 1e-3 as long as their depths resolve the radius.
+   - Tables are integers modulo 2^32: sums over boxes are exact at every size (the picture may be 32768 wide), so a box
+     mean is wrong by at most half a quantum: 2^-21 of its range (from a quarter of the nearest distance on) or less for
+     regions up to 22 pixels, 2^-15 at 128. The same bits for any number of workers and any bands; with and without SIMD
+     to the last bits of the compiler's float contraction.
+   - Depths that are NaN, infinite, <= 0, cleared, or beyond 1e18 are sky: accessibility 1, part of no slab, never an
+     occluder. Normals that are NaN, infinite or zero are taken from depth; any length will do.
+   - The bias (a sine of 0.06) hides the rounding of depths. Conventions agree to 1e-3 as long as their depths resolve
+     the radius.
    - Edges of slabs follow both the depth range and where pixels are: nine decades of depth keep their slabs useful.
-   - Regions are cut at the border of the picture and divided by what is left. SLABS: what a cell loses goes to the cells beside the
-     pixel, so that a crease keeps its value up to the border (within 0.03) without seams. Radii beyond max_pixels are cut and counted.
+   - Regions are cut at the border of the picture and divided by what is left. SLABS: what a cell loses goes to the
+     cells beside the pixel, so that a crease keeps its value up to the border (within 0.03) without seams. Radii beyond
+     max_pixels are cut and counted.
 
    COST
 
-   Work a table pixel: 16 lookups a ring and slab in reach; flat regions cost 4. Measured by bench_ssao_sat, three scenes x radii 0.1,
-   0.25, 0.6 at 512 x 512, 96 rays a pixel, one thread, gcc -O2 (SSE2), processor time in the same run (1 = half-resolution GTAO,
-   3 x (3 + 3) samples). The others are plain scalar C, the slabs four lanes wide: a GTAO in vectors is faster than the slabs.
+   Work a table pixel: 16 lookups a ring and slab in reach; flat regions cost 4. Measured by bench_ssao_sat, three
+   scenes x radii 0.1, 0.25, 0.6 at 512 x 512, 96 rays a pixel, one thread, gcc -O2 (SSE2), processor time in the same
+   run (1 = half-resolution GTAO, 3 x (3 + 3) samples). The others are plain scalar C, the slabs four lanes wide: a GTAO
+   in vectors is faster than the slabs.
 
      method                        time   RMSE    SSIM   RMSE, gain and power    RMSE, another scene,
                                                          from other scenes       nothing fitted to it
@@ -110,12 +122,13 @@
      GTAO, half resolution         1.00   0.060   0.88   0.060                   0.049
      GTAO 3 x (3 + 3) + 5 x 5      1.72   0.058   0.88   0.058                   0.047
 
-   Where things are thinner than cells the order is another: RMSE on grass and poles (192 x 192) 0.105, HBAO 0.093, GTAO 0.148; in a
-   hall of 40 m 0.077, HBAO 0.076, GTAO 0.081, all at half resolution. Time grows with the radius, because more slabs come into reach
-   and less is flat: radii 0.1 : 0.25 : 0.6 cost 1 : 1.4 : 2.0; the others cost 1 : 1.0 : 1.1. Leaving out flat regions changes nothing
-   in the output. Bent normals cost a tenth or so and are 1 to 7 degrees off the ray-traced ones. A gliding camera (192 x 192) changes
-   the result by 0.0016 a frame where half-resolution GTAO changes by 0.0031, HBAO by 0.0020. Box means of 1/z at 4096 x 4096: 5e-6 of
-   a depth step off, where float tables are 0.6 off. Full-resolution tables cost 2.7 times as much and gain 0.0005.
+   Where things are thinner than cells the order is another: RMSE on grass and poles (192 x 192) 0.105, HBAO 0.093, GTAO
+   0.148; in a hall of 40 m 0.077, HBAO 0.076, GTAO 0.081, all at half resolution. Time grows with the radius, because
+   more slabs come into reach and less is flat: radii 0.1 : 0.25 : 0.6 cost 1 : 1.4 : 2.0; the others cost 1 : 1.0 :
+   1.1. Leaving out flat regions changes nothing in the output. Bent normals cost a tenth or so and are 1 to 7 degrees
+   off the ray-traced ones. A gliding camera (192 x 192) changes the result by 0.0016 a frame where half-resolution GTAO
+   changes by 0.0031, HBAO by 0.0020. Box means of 1/z at 4096 x 4096: 5e-6 of a depth step off, where float tables are
+   0.6 off. Full-resolution tables cost 2.7 times as much and gain 0.0005.
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SSAO_SAT_IMPLEMENTATION)
@@ -186,35 +199,46 @@ typedef struct ssao_sat_input {
     const float *normals;      /* view space xyz; NULL: derived from depth */
     ptrdiff_t normal_stride;
     ssao_sat_depth depth_kind; /* SSAO_SAT_DEPTH_LINEAR */
-    float projection[16];      /* column-major; perspective or orthographic, off-centre, flipped, infinite far: all read from it */
-    int clip_zero_to_one;      /* 0: the matrix maps depth to [-1,1] (OpenGL); 1: to [0,1] (Vulkan, Direct3D, glClipControl) */
+    float projection[16];      /* column-major; perspective or orthographic, off-centre, flipped, infinite far: all read
+                                  from it */
+    int clip_zero_to_one;      /* 0: the matrix maps depth to [-1,1] (OpenGL); 1: to [0,1] (Vulkan, Direct3D,
+                                  glClipControl) */
     const uint16_t *half_depth;/* binary16 depths instead of `depth`, which is then NULL */
     float sky;                 /* LINEAR: distances >= sky are sky; 0: only infinity is */
-    int left_handed;           /* 0; 1: the camera looks along +z (Direct3D): of the matrix, the normals and the bent normals */
+    int left_handed;           /* 0; 1: the camera looks along +z (Direct3D): of the matrix, the normals and the bent
+                                  normals */
 } ssao_sat_input;
 
 /* default; range */
 typedef struct ssao_sat_options {
     ssao_sat_method method;  /* SSAO_SAT_SLABS; 0..4 */
-    double radius;           /* 0.5; 0..1e15; world units: occluders farther away than this do not count; 0: all is open */
+    double radius;           /* 0.5; 0..1e15; world units: occluders farther away than this do not count; 0: all is
+                                open */
     double gain;             /* 1; 0..1e6; times the strength fitted for the method; 0: all is open */
     double power;            /* 1; 0.001..1000; exponent on the accessibility, on top of the fitted one */
-    int half_resolution;     /* 1; 0..1; tables and estimates for every second pixel of every second row, then a plane-aware
-                                upsample (5.5); SLABS: the tables hold all pixels, the others every fourth */
+    int half_resolution;     /* 1; 0..1; tables and estimates for every second pixel of every second row, then a
+                                plane-aware upsample (5.5); SLABS: the tables hold all pixels, the others every
+                                fourth */
     int slabs;               /* 8; 1..16; 4 halve the memory */
     int scales;              /* 3; 1..4; rings of cells, each a third of the one before */
     int plane_boxes;         /* 2; 1..2; PLANE uses n x n boxes */
     double normal_offset;    /* 1.5; 0..1000; NORMAL_GUIDED, REFINED: shift of the region, in its half sizes */
     int refine_levels;       /* 2; 0..2 */
     double refine_threshold; /* 0.15; 0..1e6; regions are split while |mean - depth| < this part of the depth */
-    int as_printed;          /* 0; 0..1; the text of 5.4.2 and 5.4.3 to the letter: shift along n.xy, keep the children of higher value */
-    double region_pixels;    /* 0; 0..512; 0: the region follows the projected radius; else half its side in pixels, for all pixels */
-    double depth_gain;       /* 0; -1..1e6; gain grows by this factor from the nearest to the farthest pixel (published methods) */
+    int as_printed;          /* 0; 0..1; the text of 5.4.2 and 5.4.3 to the letter: shift along n.xy, keep the children
+                                of higher value */
+    double region_pixels;    /* 0; 0..512; 0: the region follows the projected radius; else half its side in pixels, for
+                                all pixels */
+    double depth_gain;       /* 0; -1..1e6; gain grows by this factor from the nearest to the farthest pixel (published
+                                methods) */
     int inverted_depth;      /* 0; 0..1; published methods average 1 / depth (5.5) */
-    int float_table;         /* 0; 0..2; integers modulo 2^32; 1: floats, 2: floats less the mean (4.6): for comparison only */
-    double min_pixels;       /* 1.5; 1..512; regions with a smaller half side fade out, measured in pixels of the tables */
+    int float_table;         /* 0; 0..2; integers modulo 2^32; 1: floats, 2: floats less the mean (4.6): for comparison
+                                only */
+    double min_pixels;       /* 1.5; 1..512; regions with a smaller half side fade out, measured in pixels of the
+                                tables */
     double max_pixels;       /* 256; 1..512; at least min_pixels: regions are cut to this half side */
-    int band_rows;           /* 0; 16..32768 or 0; tables of this many rows and a radius above and below; 0: of the whole picture */
+    int band_rows;           /* 0; 16..32768 or 0; tables of this many rows and a radius above and below; 0: of the
+                                whole picture */
     int bottom_up;           /* 0; 0..1; row 0 is the bottom of the picture, in all buffers */
     int skip_flat;           /* 1; 0..1; regions that are one plane are not looked at */
     sat_allocator allocator; /* malloc; used by create and destroy only */
@@ -233,9 +257,10 @@ typedef struct ssao_sat_stats {
     size_t slabs_visited, slabs_skipped; /* SLABS, summed over groups of pixels: outside [z - R, z + R], or empty */
     size_t lookups;           /* published methods and PLANE: table entries read */
     size_t normals_replaced;  /* given normals that were NaN, infinite or zero */
-    size_t normals_backfacing;/* given normals that point away from the camera: most of them, when a convention is wrong */
-    size_t normals_compared, normals_off; /* of the 32 x 32 sample; those more than 45 degrees off the normal from depth: a tenth
-                                             of them or more when the normals are not in view space */
+    size_t normals_backfacing;/* given normals that point away from the camera: most of them, when a convention is
+                                 wrong */
+    size_t normals_compared, normals_off; /* of the 32 x 32 sample; those more than 45 degrees off the normal from
+                                             depth: a tenth of them or more when the normals are not in view space */
     double nearest, farthest; /* depth range; 0, 0 when all is sky */
     size_t bytes;             /* memory the object holds */
 } ssao_sat_stats;
@@ -251,33 +276,40 @@ SSAO_SAT_DEF ssao_sat_options ssao_sat_defaults(void);
 /* Linear depth and a symmetric perspective of this vertical field of view: fill in buffers and strides. */
 SSAO_SAT_DEF ssao_sat_input ssao_sat_input_linear(const float *depth, int width, int height, double vertical_fov);
 
-/* Scratch memory for pictures of this size; exactly one allocation. 1 <= width, height <= 32768. NULL options: the defaults. */
+/* Scratch memory for pictures of this size; exactly one allocation. 1 <= width, height <= 32768. NULL options: the
+   defaults. */
 SSAO_SAT_DEF sat_result ssao_sat_create(ssao_sat **out, int width, int height, const ssao_sat_options *options);
-/* Another size or other options in the memory that create took: SAT_ERR_SIZE when it does not hold them, and nothing changes. The
-   allocator stays; NULL options: as they are. Costs nothing but where the layout changes (one pass over the memory). */
+/* Another size or other options in the memory that create took: SAT_ERR_SIZE when it does not hold them, and nothing
+   changes. The allocator stays; NULL options: as they are. Costs nothing but where the layout changes (one pass over
+   the memory). */
 SSAO_SAT_DEF sat_result ssao_sat_resize(ssao_sat *ao, int width, int height, const ssao_sat_options *options);
-/* What create or apply says SAT_ERR_ARGUMENT to, in a sentence ("scales is 99; 1..4") written into `text` and returned; "" for
-   nothing. */
-SSAO_SAT_DEF const char *ssao_sat_explain(char *text, size_t size, int width, int height, const ssao_sat_options *options);
+/* What create or apply says SAT_ERR_ARGUMENT to, in a sentence ("scales is 99; 1..4") written into `text` and returned;
+   "" for nothing. */
+SSAO_SAT_DEF const char *ssao_sat_explain(char *text, size_t size, int width, int height,
+                                          const ssao_sat_options *options);
 SSAO_SAT_DEF const char *ssao_sat_explain_input(char *text, size_t size, const ssao_sat_input *input);
 /* Accessibility of every pixel, 0 blocked .. 1 open; sky is 1. Allocates nothing. The output must not overlap the
    input. stats may be NULL. On an error nothing is written. */
-SSAO_SAT_DEF sat_result ssao_sat_apply(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride, const ssao_sat_input *input,
-                                       ssao_sat_stats *stats);
+SSAO_SAT_DEF sat_result ssao_sat_apply(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride,
+                                       const ssao_sat_input *input, ssao_sat_stats *stats);
 #ifndef SSAO_SAT_NO_BENT
-/* The same, and the mean unblocked direction (unit, view space, xyz; the normal where all is open, 0 0 1 on sky): look up
-   irradiance along it instead of the normal. SLABS only. */
-SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride, float *bent_normals,
-                                            ptrdiff_t bent_stride, const ssao_sat_input *input, ssao_sat_stats *stats);
+/* The same, and the mean unblocked direction (unit, view space, xyz; the normal where all is open, 0 0 1 on sky): look
+   up irradiance along it instead of the normal. SLABS only. */
+SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride,
+                                            float *bent_normals, ptrdiff_t bent_stride, const ssao_sat_input *input,
+                                            ssao_sat_stats *stats);
 #endif
-/* Depth unsharp masking (Luft 2006): mean depth of the region less the own depth, over the radius, times options.gain, clamped to
-   -1..1: negative in creases and beside nearer objects, positive on ridges and rims. Sky is 0. From the same table. */
-SSAO_SAT_DEF sat_result ssao_sat_apply_signed(ssao_sat *ao, float *out, ptrdiff_t out_stride, const ssao_sat_input *input,
-                                              ssao_sat_stats *stats);
-/* Light that bounces more than once (Jimenez 2016, eq 10): accessibility of a surface with this albedo, 0..1, one colour at a time. */
+/* Depth unsharp masking (Luft 2006): mean depth of the region less the own depth, over the radius, times options.gain,
+   clamped to -1..1: negative in creases and beside nearer objects, positive on ridges and rims. Sky is 0. From the same
+   table. */
+SSAO_SAT_DEF sat_result ssao_sat_apply_signed(ssao_sat *ao, float *out, ptrdiff_t out_stride,
+                                              const ssao_sat_input *input, ssao_sat_stats *stats);
+/* Light that bounces more than once (Jimenez 2016, eq 10): accessibility of a surface with this albedo, 0..1, one
+   colour at a time. */
 SSAO_SAT_DEF float ssao_sat_multi_bounce(float accessibility, float albedo);
-/* How much of a highlight is open (Jimenez 2016, section 6): the overlap of two cones, that of the accessibility around the bent
-   normal and that of the reflection. cosine: between bent normal and reflected view direction; roughness 0..1. */
+/* How much of a highlight is open (Jimenez 2016, section 6): the overlap of two cones, that of the accessibility around
+   the bent normal and that of the reflection. cosine: between bent normal and reflected view direction; roughness
+   0..1. */
 SSAO_SAT_DEF float ssao_sat_specular(float accessibility, float cosine, float roughness);
 SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao); /* NULL is fine */
 
@@ -296,29 +328,36 @@ extern "C" {
    OpenGL 3.3 core or ES 3.0 (with EXT_color_buffer_float)
    ------------------------------------------------------------------------------------------------ */
 
-/* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL state as it was
-   (but for pending errors, which are lost). Does not wait for the GPU. All methods; band_rows, threads, float_table and skip_flat
-   mean nothing here. Textures drawn by OpenGL have the bottom row first: set options.bottom_up. */
+/* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL
+   state as it was (but for pending errors, which are lost). Does not wait for the GPU. All methods; band_rows, threads,
+   float_table and skip_flat mean nothing here. Textures drawn by OpenGL have the bottom row first: set
+   options.bottom_up. */
 typedef struct ssao_sat_gl ssao_sat_gl;
 
 /* On an OpenGL error *out only answers ssao_sat_gl_message, and is to be destroyed; on the others it is NULL. */
-SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *get_proc, int width, int height, const ssao_sat_options *options);
-/* depth: a 2D texture whose red is the depth (R32F, R16F, or a depth format without comparison). normals: its red, green, blue are the
-   view-space normal, signed; 0: from depth. out: a colour-renderable texture of the caller whose red gets the accessibility, or 0 for
-   the object's own R32F, ssao_sat_gl_texture(). Of `input` only width, height, depth_kind, projection, clip_zero_to_one and sky count. */
-SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigned depth, unsigned normals, const ssao_sat_input *input);
-/* Other options from the next frame on. Those that shaders and textures are made for stay: method, half_resolution, slabs, scales,
-   plane_boxes, refine_levels, as_printed, inverted_depth: SAT_ERR_MISMATCH when one differs. The rest are uniforms and free. */
+SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *get_proc, int width, int height,
+                                           const ssao_sat_options *options);
+/* depth: a 2D texture whose red is the depth (R32F, R16F, or a depth format without comparison). normals: its red,
+   green, blue are the view-space normal, signed; 0: from depth. out: a colour-renderable texture of the caller whose
+   red gets the accessibility, or 0 for the object's own R32F, ssao_sat_gl_texture(). Of `input` only width, height,
+   depth_kind, projection, clip_zero_to_one and sky count. */
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigned depth, unsigned normals,
+                                          const ssao_sat_input *input);
+/* Other options from the next frame on. Those that shaders and textures are made for stay: method, half_resolution,
+   slabs, scales, plane_boxes, refine_levels, as_printed, inverted_depth: SAT_ERR_MISMATCH when one differs. The rest
+   are uniforms and free. */
 SSAO_SAT_DEF sat_result ssao_sat_gl_set_options(ssao_sat_gl *gl, const ssao_sat_options *options);
 SSAO_SAT_DEF unsigned ssao_sat_gl_texture(const ssao_sat_gl *gl);
 /* What the last SAT_ERR_GL_... was about; never NULL. */
 SSAO_SAT_DEF const char *ssao_sat_gl_message(const ssao_sat_gl *gl);
 SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl); /* NULL is fine */
 
-/* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader. `view` is the 12 floats of ssao_sat_gl_view as vec4 view[3]:
+/* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader. `view` is the 12 floats of ssao_sat_gl_view as
+   vec4 view[3]:
 
-       float ssao_sat_distance(vec4 view[3], ivec2 pixel, float d)                             depth value -> distance, 0: nothing there
-       float ssao_sat_distance(vec4 view[3], float d)                                          the same, but for oblique near planes
+       float ssao_sat_distance(vec4 view[3], ivec2 pixel, float d)                             depth value -> distance,
+       0: nothing there float ssao_sat_distance(vec4 view[3], float d)                                          the
+       same, but for oblique near planes
        vec3  ssao_sat_position(vec4 view[3], ivec2 pixel, float z)                             z points forward
        vec3  ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z)        the same axes */
 SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void);
@@ -369,8 +408,14 @@ static inline ssao_sat__f ssao_sat__if_positive(ssao_sat__f a, ssao_sat__f b) /*
 {
     return sat__f32x4_select(sat__f32x4_less(sat__f32x4_set1(0), a), b, sat__f32x4_set1(0));
 }
-static inline int ssao_sat__any_positive(ssao_sat__f a) { return sat__i32x4_any(sat__f32x4_less(sat__f32x4_set1(0), a)); }
-static inline ssao_sat__i ssao_sat__load_i(const uint32_t *p) { return sat__i32x4_load((const int32_t *)(const void *)p); }
+static inline int ssao_sat__any_positive(ssao_sat__f a)
+{
+    return sat__i32x4_any(sat__f32x4_less(sat__f32x4_set1(0), a));
+}
+static inline ssao_sat__i ssao_sat__load_i(const uint32_t *p)
+{
+    return sat__i32x4_load((const int32_t *)(const void *)p);
+}
 static inline void ssao_sat__store_i(uint32_t *p, ssao_sat__i v) { sat__i32x4_store((int32_t *)(void *)p, v); }
 static inline ssao_sat__i ssao_sat__add_i(ssao_sat__i a, ssao_sat__i b) { return sat__i32x4_add(a, b); }
 static inline ssao_sat__i ssao_sat__sub_i(ssao_sat__i a, ssao_sat__i b) { return sat__i32x4_sub(a, b); }
@@ -392,24 +437,50 @@ typedef struct ssao_sat__f { float v[4]; } ssao_sat__f;
 typedef struct ssao_sat__i { uint32_t v[4]; } ssao_sat__i;
 /* written out: loops over four would stay loops where nothing vectorises them */
 #define SSAO_SAT__LANE(lane, expression) { enum { k = lane }; r.v[k] = (expression); }
-#define SSAO_SAT__EACH(type, expression) type r; \
-    SSAO_SAT__LANE(0, expression) SSAO_SAT__LANE(1, expression) SSAO_SAT__LANE(2, expression) SSAO_SAT__LANE(3, expression) return r
+#define SSAO_SAT__EACH(type, expression)                                                                               \
+    type r;                                                                                                            \
+    SSAO_SAT__LANE(0, expression)                                                                                      \
+    SSAO_SAT__LANE(1, expression) SSAO_SAT__LANE(2, expression) SSAO_SAT__LANE(3, expression) return r
 static inline ssao_sat__f ssao_sat__load(const float *p) { SSAO_SAT__EACH(ssao_sat__f, p[k]); }
-static inline void ssao_sat__store(float *p, ssao_sat__f v) { p[0] = v.v[0]; p[1] = v.v[1]; p[2] = v.v[2]; p[3] = v.v[3]; }
+static inline void ssao_sat__store(float *p, ssao_sat__f v)
+{
+    p[0] = v.v[0];
+    p[1] = v.v[1];
+    p[2] = v.v[2];
+    p[3] = v.v[3];
+}
 static inline ssao_sat__f ssao_sat__set(float v) { SSAO_SAT__EACH(ssao_sat__f, v); }
 static inline ssao_sat__f ssao_sat__add(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] + b.v[k]); }
 static inline ssao_sat__f ssao_sat__sub(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] - b.v[k]); }
 static inline ssao_sat__f ssao_sat__mul(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] * b.v[k]); }
 static inline ssao_sat__f ssao_sat__div(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] / b.v[k]); }
-static inline ssao_sat__f ssao_sat__max(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] > b.v[k] ? a.v[k] : b.v[k]); }
+static inline ssao_sat__f ssao_sat__max(ssao_sat__f a, ssao_sat__f b)
+{
+    SSAO_SAT__EACH(ssao_sat__f, a.v[k] > b.v[k] ? a.v[k] : b.v[k]);
+}
 static inline ssao_sat__f ssao_sat__sqrt(ssao_sat__f a) { SSAO_SAT__EACH(ssao_sat__f, sqrtf(a.v[k])); }
 static inline ssao_sat__f ssao_sat__abs(ssao_sat__f a) { SSAO_SAT__EACH(ssao_sat__f, fabsf(a.v[k])); }
-static inline ssao_sat__f ssao_sat__if_positive(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] > 0 ? b.v[k] : 0); }
+static inline ssao_sat__f ssao_sat__if_positive(ssao_sat__f a, ssao_sat__f b)
+{
+    SSAO_SAT__EACH(ssao_sat__f, a.v[k] > 0 ? b.v[k] : 0);
+}
 static inline int ssao_sat__any_positive(ssao_sat__f a) { return a.v[0] > 0 || a.v[1] > 0 || a.v[2] > 0 || a.v[3] > 0; }
 static inline ssao_sat__i ssao_sat__load_i(const uint32_t *p) { SSAO_SAT__EACH(ssao_sat__i, p[k]); }
-static inline void ssao_sat__store_i(uint32_t *p, ssao_sat__i v) { p[0] = v.v[0]; p[1] = v.v[1]; p[2] = v.v[2]; p[3] = v.v[3]; }
-static inline ssao_sat__i ssao_sat__add_i(ssao_sat__i a, ssao_sat__i b) { SSAO_SAT__EACH(ssao_sat__i, a.v[k] + b.v[k]); }
-static inline ssao_sat__i ssao_sat__sub_i(ssao_sat__i a, ssao_sat__i b) { SSAO_SAT__EACH(ssao_sat__i, a.v[k] - b.v[k]); }
+static inline void ssao_sat__store_i(uint32_t *p, ssao_sat__i v)
+{
+    p[0] = v.v[0];
+    p[1] = v.v[1];
+    p[2] = v.v[2];
+    p[3] = v.v[3];
+}
+static inline ssao_sat__i ssao_sat__add_i(ssao_sat__i a, ssao_sat__i b)
+{
+    SSAO_SAT__EACH(ssao_sat__i, a.v[k] + b.v[k]);
+}
+static inline ssao_sat__i ssao_sat__sub_i(ssao_sat__i a, ssao_sat__i b)
+{
+    SSAO_SAT__EACH(ssao_sat__i, a.v[k] - b.v[k]);
+}
 static inline ssao_sat__f ssao_sat__to_f(ssao_sat__i a) { SSAO_SAT__EACH(ssao_sat__f, (float)(int32_t)a.v[k]); }
 static inline void ssao_sat__transpose(ssao_sat__f *m)
 {
@@ -439,13 +510,15 @@ enum {
 };
 #define SSAO_SAT__BINS 256    /* the sample is counted in so many bins */
 #define SSAO_SAT__MARGIN 4.0f  /* quanta hold what is nearer than the range by this factor */
-#define SSAO_SAT__BEYOND 0.73f /* of a side's weight that the border takes, to the cells beside the pixel: a corner keeps its value */
+#define SSAO_SAT__BEYOND 0.73f /* of a side's weight that the border takes, to the cells beside the pixel: a corner
+                                  keeps its value */
 #define SSAO_SAT__BLOCKED 2.0f  /* length of blocked directions against occlusion, fitted */
 #define SSAO_SAT__SHARPNESS 50 /* upsampling: a neighbour off the tangent plane by 1/50 of the distance has no weight */
 #define SSAO_SAT__FAR 1e18f   /* distances beyond are sky: their squares would overflow */
 
-/* What was fitted to ray-traced references by tests/bench/bench_ssao_sat.c. reach: half side of the region in radii. range: SLABS:
-   occluders count less with their distance, to nothing at this many radii; PLANE: heights h (in radii) count as h / (1 + range h^2). */
+/* What was fitted to ray-traced references by tests/bench/bench_ssao_sat.c. reach: half side of the region in radii.
+   range: SLABS: occluders count less with their distance, to nothing at this many radii; PLANE: heights h (in radii)
+   count as h / (1 + range h^2). */
 typedef struct ssao_sat__fit { float reach, range, bias, gain, power; } ssao_sat__fit;
 static const float ssao_sat__ring_weights[4] = {1.6f, 1.0f, 0.37f, 0.37f}; /* outermost first */
 static const ssao_sat__fit ssao_sat__fits[6] = {
@@ -491,7 +564,8 @@ struct ssao_sat {
     /* arrays of `capacity` rows, `stride` apart */
     float *z, *affine, *nx, *ny, *nz, *open, *blocked[3];
     float *lower;           /* affine depth of the pixel below: half resolution has one between two table rows */
-    uint32_t *words;        /* step x step a table pixel, rows `word_stride` apart: slab and quantised affine depth, SSAO_SAT__NOTHING */
+    uint32_t *words;        /* step x step a table pixel, rows `word_stride` apart: slab and quantised affine depth,
+                               SSAO_SAT__NOTHING */
     size_t word_stride;
     uint32_t *row_slabs;    /* which slabs occur in the row */
     uint32_t *table, *flags;
@@ -507,7 +581,8 @@ struct ssao_sat {
     float limit, largest;   /* half sides in table pixels: allowed, and of the nearest pixel */
     float nearest, farthest; /* the range that slabs and quanta follow */
     float band_nearest, band_farthest; /* of all pixels held so far */
-    float edge[SSAO_SAT__MAX_SLABS + 1]; /* distances; what lies before the first or behind the last is in the end slabs */
+    float edge[SSAO_SAT__MAX_SLABS + 1]; /* distances; what lies before the first or behind the last is in the end
+                                            slabs */
     ssao_sat__slab slabs[SSAO_SAT__MAX_SLABS];
     uint32_t used_slabs;
     ssao_sat__slab value;   /* single table: how a value is quantised */
@@ -591,7 +666,8 @@ SSAO_SAT_DEF ssao_sat_input ssao_sat_input_linear(const float *depth, int width,
 static int ssao_sat__read_axes(ssao_sat__camera *c, const float *m, int width, int height, int bottom_up)
 {
     double w = c->orthographic ? (double)m[15] : -(double)m[11];
-    double shift_x = c->orthographic ? -(double)m[12] : (double)m[8], shift_y = c->orthographic ? -(double)m[13] : (double)m[9];
+    double shift_x = c->orthographic ? -(double)m[12] : (double)m[8],
+           shift_y = c->orthographic ? -(double)m[13] : (double)m[9];
     double most = c->orthographic ? 1e15 : 1e6, least = c->orthographic ? 1e-15 : 1e-9;
     double top = m[5] > 0 ? 1 : -1; /* normalised y of the upper border: -1 when the matrix flips y, as Vulkan's do */
     if (bottom_up) top = -top;
@@ -600,12 +676,12 @@ static int ssao_sat__read_axes(ssao_sat__camera *c, const float *m, int width, i
     c->full[2] = -2 * w * top / (height * (double)m[5]);
     c->full[3] = (w * top + shift_y) / (double)m[5];
     /* rays flatter than one in a million and pixels smaller than a billionth of the distance are no view */
-    return fabs(c->full[0]) <= most && fabs(c->full[1]) <= most && fabs(c->full[2]) <= most && fabs(c->full[3]) <= most &&
-           fabs(c->full[0]) >= least && fabs(c->full[2]) >= least;
+    return fabs(c->full[0]) <= most && fabs(c->full[1]) <= most && fabs(c->full[2]) <= most &&
+           fabs(c->full[3]) <= most && fabs(c->full[0]) >= least && fabs(c->full[2]) >= least;
 }
 
-/* depth d -> 1/z (perspective) or z (orthographic), both affine in d and, under an oblique near plane (Lengyel 2005: the third row
-   holds a plane), in the pixel. The kind must agree with the matrix. */
+/* depth d -> 1/z (perspective) or z (orthographic), both affine in d and, under an oblique near plane (Lengyel 2005:
+   the third row holds a plane), in the pixel. The kind must agree with the matrix. */
 static int ssao_sat__read_depth(ssao_sat__camera *c, const float *m, ssao_sat_depth kind, int zero_to_one)
 {
     double scale = zero_to_one ? 1 : 2, shift = zero_to_one ? 0 : -1; /* normalised z = scale d + shift */
@@ -631,15 +707,17 @@ static int ssao_sat__read_depth(ssao_sat__camera *c, const float *m, ssao_sat_de
     return (kind == SSAO_SAT_DEPTH_REVERSED) == (c->orthographic ? a < 0 : a > 0);
 }
 
-/* Perspective, orthographic, or neither. What must be 0 may be the rounding of a product of float matrices: SSAO_SAT__ROUNDING of
-   what it stands beside. */
+/* Perspective, orthographic, or neither. What must be 0 may be the rounding of a product of float matrices:
+   SSAO_SAT__ROUNDING of what it stands beside. */
 #define SSAO_SAT__ROUNDING 1e-5
 static int ssao_sat__read_kind(ssao_sat__camera *c, const float *m)
 {
     double x = SSAO_SAT__ROUNDING * fabs((double)m[0]), y = SSAO_SAT__ROUNDING * fabs((double)m[5]), w;
     double beside = SSAO_SAT__ROUNDING * fabs((double)m[14]);
-    if (m[11] < 0 && fabs((double)m[15]) <= beside && fabs((double)m[12]) <= beside && fabs((double)m[13]) <= beside) c->orthographic = 0;
-    else if (m[15] > 0 && fabs((double)m[11]) <= SSAO_SAT__ROUNDING * fabs((double)m[10]) && fabs((double)m[8]) <= x && fabs((double)m[9]) <= y)
+    if (m[11] < 0 && fabs((double)m[15]) <= beside && fabs((double)m[12]) <= beside && fabs((double)m[13]) <= beside)
+        c->orthographic = 0;
+    else if (m[15] > 0 && fabs((double)m[11]) <= SSAO_SAT__ROUNDING * fabs((double)m[10]) && fabs((double)m[8]) <= x &&
+             fabs((double)m[9]) <= y)
         c->orthographic = 1;
     else return 0;
     w = SSAO_SAT__ROUNDING * fabs((double)(c->orthographic ? m[15] : m[11]));
@@ -761,7 +839,8 @@ static inline ssao_sat__vector ssao_sat__normal(const ssao_sat *s, int x, int y,
     const float *p;
     float square;
     if (!s->input.normals) return ssao_sat__depth_normal(s, x, y, z);
-    p = (const float *)(const void *)((const unsigned char *)s->input.normals + (ptrdiff_t)y * s->input.normal_stride) + 3 * (ptrdiff_t)x;
+    p = (const float *)(const void *)((const unsigned char *)s->input.normals + (ptrdiff_t)y * s->input.normal_stride) +
+        3 * (ptrdiff_t)x;
     n.x = p[0];
     n.y = p[1];
     n.z = s->camera.forward * p[2];
@@ -829,9 +908,9 @@ static void ssao_sat__keep_least(float *kept, float v)
     kept[i] = v;
 }
 
-/* Nearest and farthest distance that slabs and quanta follow: of the sample, in blocks of 2 x 2, less the TRIM blocks with the
-   nearest and those with the farthest pixels. So no pixel and no small object (a bird, a spark) moves them. 0 when the sample
-   meets nothing. */
+/* Nearest and farthest distance that slabs and quanta follow: of the sample, in blocks of 2 x 2, less the TRIM blocks
+   with the nearest and those with the farthest pixels. So no pixel and no small object (a bird, a spark) moves them. 0
+   when the sample meets nothing. */
 static int ssao_sat__sample_range(ssao_sat *s)
 {
     float least[SSAO_SAT__TRIM + 1], most[SSAO_SAT__TRIM + 1];
@@ -884,7 +963,9 @@ static void ssao_sat__count_depths(const ssao_sat *s, float *share, float low, f
         for (i = 0; i < SSAO_SAT__GRID; i++) {
             float z = ssao_sat__sample(s, i, j);
             if (!(z > 0)) continue;
-            count[range > 0 ? sat__clamp_int((int)((ssao_sat__scale_depth(s, z) - low) / range * SSAO_SAT__BINS), 0, SSAO_SAT__BINS - 1) : 0]++;
+            count[range > 0 ? sat__clamp_int((int)((ssao_sat__scale_depth(s, z) - low) / range * SSAO_SAT__BINS), 0,
+                                             SSAO_SAT__BINS - 1)
+                            : 0]++;
             n++;
         }
     for (i = 0; i <= SSAO_SAT__BINS; i++) {
@@ -893,18 +974,20 @@ static void ssao_sat__count_depths(const ssao_sat *s, float *share, float low, f
     }
 }
 
-/* Edges at equal steps of F = half the share of the depth range + half the share of the pixels, so that neither a long empty
-   range nor a crowd at one depth leaves a slab useless. */
+/* Edges at equal steps of F = half the share of the depth range + half the share of the pixels, so that neither a long
+   empty range nor a crowd at one depth leaves a slab useless. */
 static void ssao_sat__cut_slabs(ssao_sat *s)
 {
-    float share[SSAO_SAT__BINS + 1], low = ssao_sat__scale_depth(s, s->nearest), range = ssao_sat__scale_depth(s, s->farthest) - low;
+    float share[SSAO_SAT__BINS + 1], low = ssao_sat__scale_depth(s, s->nearest),
+                                     range = ssao_sat__scale_depth(s, s->farthest) - low;
     int k, bin = 0, slabs = s->frame_slabs;
     ssao_sat__count_depths(s, share, low, range);
     s->edge[0] = s->nearest;
     s->edge[slabs] = s->farthest;
     for (k = 1; k < slabs; k++) {
         float target = (float)k / (float)slabs, below, above, z;
-        while (bin < SSAO_SAT__BINS - 1 && 0.5f * (float)(bin + 1) / SSAO_SAT__BINS + 0.5f * share[bin + 1] < target) bin++;
+        while (bin < SSAO_SAT__BINS - 1 && 0.5f * (float)(bin + 1) / SSAO_SAT__BINS + 0.5f * share[bin + 1] < target)
+            bin++;
         below = 0.5f * (float)bin / SSAO_SAT__BINS + 0.5f * share[bin];
         above = 0.5f * (float)(bin + 1) / SSAO_SAT__BINS + 0.5f * share[bin + 1];
         z = low + range * ((float)bin + (target - below) / (above - below)) / SSAO_SAT__BINS;
@@ -939,7 +1022,8 @@ static inline float ssao_sat__affine(const ssao_sat *s, float z) { return s->cam
 /* How many slabs: those thinner than the radius, or than the region that max_pixels leaves of it, tell nothing new. */
 static int ssao_sat__slab_count(const ssao_sat *s)
 {
-    double region = (double)s->limit / (double)s->camera.pixels * (s->camera.orthographic ? 1 : (double)s->nearest), thick;
+    double region = (double)s->limit / (double)s->camera.pixels * (s->camera.orthographic ? 1 : (double)s->nearest),
+           thick;
     thick = ((double)s->farthest - (double)s->nearest) / ((double)s->radius < region ? (double)s->radius : region);
     return thick < s->options.slabs ? (int)thick + 1 : s->options.slabs;
 }
@@ -956,12 +1040,14 @@ static void ssao_sat__prepare_slabs(ssao_sat *s)
     for (k = 0; k < s->frame_slabs; k++) {
         float low = s->edge[k], high = s->edge[k + 1];
         if (k == 0) low = s->camera.orthographic ? low - spare : low / SSAO_SAT__MARGIN;
-        if (s->camera.orthographic) s->slabs[k] = ssao_sat__quantise(low, k == s->frame_slabs - 1 ? high + spare : high, cell * cell);
+        if (s->camera.orthographic)
+            s->slabs[k] = ssao_sat__quantise(low, k == s->frame_slabs - 1 ? high + spare : high, cell * cell);
         else s->slabs[k] = ssao_sat__quantise(k == s->frame_slabs - 1 ? 0 : 1 / high, 1 / low, cell * cell);
     }
 }
 
-/* The single table holds: PLANE: 1/z, or farthest - z when orthographic, sky 0. Published: z, sky just beyond the farthest, or 1/z, sky 0. */
+/* The single table holds: PLANE: 1/z, or farthest - z when orthographic, sky 0. Published: z, sky just beyond the
+   farthest, or 1/z, sky 0. */
 static int ssao_sat__table_is_inverse(const ssao_sat *s)
 {
     return s->options.method == SSAO_SAT_PLANE ? !s->camera.orthographic : s->options.inverted_depth;
@@ -981,7 +1067,8 @@ static void ssao_sat__prepare_value(ssao_sat *s)
     float high;
     s->sky_value = 0;
     if (ssao_sat__table_is_inverse(s)) high = SSAO_SAT__MARGIN / s->nearest;
-    else if (s->options.method == SSAO_SAT_PLANE) high = s->farthest - s->nearest + SSAO_SAT__MARGIN * (s->radius < 1e15f ? s->radius : 1e15f);
+    else if (s->options.method == SSAO_SAT_PLANE)
+        high = s->farthest - s->nearest + SSAO_SAT__MARGIN * (s->radius < 1e15f ? s->radius : 1e15f);
     else high = s->sky_value = 1.05f * s->farthest;
     s->value = ssao_sat__quantise(0, high, side * side);
 }
@@ -990,7 +1077,8 @@ static void ssao_sat__prepare_value(ssao_sat *s)
    Regions
    ------------------------------------------------------------------------------------------------ */
 
-/* Half side along x, in table pixels, of a region of `reach` world units at distance z, cut so that neither side exceeds the limit. */
+/* Half side along x, in table pixels, of a region of `reach` world units at distance z, cut so that neither side
+   exceeds the limit. */
 static inline float ssao_sat__half_side(const ssao_sat *s, float z, int *cut)
 {
     float r;
@@ -1018,7 +1106,8 @@ static inline size_t ssao_sat__at(const ssao_sat *s, int y)
     return (size_t)(y - s->first) * s->stride + SSAO_SAT__PAD;
 }
 
-/* Do the pixels between those of the table lie on one plane with them? Affine depth has no second differences on planes. */
+/* Do the pixels between those of the table lie on one plane with them? Affine depth has no second differences on
+   planes. */
 static inline uint32_t ssao_sat__is_rough(const float *a, int x, float limit)
 {
     float c = a[x + 1];
@@ -1122,7 +1211,8 @@ static void ssao_sat__build_slab(ssao_sat *s, int k)
                 if ((int)(w >> SSAO_SAT__LEVEL_BITS & 31) != k) continue;
                 word[1] = w & ((1u << SSAO_SAT__LEVEL_BITS) - 1);
                 word[2] = (uint32_t)(x * step + i % step);
-                word[3] = (uint32_t)((s->first + row) * step + i / step); /* counted in the picture, so that bands give the same bits */
+                word[3] = (uint32_t)((s->first + row) * step + i / step); /* counted in the picture, so that bands give
+                                                                             the same bits */
                 sum = ssao_sat__add_i(sum, ssao_sat__load_i(word));
             }
             ssao_sat__store_i(o, ssao_sat__add_i(sum, ssao_sat__load_i(above)));
@@ -1158,8 +1248,9 @@ static void ssao_sat__build_value(ssao_sat *s)
 }
 
 #ifndef SSAO_SAT_NO_SLABS
-/* Is the pixel no part of a plane that its neighbours see too? Affine depth has no second differences on planes, and the
-   tangent plane of the given normal falls as the depth does. What passes moves no sine beyond the bias: flat_limit. */
+/* Is the pixel no part of a plane that its neighbours see too? Affine depth has no second differences on planes, and
+   the tangent plane of the given normal falls as the depth does. What passes moves no sine beyond the bias:
+   flat_limit. */
 static int ssao_sat__is_bent(const ssao_sat *s, const float *a, size_t at, float rx, float ry)
 {
     const float *above = a - s->stride, *below = a + s->stride;
@@ -1181,8 +1272,8 @@ static int ssao_sat__is_bent(const ssao_sat *s, const float *a, size_t at, float
     return !((fabsf(gx) + fabsf(gy)) * scale < 0.5f * s->fit.bias);
 }
 
-/* Half resolution: is anything off the plane among the pixels between those of the table? In the last column and row that is
-   asked of the pixels before. */
+/* Half resolution: is anything off the plane among the pixels between those of the table? In the last column and row
+   that is asked of the pixels before. */
 static int ssao_sat__hides_bend(const ssao_sat *s, int row, int x)
 {
     const uint32_t *words = s->words + (size_t)(2 * row) * s->word_stride + (size_t)(2 * x);
@@ -1202,12 +1293,14 @@ static void ssao_sat__build_flags(ssao_sat *s)
         uint32_t *o = s->flags + (size_t)(row + 1) * s->table_stride, sum = 0;
         const uint32_t *up = o - s->table_stride;
         size_t at = (size_t)row * s->stride + SSAO_SAT__PAD;
-        const float *a = s->affine + (size_t)(thin ? row : sat__clamp_int(row, 1, s->held - 2)) * s->stride + SSAO_SAT__PAD;
+        const float *a =
+            s->affine + (size_t)(thin ? row : sat__clamp_int(row, 1, s->held - 2)) * s->stride + SSAO_SAT__PAD;
         float ry = s->camera.ay * (float)(s->first + row) + s->camera.by;
         o[0] = 0;
         for (x = 0; x < s->columns; x++) {
             int inner = sat__clamp_int(x, 1, s->columns - 2);
-            sum += thin || ssao_sat__is_bent(s, a + inner, at + (size_t)x, s->camera.ax * (float)x + s->camera.bx, ry) ||
+            sum += thin ||
+                   ssao_sat__is_bent(s, a + inner, at + (size_t)x, s->camera.ax * (float)x + s->camera.bx, ry) ||
                    (s->step == 2 && ssao_sat__hides_bend(s, row, x));
             o[x + 1] = up[x + 1] + sum;
         }
@@ -1234,14 +1327,17 @@ static void ssao_sat__build_tables(int begin, int end, int worker, void *context
 }
 
 /* Box sum in a table of `words` words an entry, rows and columns within it. */
-static inline uint32_t ssao_sat__box(const ssao_sat *s, const uint32_t *table, size_t words, int x0, int y0, int x1, int y1)
+static inline uint32_t ssao_sat__box(const ssao_sat *s, const uint32_t *table, size_t words, int x0, int y0, int x1,
+                                     int y1)
 {
     const uint32_t *above = table + words * (size_t)(y0 - s->first) * s->table_stride;
     const uint32_t *below = table + words * (size_t)(y1 - s->first) * s->table_stride;
-    return below[words * (size_t)x1] - below[words * (size_t)x0] - above[words * (size_t)x1] + above[words * (size_t)x0];
+    return below[words * (size_t)x1] - below[words * (size_t)x0] - above[words * (size_t)x1] +
+           above[words * (size_t)x0];
 }
 
-/* (1 - strength occlusion)^power; the fitted exponents are 1, 1.5, 2 or 3, so powf is for callers who ask for others. */
+/* (1 - strength occlusion)^power; the fitted exponents are 1, 1.5, 2 or 3, so powf is for callers who ask for
+   others. */
 static inline float ssao_sat__accessibility(const ssao_sat *s, float occlusion, float gain)
 {
     float open = 1 - gain * occlusion;
@@ -1269,25 +1365,31 @@ typedef struct ssao_sat__point {
     ssao_sat__f occlusion[2], blocked[2][3]; /* by cell */
 } ssao_sat__point;
 
-/* Columns and rows of the 3 x 3 cells, clipped to the picture, and what one pixel weighs in each of the eight outer ones. */
+/* Columns and rows of the 3 x 3 cells, clipped to the picture, and what one pixel weighs in each of the eight outer
+   ones. */
 typedef struct ssao_sat__cells {
     int column[4], row[4];
     ssao_sat__f weight[2];
 } ssao_sat__cells;
 
 /* The occluders of one slab in four cells, given the sums over each. */
-static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__slab *slab, ssao_sat__f *sums, int group,
-                                           ssao_sat__f weight)
+static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__slab *slab,
+                                           ssao_sat__f *sums, int group, ssao_sat__f weight)
 {
-    const ssao_sat__f one = ssao_sat__set(1), zero = ssao_sat__set(0), falloff = ssao_sat__set(1 / (s->range * s->range));
+    const ssao_sat__f one = ssao_sat__set(1), zero = ssao_sat__set(0),
+                      falloff = ssao_sat__set(1 / (s->range * s->range));
     ssao_sat__f count, affine, r, z, dx, dy, dz, square, height, share, inverse, part;
     ssao_sat__transpose(sums); /* count, level, x, y of the four cells */
     count = sums[0];
-    affine = ssao_sat__add(ssao_sat__mul(ssao_sat__set(slab->low), count), ssao_sat__mul(ssao_sat__set(slab->quantum), sums[1]));
-    r = ssao_sat__div(one, s->camera.orthographic ? ssao_sat__max(count, one) : ssao_sat__max(affine, ssao_sat__set(1e-30f)));
+    affine = ssao_sat__add(ssao_sat__mul(ssao_sat__set(slab->low), count),
+                           ssao_sat__mul(ssao_sat__set(slab->quantum), sums[1]));
+    r = ssao_sat__div(one, s->camera.orthographic ? ssao_sat__max(count, one)
+                                                  : ssao_sat__max(affine, ssao_sat__set(1e-30f)));
     z = ssao_sat__mul(s->camera.orthographic ? affine : count, r);
-    dx = ssao_sat__add(ssao_sat__mul(ssao_sat__set((float)s->camera.full[0]), sums[2]), ssao_sat__mul(ssao_sat__set(s->camera.bx), count));
-    dy = ssao_sat__add(ssao_sat__mul(ssao_sat__set((float)s->camera.full[2]), sums[3]), ssao_sat__mul(ssao_sat__set(s->camera.by), count));
+    dx = ssao_sat__add(ssao_sat__mul(ssao_sat__set((float)s->camera.full[0]), sums[2]),
+                       ssao_sat__mul(ssao_sat__set(s->camera.bx), count));
+    dy = ssao_sat__add(ssao_sat__mul(ssao_sat__set((float)s->camera.full[2]), sums[3]),
+                       ssao_sat__mul(ssao_sat__set(s->camera.by), count));
     dx = ssao_sat__sub(ssao_sat__mul(dx, r), p->px);
     dy = ssao_sat__sub(ssao_sat__mul(dy, r), p->py);
     dz = ssao_sat__sub(z, p->pz);
@@ -1322,7 +1424,8 @@ static inline void ssao_sat__add_slab(ssao_sat__point *p, const ssao_sat *s, con
         column[t] = 4 * (size_t)c->column[t];
         row[t] = table + 4 * (size_t)(c->row[t] - s->first) * s->table_stride;
     }
-    if (row[3][column[3]] - row[3][column[0]] == row[0][column[3]] - row[0][column[0]]) return; /* no pixel of the slab in sight */
+    if (row[3][column[3]] - row[3][column[0]] == row[0][column[3]] - row[0][column[0]])
+        return; /* no pixel of the slab in sight */
     for (t = 0; t < 4; t++) {
         upper = ssao_sat__load_i(row[0] + column[t]);
         for (j = 0; j < 3; j++, upper = lower) {
@@ -1344,10 +1447,12 @@ static inline void ssao_sat__add_slab(ssao_sat__point *p, const ssao_sat *s, con
     ssao_sat__add_occluders(p, s, &s->slabs[k], sides, 1, c->weight[1]);
 }
 
-/* Borders of the cells along one axis: [at - outer, at - inner) [at - inner, at + inner] (at + inner, at + outer], and what a pixel
-   of the picture weighs in them. What the picture's border takes from a side goes to the middle, less for being farther off: as if
-   the surroundings went on beyond the border, without a jump where a cell leaves the picture. */
-static inline void ssao_sat__cut_axis(int *border, float *weight, int at, int inner, int outer, int end, int step, int pixels)
+/* Borders of the cells along one axis: [at - outer, at - inner) [at - inner, at + inner] (at + inner, at + outer], and
+   what a pixel of the picture weighs in them. What the picture's border takes from a side goes to the middle, less for
+   being farther off: as if the surroundings went on beyond the border, without a jump where a cell leaves the
+   picture. */
+static inline void ssao_sat__cut_axis(int *border, float *weight, int at, int inner, int outer, int end, int step,
+                                      int pixels)
 {
     float first, last, length = (float)(outer - inner);
     int t;
@@ -1367,7 +1472,8 @@ static inline void ssao_sat__cut_axis(int *border, float *weight, int at, int in
     weight[2] *= last;
 }
 
-static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, int y, const int *inner, const int *outer, float weight)
+static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, int y, const int *inner, const int *outer,
+                                float weight)
 {
     float u[3], v[3], corners[4], sides[4];
     ssao_sat__cut_axis(c->column, u, x, inner[0], outer[0], s->columns, s->step, s->width);
@@ -1384,11 +1490,12 @@ static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, in
     c->weight[1] = ssao_sat__mul(ssao_sat__load(sides), ssao_sat__set(weight));
 }
 
-/* Can anything of the slab within the ring rise above the tangent plane by more than the bias? Its height is at most that of a corner
-   of the frustum that holds it, and its distance at least that along the axis. */
+/* Can anything of the slab within the ring rise above the tangent plane by more than the bias? Its height is at most
+   that of a corner of the frustum that holds it, and its distance at least that along the axis. */
 static inline int ssao_sat__may_occlude(const ssao_sat__point *p, const ssao_sat *s, const int *outer, int k)
 {
-    float low = s->edge[k], high = s->edge[k + 1], spread = p->slope[0] * (float)(outer[0] + 1) + p->slope[1] * (float)(outer[1] + 1);
+    float low = s->edge[k], high = s->edge[k + 1],
+          spread = p->slope[0] * (float)(outer[0] + 1) + p->slope[1] * (float)(outer[1] + 1);
     float distance, height;
     if (k == 0 && s->band_nearest < low) low = s->band_nearest; /* the end slabs hold all that is beyond */
     if (k == s->frame_slabs - 1 && s->band_farthest > high) high = s->band_farthest;
@@ -1410,10 +1517,12 @@ static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, float hal
         next[1][0] = sat__max_int(next[0][0] + 1, (int)(r + 0.5f));
         next[0][1] = sat__max_int(1, (int)(r * s->camera.aspect / 3 + 0.5f));
         next[1][1] = sat__max_int(next[0][1] + 1, (int)(r * s->camera.aspect + 0.5f));
-        if (ring > 0 && (ring == s->options.scales || memcmp(next[0], inner, sizeof inner) || memcmp(next[1], outer, sizeof outer))) {
+        if (ring > 0 && (ring == s->options.scales || memcmp(next[0], inner, sizeof inner) ||
+                         memcmp(next[1], outer, sizeof outer))) {
             ssao_sat__cut_cells(&cells, s, p->x, p->y, inner, outer, weight / total);
             for (k = first_slab; k < end_slab; k++)
-                if (s->used_slabs >> k & 1 && ssao_sat__may_occlude(p, s, outer, k)) ssao_sat__add_slab(p, s, &cells, k);
+                if (s->used_slabs >> k & 1 && ssao_sat__may_occlude(p, s, outer, k))
+                    ssao_sat__add_slab(p, s, &cells, k);
             weight = 0;
         }
         memcpy(inner, next[0], sizeof inner);
@@ -1430,7 +1539,8 @@ static inline float ssao_sat__sum_lanes(ssao_sat__f a, ssao_sat__f b)
 }
 
 #ifndef SSAO_SAT_NO_BENT
-/* Sum of the blocked directions. Kept as it is until the picture is written: upsampled, it spoils no detail of the normals. */
+/* Sum of the blocked directions. Kept as it is until the picture is written: upsampled, it spoils no detail of the
+   normals. */
 static void ssao_sat__store_blocked(const ssao_sat *s, const ssao_sat__point *p, size_t at, float gain)
 {
     int c;
@@ -1442,8 +1552,9 @@ static void ssao_sat__store_blocked(const ssao_sat *s, const ssao_sat__point *p,
 static inline int ssao_sat__is_flat(const ssao_sat *s, int x, int y, float half_side)
 {
     int rx = (int)(half_side + 0.5f) + 2, ry = (int)(half_side * s->camera.aspect + 0.5f) + 2;
-    return s->options.skip_flat && ssao_sat__box(s, s->flags, 1, sat__max_int(x - rx, 0), sat__max_int(y - ry, 0), sat__min_int(x + rx + 1, s->columns),
-                                                 sat__min_int(y + ry + 1, s->rows)) == 0;
+    return s->options.skip_flat &&
+           ssao_sat__box(s, s->flags, 1, sat__max_int(x - rx, 0), sat__max_int(y - ry, 0),
+                         sat__min_int(x + rx + 1, s->columns), sat__min_int(y + ry + 1, s->rows)) == 0;
 }
 
 static void ssao_sat__set_point(ssao_sat__point *p, const ssao_sat *s, int x, int y, size_t at)
@@ -1455,7 +1566,8 @@ static void ssao_sat__set_point(ssao_sat__point *p, const ssao_sat *s, int x, in
     p->z = z;
     p->facing = s->nz[at];
     if (!s->camera.orthographic)
-        p->facing += s->nx[at] * (s->camera.ax * (float)x + s->camera.bx) + s->ny[at] * (s->camera.ay * (float)y + s->camera.by);
+        p->facing +=
+            s->nx[at] * (s->camera.ax * (float)x + s->camera.bx) + s->ny[at] * (s->camera.ay * (float)y + s->camera.by);
     p->slope[0] = fabsf(s->nx[at] * s->camera.ax);
     p->slope[1] = fabsf(s->ny[at] * s->camera.ay);
     p->px = ssao_sat__set((s->camera.ax * (float)x + s->camera.bx) * scale);
@@ -1495,7 +1607,8 @@ static void ssao_sat__estimate_slabs(ssao_sat *s, int x, int y, ssao_sat_stats *
         stats->border += x < side_x || y < side_y || x + side_x >= s->columns || y + side_y >= s->rows;
         stats->estimated++;
         ssao_sat__add_rings(&p, s, half_side, first, end);
-        s->open[at] = ssao_sat__accessibility(s, ssao_sat__sum_lanes(p.occlusion[0], p.occlusion[1]), fade * s->fit.gain);
+        s->open[at] =
+            ssao_sat__accessibility(s, ssao_sat__sum_lanes(p.occlusion[0], p.occlusion[1]), fade * s->fit.gain);
     }
 #ifndef SSAO_SAT_NO_BENT
     if (s->bent_wanted) ssao_sat__store_blocked(s, &p, at, fade * s->fit.gain * SSAO_SAT__BLOCKED);
@@ -1507,8 +1620,8 @@ static void ssao_sat__estimate_slabs(ssao_sat *s, int x, int y, ssao_sat_stats *
    The single-table methods: MINIMALIST, NORMAL_GUIDED, REFINED as published, and PLANE
    ------------------------------------------------------------------------------------------------ */
 
-/* A region and its corners in the table: 3 x 3 of them first, 5 x 5 when a child is split again (Slomp 2012, figure 5.12:
-   9 and 25 lookups instead of 20 and 84). */
+/* A region and its corners in the table: 3 x 3 of them first, 5 x 5 when a child is split again (Slomp 2012, figure
+   5.12: 9 and 25 lookups instead of 20 and 84). */
 typedef struct ssao_sat__region {
     int x[5], y[5];
     uint32_t corner[5][5];
@@ -1560,7 +1673,9 @@ static float ssao_sat__mean(const ssao_sat__region *r, const ssao_sat *s, int i0
     float area = ssao_sat__area(r, i0, j0, i1, j1);
     uint32_t a = r->corner[j0][i0], b = r->corner[j0][i1], c = r->corner[j1][i0], d = r->corner[j1][i1];
     if (s->options.float_table)
-        return s->mean + (sat__float_from_bits(d) - sat__float_from_bits(c) - sat__float_from_bits(b) + sat__float_from_bits(a)) / area;
+        return s->mean +
+               (sat__float_from_bits(d) - sat__float_from_bits(c) - sat__float_from_bits(b) + sat__float_from_bits(a)) /
+                   area;
     return s->value.low + s->value.quantum * (float)(d - c - b + a) / area;
 }
 
@@ -1571,11 +1686,13 @@ static float ssao_sat__deficit(const ssao_sat *s, float mean, float z)
 }
 
 #ifndef SSAO_SAT_NO_REFINED
-/* Eq 5.4 over the children of one node: those that are nearer than their parent, weighted by area. As printed (E: "higher",
-   where 5.4.1 calls higher values farther away) the others are kept. No child passes: the parent. */
-static float ssao_sat__refine(ssao_sat__region *r, const ssao_sat *s, float z, int i0, int j0, int step, int level, ssao_sat_stats *stats)
+/* Eq 5.4 over the children of one node: those that are nearer than their parent, weighted by area. As printed (E:
+   "higher", where 5.4.1 calls higher values farther away) the others are kept. No child passes: the parent. */
+static float ssao_sat__refine(ssao_sat__region *r, const ssao_sat *s, float z, int i0, int j0, int step, int level,
+                              ssao_sat_stats *stats)
 {
-    float parent_mean = ssao_sat__mean(r, s, i0, j0, i0 + 2 * step, j0 + 2 * step), parent = ssao_sat__deficit(s, parent_mean, z);
+    float parent_mean = ssao_sat__mean(r, s, i0, j0, i0 + 2 * step, j0 + 2 * step),
+          parent = ssao_sat__deficit(s, parent_mean, z);
     float sum = 0, weight = 0;
     int i, j;
     if (level >= s->options.refine_levels || fabsf(parent) >= (float)s->options.refine_threshold * z) return parent;
@@ -1600,10 +1717,12 @@ static float ssao_sat__refine(ssao_sat__region *r, const ssao_sat *s, float z, i
 
 /* Where the region is centred: moved along the projected normal (5.4.2). A normal n at P moves its point along
    n.xy - n.z P.xy / P.z on the screen; the text's n.xy is right in orthographic views. */
-static void ssao_sat__guide(const ssao_sat *s, const ssao_sat__vector *n, float rx, float ry, float half_side, float *cx, float *cy)
+static void ssao_sat__guide(const ssao_sat *s, const ssao_sat__vector *n, float rx, float ry, float half_side,
+                            float *cx, float *cy)
 {
     float straight = s->options.as_printed || s->camera.orthographic ? 0 : n->z, length;
-    float dx = (n->x - straight * rx) * (s->camera.ax > 0 ? 1.0f : -1.0f), dy = (n->y - straight * ry) * (s->camera.ay > 0 ? 1.0f : -1.0f);
+    float dx = (n->x - straight * rx) * (s->camera.ax > 0 ? 1.0f : -1.0f),
+          dy = (n->y - straight * ry) * (s->camera.ay > 0 ? 1.0f : -1.0f);
     float offset = (float)s->options.normal_offset * half_side;
     length = dx * dx + dy * dy;
     if (length > 1) offset /= sqrtf(length);
@@ -1624,18 +1743,19 @@ static float ssao_sat__published(const ssao_sat *s, ssao_sat__region *r, float z
     return deficit > 0 ? gain * deficit / s->radius : 0;
 }
 
-/* Mean of max(plane, 0) over a box, of a plane with this value at the centre and at most `spread` off it: beyond its horizon there
-   is sky, 0 in the table. Exact where the plane falls along an axis, and more than that otherwise. */
+/* Mean of max(plane, 0) over a box, of a plane with this value at the centre and at most `spread` off it: beyond its
+   horizon there is sky, 0 in the table. Exact where the plane falls along an axis, and more than that otherwise. */
 static inline float ssao_sat__plane_mean(float centre, float spread)
 {
     if (centre >= spread) return centre;
     return centre > -spread ? (centre + spread) * (centre + spread) / (4 * spread) : 0;
 }
 
-/* Height of the mean over the tangent plane, for each of the boxes. In perspective the plane is 1/z = n.ray / n.P, in orthographic
-   views z itself is affine: both are compared at the centre of the box, where their mean over the box lies. */
-static float ssao_sat__over_plane(const ssao_sat *s, ssao_sat__region *r, const ssao_sat__vector *n, float x, float y, float z,
-                                  float rx, float ry, ssao_sat_stats *stats)
+/* Height of the mean over the tangent plane, for each of the boxes. In perspective the plane is 1/z = n.ray / n.P, in
+   orthographic views z itself is affine: both are compared at the centre of the box, where their mean over the box
+   lies. */
+static float ssao_sat__over_plane(const ssao_sat *s, ssao_sat__region *r, const ssao_sat__vector *n, float x, float y,
+                                  float z, float rx, float ry, ssao_sat_stats *stats)
 {
     float gx, gy, own, to_height, sum = 0;
     int i, j, step = s->options.plane_boxes == 2 ? 2 : 4;
@@ -1646,7 +1766,8 @@ static float ssao_sat__over_plane(const ssao_sat *s, ssao_sat__region *r, const 
         own = s->farthest - z;
         to_height = -facing / s->radius;
     } else {
-        float facing = n->x * rx + n->y * ry + n->z; /* n.P / z; grazing and back-facing normals count as nearly grazing */
+        float facing = n->x * rx + n->y * ry + n->z; /* n.P / z; grazing and back-facing normals count as nearly
+                                                        grazing */
         if (facing > -1e-3f) facing = -1e-3f;
         gx = n->x * s->camera.ax / (facing * z);
         gy = n->y * s->camera.ay / (facing * z);
@@ -1656,10 +1777,14 @@ static float ssao_sat__over_plane(const ssao_sat *s, ssao_sat__region *r, const 
     ssao_sat__look_up(r, s, step, 0, stats);
     for (j = 0; j < 4; j += step)
         for (i = 0; i < 4; i += step) {
-            float height, spread, cx = 0.5f * (float)(r->x[i] + r->x[i + step]), cy = 0.5f * (float)(r->y[j] + r->y[j + step]);
+            float height, spread, cx = 0.5f * (float)(r->x[i] + r->x[i + step]),
+                                  cy = 0.5f * (float)(r->y[j] + r->y[j + step]);
             if (!(ssao_sat__area(r, i, j, i + step, j + step) > 0)) continue;
-            spread = 0.5f * (fabsf(gx) * (float)(r->x[i + step] - r->x[i]) + fabsf(gy) * (float)(r->y[j + step] - r->y[j]));
-            height = (ssao_sat__mean(r, s, i, j, i + step, j + step) - ssao_sat__plane_mean(own + gx * (cx - x) + gy * (cy - y), spread)) * to_height;
+            spread =
+                0.5f * (fabsf(gx) * (float)(r->x[i + step] - r->x[i]) + fabsf(gy) * (float)(r->y[j + step] - r->y[j]));
+            height = (ssao_sat__mean(r, s, i, j, i + step, j + step) -
+                      ssao_sat__plane_mean(own + gx * (cx - x) + gy * (cy - y), spread)) *
+                     to_height;
             if (height > 0) sum += height / (1 + s->fit.range * height * height);
         }
     return sum / (float)(s->options.plane_boxes * s->options.plane_boxes);
@@ -1696,7 +1821,8 @@ static float ssao_sat__estimate_pixel(const ssao_sat *s, int x, int y, ssao_sat_
     size_t at = ssao_sat__at(s, y) + (size_t)x;
     float z = s->z[at], cx = (float)x + 0.5f, cy = (float)y + 0.5f, half_side, fade;
     float perspective = s->camera.orthographic ? 0.0f : 1.0f;
-    float rx = (s->camera.ax * (float)x + s->camera.bx) * perspective, ry = (s->camera.ay * (float)y + s->camera.by) * perspective;
+    float rx = (s->camera.ax * (float)x + s->camera.bx) * perspective,
+          ry = (s->camera.ay * (float)y + s->camera.by) * perspective;
     ssao_sat__region region;
     ssao_sat__vector n;
     int cut;
@@ -1723,7 +1849,9 @@ static float ssao_sat__estimate_pixel(const ssao_sat *s, int x, int y, ssao_sat_
         return v > 1 ? 1 : v > -1 ? v : -1;
     }
     if (s->options.method == SSAO_SAT_PLANE)
-        return ssao_sat__accessibility(s, ssao_sat__over_plane(s, &region, &n, (float)x + 0.5f, (float)y + 0.5f, z, rx, ry, stats), fade * s->fit.gain);
+        return ssao_sat__accessibility(
+            s, ssao_sat__over_plane(s, &region, &n, (float)x + 0.5f, (float)y + 0.5f, z, rx, ry, stats),
+            fade * s->fit.gain);
     return ssao_sat__accessibility(s, ssao_sat__published(s, &region, z, stats), fade * s->fit.gain);
 }
 
@@ -1734,21 +1862,23 @@ static void ssao_sat__estimate_rows(int begin, int end, int worker, void *contex
     int y, x, above = s->step == 2 && s->begin > 0;
     memset(&unused, 0, sizeof unused);
     for (y = s->begin - above + begin; y < s->begin - above + end; y++) {
-        ssao_sat_stats *stats = y >= s->begin && y < s->end ? &s->workers[worker].stats : &unused; /* neighbours of the band count there */
+        ssao_sat_stats *stats =
+            y >= s->begin && y < s->end ? &s->workers[worker].stats : &unused; /* neighbours of the band count there */
 #ifndef SSAO_SAT_NO_SLABS
         if (s->options.method == SSAO_SAT_SLABS && !s->is_signed) {
             for (x = 0; x < s->columns; x++) ssao_sat__estimate_slabs(s, x, y, stats);
             continue;
         }
 #endif
-        for (x = 0; x < s->columns; x++) s->open[ssao_sat__at(s, y) + (size_t)x] = ssao_sat__estimate_pixel(s, x, y, stats);
+        for (x = 0; x < s->columns; x++)
+            s->open[ssao_sat__at(s, y) + (size_t)x] = ssao_sat__estimate_pixel(s, x, y, stats);
     }
 }
 
 /* ------------------------------------------------------------------------------------------------
-   Output: copied, or upsampled with weights that fall with the distance of a neighbour from the pixel's tangent plane and with
-   the angle between the normals. Sky has no weight; a pixel without neighbours on its plane takes what is near.
-   ------------------------------------------------------------------------------------------------ */
+   Output: copied, or upsampled with weights that fall with the distance of a neighbour from the pixel's tangent plane
+   and with the angle between the normals. Sky has no weight; a pixel without neighbours on its plane takes what is
+   near. ------------------------------------------------------------------------------------------------ */
 
 static inline float *ssao_sat__out_row(float *out, ptrdiff_t stride, int y)
 {
@@ -1757,9 +1887,11 @@ static inline float *ssao_sat__out_row(float *out, ptrdiff_t stride, int y)
 
 #ifndef SSAO_SAT_NO_BENT
 /* Mean free direction: that of the open hemisphere, 2/3 n, less what is blocked. z turns from forward to OpenGL's. */
-static inline void ssao_sat__write_bent(const ssao_sat *s, float *out, float z, float nx, float ny, float nz, float bx, float by, float bz)
+static inline void ssao_sat__write_bent(const ssao_sat *s, float *out, float z, float nx, float ny, float nz, float bx,
+                                        float by, float bz)
 {
-    float x = (2 / 3.0f) * nx - bx, y = (2 / 3.0f) * ny - by, w = (2 / 3.0f) * nz - bz, length = sqrtf(x * x + y * y + w * w);
+    float x = (2 / 3.0f) * nx - bx, y = (2 / 3.0f) * ny - by, w = (2 / 3.0f) * nz - bz,
+          length = sqrtf(x * x + y * y + w * w);
     if (!(z > 0)) { nx = ny = 0; nz = -1; }
     if (z > 0 && length > 1e-3f) { nx = x / length; ny = y / length; nz = w / length; }
     out[0] = nx;
@@ -1777,18 +1909,22 @@ static void ssao_sat__copy_row(const ssao_sat *s, int y)
         float *bent = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
         int x;
         for (x = 0; x < s->width; x++, at++)
-            ssao_sat__write_bent(s, bent + 3 * x, s->z[at], s->nx[at], s->ny[at], s->nz[at], s->blocked[0][at], s->blocked[1][at], s->blocked[2][at]);
+            ssao_sat__write_bent(s, bent + 3 * x, s->z[at], s->nx[at], s->ny[at], s->nz[at], s->blocked[0][at],
+                                 s->blocked[1][at], s->blocked[2][at]);
     }
 #endif
 }
 
-typedef struct ssao_sat__picture_row { float *z, *nx, *ny, *nz, *open, *blocked[3]; } ssao_sat__picture_row; /* every second pixel */
+typedef struct ssao_sat__picture_row {
+    float *z, *nx, *ny, *nz, *open, *blocked[3];
+} ssao_sat__picture_row; /* every second pixel */
 
 /* Pixels x0 + 2 i, i = first .. first + lanes - 1, of row y: the 3 x 3 table pixels around (x / 2, y / 2). */
 static void ssao_sat__upsample_lanes(const ssao_sat *s, const ssao_sat__picture_row *r, int x0, int y, int first)
 {
     const float orthographic = s->camera.orthographic ? 1.0f : 0.0f, perspective = 1 - orthographic;
-    const ssao_sat__f zero = ssao_sat__set(0), one = ssao_sat__set(1), nx = ssao_sat__load(r->nx + first), ny = ssao_sat__load(r->ny + first);
+    const ssao_sat__f zero = ssao_sat__set(0), one = ssao_sat__set(1), nx = ssao_sat__load(r->nx + first),
+                      ny = ssao_sat__load(r->ny + first);
     const ssao_sat__f nz = ssao_sat__load(r->nz + first), z = ssao_sat__load(r->z + first);
     const ssao_sat__f scale = ssao_sat__add(ssao_sat__mul(z, ssao_sat__set(perspective)), ssao_sat__set(orthographic));
     float lane[4], ry = (float)(s->camera.full[2] * (y + 0.5) + s->camera.full[3]);
@@ -1796,7 +1932,9 @@ static void ssao_sat__upsample_lanes(const ssao_sat *s, const ssao_sat__picture_
     int i, j, k, c;
     for (i = 0; i < 4; i++) lane[i] = (float)(s->camera.full[0] * (x0 + 2 * (first + i) + 0.5) + s->camera.full[1]);
     rx = ssao_sat__load(lane);
-    own = ssao_sat__add(ssao_sat__mul(scale, ssao_sat__add(ssao_sat__mul(nx, rx), ssao_sat__mul(ny, ssao_sat__set(ry)))), ssao_sat__mul(nz, z));
+    own =
+        ssao_sat__add(ssao_sat__mul(scale, ssao_sat__add(ssao_sat__mul(nx, rx), ssao_sat__mul(ny, ssao_sat__set(ry)))),
+                      ssao_sat__mul(nz, z));
     sharpness = ssao_sat__div(ssao_sat__set(SSAO_SAT__SHARPNESS), ssao_sat__max(z, ssao_sat__set(1 / SSAO_SAT__FAR)));
     for (c = 0; c < 3; c++) blocked[c] = zero;
     for (j = sat__max_int(y / 2 - 1, 0); j <= sat__min_int(y / 2 + 1, s->rows - 1); j++) {
@@ -1805,21 +1943,29 @@ static void ssao_sat__upsample_lanes(const ssao_sat *s, const ssao_sat__picture_
         for (k = -1; k <= 1; k++) {
             const size_t t = at + (size_t)k; /* at >= 1: rows are padded */
             const int dx = 2 * k - x0, dy = 2 * j - y;
-            ssao_sat__f tx = ssao_sat__add(rx, ssao_sat__set((float)s->camera.full[0] * (float)dx)), tz = ssao_sat__load(s->z + t);
-            ssao_sat__f tscale = ssao_sat__add(ssao_sat__mul(tz, ssao_sat__set(perspective)), ssao_sat__set(orthographic));
-            ssao_sat__f along = ssao_sat__add(ssao_sat__mul(tscale, ssao_sat__add(ssao_sat__mul(nx, tx), ssao_sat__mul(ny, ssao_sat__set(rowy)))), ssao_sat__mul(nz, tz));
-            ssao_sat__f on_plane = ssao_sat__max(zero, ssao_sat__sub(one, ssao_sat__mul(ssao_sat__abs(ssao_sat__sub(along, own)), sharpness)));
-            ssao_sat__f alike = ssao_sat__add(ssao_sat__add(ssao_sat__mul(nx, ssao_sat__load(s->nx + t)), ssao_sat__mul(ny, ssao_sat__load(s->ny + t))),
+            ssao_sat__f tx = ssao_sat__add(rx, ssao_sat__set((float)s->camera.full[0] * (float)dx)),
+                        tz = ssao_sat__load(s->z + t);
+            ssao_sat__f tscale =
+                ssao_sat__add(ssao_sat__mul(tz, ssao_sat__set(perspective)), ssao_sat__set(orthographic));
+            ssao_sat__f along = ssao_sat__add(
+                ssao_sat__mul(tscale, ssao_sat__add(ssao_sat__mul(nx, tx), ssao_sat__mul(ny, ssao_sat__set(rowy)))),
+                ssao_sat__mul(nz, tz));
+            ssao_sat__f on_plane = ssao_sat__max(
+                zero, ssao_sat__sub(one, ssao_sat__mul(ssao_sat__abs(ssao_sat__sub(along, own)), sharpness)));
+            ssao_sat__f alike = ssao_sat__add(ssao_sat__add(ssao_sat__mul(nx, ssao_sat__load(s->nx + t)),
+                                                            ssao_sat__mul(ny, ssao_sat__load(s->ny + t))),
                                               ssao_sat__mul(nz, ssao_sat__load(s->nz + t)));
             ssao_sat__f weight;
             alike = ssao_sat__max(zero, alike);
             alike = ssao_sat__mul(alike, alike);
             weight = ssao_sat__add(ssao_sat__mul(on_plane, ssao_sat__mul(alike, alike)), ssao_sat__set(1e-4f));
-            weight = ssao_sat__if_positive(tz, ssao_sat__mul(weight, ssao_sat__set(1 / (1 + (float)(dx * dx + dy * dy)))));
+            weight =
+                ssao_sat__if_positive(tz, ssao_sat__mul(weight, ssao_sat__set(1 / (1 + (float)(dx * dx + dy * dy)))));
             total = ssao_sat__add(total, weight);
             sum = ssao_sat__add(sum, ssao_sat__mul(weight, ssao_sat__load(s->open + t)));
             if (s->bent_wanted)
-                for (c = 0; c < 3; c++) blocked[c] = ssao_sat__add(blocked[c], ssao_sat__mul(weight, ssao_sat__load(s->blocked[c] + t)));
+                for (c = 0; c < 3; c++)
+                    blocked[c] = ssao_sat__add(blocked[c], ssao_sat__mul(weight, ssao_sat__load(s->blocked[c] + t)));
         }
     }
     ssao_sat__store(r->open + first, ssao_sat__div(sum, total));
@@ -1836,7 +1982,8 @@ static void ssao_sat__write_row(const ssao_sat *s, const ssao_sat__picture_row *
     if (s->bent_wanted) {
         float *bent = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
         for (x = x0, i = 0; x < s->width; x += 2, i++)
-            ssao_sat__write_bent(s, bent + 3 * x, r->z[i], r->nx[i], r->ny[i], r->nz[i], r->blocked[0][i], r->blocked[1][i], r->blocked[2][i]);
+            ssao_sat__write_bent(s, bent + 3 * x, r->z[i], r->nx[i], r->ny[i], r->nz[i], r->blocked[0][i],
+                                 r->blocked[1][i], r->blocked[2][i]);
     }
 #endif
 }
@@ -1875,7 +2022,8 @@ static void ssao_sat__write_rows(int begin, int end, int worker, void *context)
 static void ssao_sat__run_band(ssao_sat *s, int begin, int end)
 {
     const sat_threads *threads = &s->options.threads;
-    int reserve = s->reserve, k, i, estimated, tables = s->options.method == SSAO_SAT_SLABS ? s->frame_slabs + s->options.skip_flat : 1;
+    int reserve = s->reserve, k, i, estimated,
+        tables = s->options.method == SSAO_SAT_SLABS ? s->frame_slabs + s->options.skip_flat : 1;
     s->begin = begin;
     s->end = end;
     s->first = sat__max_int(0, begin - reserve);
@@ -1944,7 +2092,8 @@ static void ssao_sat__prepare_frame(ssao_sat *s)
     side = ssao_sat__half_side(s, s->nearest, &cut);
     s->largest = (side > 2 ? side : 2) * (s->camera.aspect > 1 ? s->camera.aspect : 1);
     s->flat_limit = s->fit.bias / (4 * s->largest * s->camera.pixels);
-    if (!s->camera.orthographic && !(s->options.region_pixels > 0)) { /* what is nearer than the range has larger regions */
+    if (!s->camera.orthographic && !(s->options.region_pixels > 0)) { /* what is nearer than the range has larger
+                                                                         regions */
         side *= SSAO_SAT__MARGIN;
         if (side > s->limit) side = s->limit;
         s->largest = (side > 2 ? side : 2) * (s->camera.aspect > 1 ? s->camera.aspect : 1);
@@ -2022,7 +2171,8 @@ static void ssao_sat__run(ssao_sat *s, ssao_sat_stats *stats)
         s->band_nearest = s->nearest;
         s->band_farthest = s->farthest;
         ssao_sat__prepare_frame(s);
-        for (begin = 0; begin < s->rows; begin += band) ssao_sat__run_band(s, begin, sat__min_int(begin + band, s->rows));
+        for (begin = 0; begin < s->rows; begin += band)
+            ssao_sat__run_band(s, begin, sat__min_int(begin + band, s->rows));
     }
     if (stats) ssao_sat__collect(s, stats, fill);
 }
@@ -2042,7 +2192,8 @@ static int ssao_sat__rows_are_valid(const void *pixels, ptrdiff_t *stride, int h
 }
 
 /* Do two sets of rows share a byte? Interleaved rows of one buffer count as sharing. */
-static int ssao_sat__overlap(const void *a, ptrdiff_t a_stride, size_t a_bytes, const void *b, ptrdiff_t b_stride, size_t b_bytes, int height)
+static int ssao_sat__overlap(const void *a, ptrdiff_t a_stride, size_t a_bytes, const void *b, ptrdiff_t b_stride,
+                             size_t b_bytes, int height)
 {
     uintptr_t a0 = (uintptr_t)a, a1 = a0, b0 = (uintptr_t)b, b1 = b0;
     if (!a || !b) return 0;
@@ -2060,7 +2211,8 @@ static sat_result ssao_sat__check_input(ssao_sat *s, const ssao_sat_input *input
     ssao_sat_input *in = &s->input;
     *in = *input;
     if (in->width != s->width || in->height != s->height) return SAT_ERR_MISMATCH;
-    if ((unsigned)in->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED || !(in->sky >= 0) || ssao_sat__bad_buffer(in)) return SAT_ERR_ARGUMENT;
+    if ((unsigned)in->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED || !(in->sky >= 0) || ssao_sat__bad_buffer(in))
+        return SAT_ERR_ARGUMENT;
     return ssao_sat__read_camera(&s->camera, in, s->step, s->options.bottom_up) ? SAT_OK : SAT_ERR_ARGUMENT;
 }
 
@@ -2069,7 +2221,8 @@ static int ssao_sat__output_is_valid(const ssao_sat *s, const float *out, ptrdif
     const ssao_sat_input *in = &s->input;
     const void *depth = in->depth ? (const void *)in->depth : (const void *)in->half_depth;
     if (!ssao_sat__rows_are_valid(out, stride, s->height, bytes, 4)) return 0;
-    return !ssao_sat__overlap(out, *stride, bytes, depth, in->depth_stride, (size_t)s->width * (in->depth ? 4 : 2), s->height) &&
+    return !ssao_sat__overlap(out, *stride, bytes, depth, in->depth_stride, (size_t)s->width * (in->depth ? 4 : 2),
+                              s->height) &&
            !ssao_sat__overlap(out, *stride, bytes, in->normals, in->normal_stride, (size_t)s->width * 12, s->height);
 }
 
@@ -2090,7 +2243,8 @@ static sat_result ssao_sat__apply(ssao_sat *s, float *out, ptrdiff_t stride, flo
     if (!ssao_sat__output_is_valid(s, out, &stride, (size_t)s->width * 4)) return SAT_ERR_ARGUMENT;
     if (bent) {
         if (!ssao_sat__output_is_valid(s, bent, &bent_stride, (size_t)s->width * 12)) return SAT_ERR_ARGUMENT;
-        if (ssao_sat__overlap(out, stride, (size_t)s->width * 4, bent, bent_stride, (size_t)s->width * 12, s->height)) return SAT_ERR_ARGUMENT;
+        if (ssao_sat__overlap(out, stride, (size_t)s->width * 4, bent, bent_stride, (size_t)s->width * 12, s->height))
+            return SAT_ERR_ARGUMENT;
     }
     s->out = out;
     s->out_stride = stride;
@@ -2106,21 +2260,22 @@ static sat_result ssao_sat__apply(ssao_sat *s, float *out, ptrdiff_t stride, flo
     return SAT_OK;
 }
 
-SSAO_SAT_DEF sat_result ssao_sat_apply(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride, const ssao_sat_input *input,
-                                       ssao_sat_stats *stats)
+SSAO_SAT_DEF sat_result ssao_sat_apply(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride,
+                                       const ssao_sat_input *input, ssao_sat_stats *stats)
 {
     return ssao_sat__apply(ao, accessibility, out_stride, NULL, 0, input, stats, 0);
 }
 
-SSAO_SAT_DEF sat_result ssao_sat_apply_signed(ssao_sat *ao, float *out, ptrdiff_t out_stride, const ssao_sat_input *input,
-                                              ssao_sat_stats *stats)
+SSAO_SAT_DEF sat_result ssao_sat_apply_signed(ssao_sat *ao, float *out, ptrdiff_t out_stride,
+                                              const ssao_sat_input *input, ssao_sat_stats *stats)
 {
     return ssao_sat__apply(ao, out, out_stride, NULL, 0, input, stats, 1);
 }
 
 #ifndef SSAO_SAT_NO_BENT
-SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride, float *bent_normals,
-                                            ptrdiff_t bent_stride, const ssao_sat_input *input, ssao_sat_stats *stats)
+SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride,
+                                            float *bent_normals, ptrdiff_t bent_stride, const ssao_sat_input *input,
+                                            ssao_sat_stats *stats)
 {
     if (!ao || !bent_normals || ao->options.method != SSAO_SAT_SLABS) return SAT_ERR_ARGUMENT;
     return ssao_sat__apply(ao, accessibility, out_stride, bent_normals, bent_stride, input, stats, 0);
@@ -2132,7 +2287,8 @@ static int ssao_sat__options_are_valid(const ssao_sat_options *o)
     return !sat__fields_check(o, ssao_sat__fields, SSAO_SAT__FIELDS) && o->max_pixels >= o->min_pixels;
 }
 
-SSAO_SAT_DEF const char *ssao_sat_explain(char *text, size_t size, int width, int height, const ssao_sat_options *options)
+SSAO_SAT_DEF const char *ssao_sat_explain(char *text, size_t size, int width, int height,
+                                          const ssao_sat_options *options)
 {
     sat__text t = sat__text_begin(text, size);
     ssao_sat_options o = options ? *options : ssao_sat_defaults();
@@ -2140,7 +2296,8 @@ SSAO_SAT_DEF const char *ssao_sat_explain(char *text, size_t size, int width, in
     if (width < 1 || width > 32768) sat__text_range(&t, "width", width, 1, 32768, ' ');
     else if (height < 1 || height > 32768) sat__text_range(&t, "height", height, 1, 32768, ' ');
     else if (field) sat__text_field(&t, field, &o);
-    else if (o.max_pixels < o.min_pixels) sat__text_range(&t, "max_pixels (from min_pixels on)", o.max_pixels, o.min_pixels, 512, ' ');
+    else if (o.max_pixels < o.min_pixels)
+        sat__text_range(&t, "max_pixels (from min_pixels on)", o.max_pixels, o.min_pixels, 512, ' ');
     return t.size ? text : "";
 }
 
@@ -2150,9 +2307,11 @@ static const char *ssao_sat__bad_buffer(ssao_sat_input *in)
     if (!in->depth == !in->half_depth) return "depth or half_depth, one of them, is needed";
     if (in->depth && !ssao_sat__rows_are_valid(in->depth, &in->depth_stride, in->height, (size_t)in->width * 4, 4))
         return "depth: not aligned, or depth_stride is less than a row or no multiple of 4";
-    if (in->half_depth && !ssao_sat__rows_are_valid(in->half_depth, &in->depth_stride, in->height, (size_t)in->width * 2, 2))
+    if (in->half_depth &&
+        !ssao_sat__rows_are_valid(in->half_depth, &in->depth_stride, in->height, (size_t)in->width * 2, 2))
         return "half_depth: not aligned, or depth_stride is less than a row or odd";
-    if (in->normals && !ssao_sat__rows_are_valid(in->normals, &in->normal_stride, in->height, (size_t)in->width * 12, 4))
+    if (in->normals &&
+        !ssao_sat__rows_are_valid(in->normals, &in->normal_stride, in->height, (size_t)in->width * 12, 4))
         return "normals: not aligned, or normal_stride is less than a row or no multiple of 4";
     return NULL;
 }
@@ -2194,8 +2353,10 @@ static int ssao_sat__lay_out(ssao_sat *s, sat__arena *arena)
 #ifndef SSAO_SAT_NO_BENT
     bent = s->options.method == SSAO_SAT_SLABS;
 #endif
-    if (!sat__multiply_size(&picture, rows, s->stride) || !sat__multiply_size(&s->table_plane, rows + 1, s->table_stride) ||
-        !sat__multiply_size(&words, s->table_plane, (size_t)s->tables)) return 0;
+    if (!sat__multiply_size(&picture, rows, s->stride) ||
+        !sat__multiply_size(&s->table_plane, rows + 1, s->table_stride) ||
+        !sat__multiply_size(&words, s->table_plane, (size_t)s->tables))
+        return 0;
     s->z = (float *)sat__carve(arena, picture, 4);
     s->affine = (float *)sat__carve(arena, picture, 4);
     s->nx = (float *)sat__carve(arena, picture, 4);
@@ -2210,7 +2371,8 @@ static int ssao_sat__lay_out(ssao_sat *s, sat__arena *arena)
     s->table = (uint32_t *)sat__carve(arena, words, 4);
     s->flags = (uint32_t *)sat__carve(arena, s->tables > 1 ? s->table_plane : 0, 4);
     s->scratch = (float *)sat__carve(arena, (size_t)sat__worker_count(&s->options.threads) * 8, s->stride * 4);
-    s->workers = (ssao_sat__worker *)sat__carve(arena, (size_t)sat__worker_count(&s->options.threads), sizeof(ssao_sat__worker));
+    s->workers =
+        (ssao_sat__worker *)sat__carve(arena, (size_t)sat__worker_count(&s->options.threads), sizeof(ssao_sat__worker));
     return !arena->overflow;
 }
 
@@ -2258,7 +2420,8 @@ SSAO_SAT_DEF sat_result ssao_sat_create(ssao_sat **out, int width, int height, c
     if (!sat__version_matches()) return SAT_ERR_VERSION;
     memset(&s, 0, sizeof s);
     s.options = options ? *options : ssao_sat_defaults();
-    if (width < 1 || height < 1 || width > 32768 || height > 32768 || !ssao_sat__options_are_valid(&s.options)) return SAT_ERR_ARGUMENT;
+    if (width < 1 || height < 1 || width > 32768 || height > 32768 || !ssao_sat__options_are_valid(&s.options))
+        return SAT_ERR_ARGUMENT;
     if (!sat__resolve_allocator(&allocator, &s.options.allocator)) return SAT_ERR_ARGUMENT;
     s.options.allocator = allocator;
     if (!ssao_sat__measure(&s, width, height, &s.bytes)) return SAT_ERR_SIZE;
@@ -2279,8 +2442,8 @@ SSAO_SAT_DEF sat_result ssao_sat_resize(ssao_sat *ao, int width, int height, con
     if (options) s.options = *options;
     s.options.allocator = ao->options.allocator;
     if (!ssao_sat__measure(&s, width, height, &used) || used + 64 > ao->bytes) return SAT_ERR_SIZE;
-    if (width == ao->width && height == ao->height && s.step == ao->step && s.capacity == ao->capacity && s.tables == ao->tables &&
-        sat__worker_count(&s.options.threads) == sat__worker_count(&ao->options.threads)) {
+    if (width == ao->width && height == ao->height && s.step == ao->step && s.capacity == ao->capacity &&
+        s.tables == ao->tables && sat__worker_count(&s.options.threads) == sat__worker_count(&ao->options.threads)) {
         ao->options = s.options; /* the same layout */
         ao->reserve = s.reserve;
     } else ssao_sat__place(&s);
@@ -2289,14 +2452,16 @@ SSAO_SAT_DEF sat_result ssao_sat_resize(ssao_sat *ao, int width, int height, con
 
 SSAO_SAT_DEF float ssao_sat_multi_bounce(float accessibility, float albedo)
 {
-    float v = accessibility, a = 2.0404f * albedo - 0.3324f, b = -4.7951f * albedo + 0.6417f, c = 2.7552f * albedo + 0.6903f, fit;
+    float v = accessibility, a = 2.0404f * albedo - 0.3324f, b = -4.7951f * albedo + 0.6417f,
+          c = 2.7552f * albedo + 0.6903f, fit;
     fit = ((v * a + b) * v + c) * v;
     return fit > v ? fit < 1 ? fit : 1 : v;
 }
 
 SSAO_SAT_DEF float ssao_sat_specular(float accessibility, float cosine, float roughness)
 {
-    float open = acosf(sqrtf(accessibility > 0 ? accessibility < 1 ? 1 - accessibility : 0.0f : 1.0f)); /* half angles of the cones */
+    float open = acosf(
+        sqrtf(accessibility > 0 ? accessibility < 1 ? 1 - accessibility : 0.0f : 1.0f)); /* half angles of the cones */
     float shine = acosf(exp2f(-3.32193f * roughness * roughness));
     float apart = acosf(cosine > -1 ? cosine < 1 ? cosine : 1.0f : -1.0f), inside = fabsf(open - shine), share;
     float lesser = open < shine ? open : shine, full = 1 - cosf(lesser), all = 1 - cosf(shine);
@@ -2323,9 +2488,9 @@ SAT__IEEE_END
 /* ------------------------------------------------------------------------------------------------
    OpenGL: depth range, slab edges, table by recursive doubling (Slomp 2012, 4.4), estimate, upsample
 
-   The tables of all slabs are tiles of one integer texture, so that one pass scans them all. Sums are those of the C code modulo
-   2^32, whatever the order; distances and edges are computed in the GPU's floats and may differ in the last bits.
-   ------------------------------------------------------------------------------------------------ */
+   The tables of all slabs are tiles of one integer texture, so that one pass scans them all. Sums are those of the C
+   code modulo 2^32, whatever the order; distances and edges are computed in the GPU's floats and may differ in the last
+   bits. ------------------------------------------------------------------------------------------------ */
 
 #if defined(SSAO_SAT_GL) && defined(SSAO_SAT_IMPLEMENTATION) && !defined(SSAO_SAT__GL_IMPLEMENTED)
 #define SSAO_SAT__GL_IMPLEMENTED
@@ -2404,8 +2569,8 @@ static const char ssao_sat__gl_common[] =
     "float aspect() { return abs(view[0].x / view[0].z); }\n"
     "bool orthographic() { return view[1].w > 0.5; }\n";
 
-/* First nearest and farthest distance in 2 x 2 of the sample, then the range without the TRIM blocks at its ends, as in C. Where
-   the sample meets nothing the range is that of nothing: 1 to 1. */
+/* First nearest and farthest distance in 2 x 2 of the sample, then the range without the TRIM blocks at its ends, as in
+   C. Where the sample meets nothing the range is that of nothing: 1 to 1. */
 static const char ssao_sat__gl_range[] =
     "uniform sampler2D finer;\n"
     "out vec4 result;\n"
@@ -2458,7 +2623,8 @@ static const char ssao_sat__gl_shares[] =
     "    result = vec4(all > 0.0 ? below / all : bin / float(BINS));\n"
     "}\n";
 
-/* Texel k: edge k; low value, quantum and highest level of slab k. The last has the farthest distance and the number of slabs. As in C. */
+/* Texel k: edge k; low value, quantum and highest level of slab k. The last has the farthest distance and the number of
+   slabs. As in C. */
 static const char ssao_sat__gl_edges[] =
     "uniform sampler2D finer, shares;\n"
     "uniform vec4 region;\n" /* radius, reach, limit */
@@ -2539,7 +2705,8 @@ static const char ssao_sat__gl_scan[] =
 
 static const char ssao_sat__gl_tone[] =
     "uniform usampler2D table;\n"
-    "uniform vec4 fit, region, tone;\n" /* reach, range, bias, gain; radius, limit, min_pixels, pixels of a fixed region; power, power of the caller */
+    "uniform vec4 fit, region, tone;\n" /* reach, range, bias, gain; radius, limit, min_pixels, pixels of a fixed
+                                           region; power, power of the caller */
     "out vec4 result;\n"
     "float open(float occlusion, float gain) {\n"
     "    return pow(clamp(1.0 - gain * occlusion, 0.0, 1.0), tone.x * tone.y);\n"
@@ -2570,7 +2737,8 @@ static const char ssao_sat__gl_slabs[] =
     "    if (!whole) share = vec3(a, 1.0 + BEYOND * (2.0 - a - b), b);\n"
     "    return vec3(count.x > 0.0 ? share.x / count.x : 0.0, count.y > 0.0 ? share.y / count.y : 0.0, count.z > 0.0 ? share.z / count.z : 0.0);\n"
     "}\n"
-    "float slab(int k, ivec2 x[4], vec3 u, vec3 v, vec3 p, vec3 n) {\n" /* x[t] = borders along both axes; weights of the thirds */
+    "float slab(int k, ivec2 x[4], vec3 u, vec3 v, vec3 p, vec3 n) {\n" /* x[t] = borders along both axes; weights of
+                                                                           the thirds */
     "    ivec2 tile = ivec2(k % TILES, k / TILES) * size;\n"
     "    vec4 edge = texelFetch(edges, ivec2(k, 0), 0);\n"
     "    uvec4 row[4];\n"
@@ -2724,8 +2892,17 @@ static const char ssao_sat__gl_upsample[] =
     "#endif\n"
     "}\n";
 
-enum { SSAO_SAT__GL_RANGE, SSAO_SAT__GL_RANGE_FIRST, SSAO_SAT__GL_SHARES, SSAO_SAT__GL_EDGES, SSAO_SAT__GL_WORDS, SSAO_SAT__GL_SCAN, SSAO_SAT__GL_ESTIMATE,
-       SSAO_SAT__GL_UPSAMPLE, SSAO_SAT__GL_PROGRAMS };
+enum {
+    SSAO_SAT__GL_RANGE,
+    SSAO_SAT__GL_RANGE_FIRST,
+    SSAO_SAT__GL_SHARES,
+    SSAO_SAT__GL_EDGES,
+    SSAO_SAT__GL_WORDS,
+    SSAO_SAT__GL_SCAN,
+    SSAO_SAT__GL_ESTIMATE,
+    SSAO_SAT__GL_UPSAMPLE,
+    SSAO_SAT__GL_PROGRAMS
+};
 
 typedef struct ssao_sat__gl_target { unsigned texture, framebuffer; int width, height; } ssao_sat__gl_target;
 
@@ -2757,14 +2934,19 @@ static void ssao_sat__gl_pack_view(float *view, const ssao_sat__camera *c, const
 SSAO_SAT_DEF sat_result ssao_sat_gl_view(float *view, const ssao_sat_input *input, int bottom_up)
 {
     ssao_sat__camera camera;
-    if (!view || !input || input->width < 1 || input->height < 1 || (unsigned)input->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED ||
-        !ssao_sat__read_camera(&camera, input, 1, bottom_up)) return SAT_ERR_ARGUMENT;
+    if (!view || !input || input->width < 1 || input->height < 1 ||
+        (unsigned)input->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED ||
+        !ssao_sat__read_camera(&camera, input, 1, bottom_up))
+        return SAT_ERR_ARGUMENT;
     ssao_sat__gl_pack_view(view, &camera, input);
     return SAT_OK;
 }
 
 /* Programs that read normals are there twice; the others once, under 0. */
-static int ssao_sat__gl_reads_normals(int which) { return which == SSAO_SAT__GL_ESTIMATE || which == SSAO_SAT__GL_UPSAMPLE; }
+static int ssao_sat__gl_reads_normals(int which)
+{
+    return which == SSAO_SAT__GL_ESTIMATE || which == SSAO_SAT__GL_UPSAMPLE;
+}
 
 static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *const *fragment, int normals)
 {
@@ -2805,8 +2987,15 @@ static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g)
     static const char last[] = "#define NAME refine_last\n#define CHILD\n#define LEVEL 1\n";
     static const char first[] = "#undef NAME\n#undef CHILD\n#undef LEVEL\n#define NAME refine_all\n#define LEVEL 0\n"
                                 "#define CHILD child = refine_last(c, z, edge);\n";
-    const char *const single[] = {ssao_sat__gl_common, ssao_sat__gl_tone, ssao_sat__gl_single, last, ssao_sat__gl_refine, first, ssao_sat__gl_refine,
-                                  ssao_sat__gl_single_main, NULL};
+    const char *const single[] = {ssao_sat__gl_common,
+                                  ssao_sat__gl_tone,
+                                  ssao_sat__gl_single,
+                                  last,
+                                  ssao_sat__gl_refine,
+                                  first,
+                                  ssao_sat__gl_refine,
+                                  ssao_sat__gl_single_main,
+                                  NULL};
     const char *const text[SSAO_SAT__GL_PROGRAMS][4] = {
         {ssao_sat__gl_common, ssao_sat__gl_range, NULL}, {ssao_sat__gl_common, ssao_sat__gl_range, NULL},
         {ssao_sat__gl_common, ssao_sat__gl_shares, NULL}, {ssao_sat__gl_common, ssao_sat__gl_edges, NULL},
@@ -2818,14 +3007,16 @@ static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g)
     for (normals = 0; normals < 2; normals++)
         for (i = 0; i < SSAO_SAT__GL_PROGRAMS && result == SAT_OK; i++) {
             if (normals && !ssao_sat__gl_reads_normals(i)) continue;
-            result = ssao_sat__gl_program(g, i, i == SSAO_SAT__GL_ESTIMATE && g->options.method != SSAO_SAT_SLABS ? single : text[i], normals);
+            result = ssao_sat__gl_program(
+                g, i, i == SSAO_SAT__GL_ESTIMATE && g->options.method != SSAO_SAT_SLABS ? single : text[i], normals);
         }
     g->is_built = result == SAT_OK;
     return result;
 }
 
 /* A texture one can draw into. */
-static sat_result ssao_sat__gl_make_target(ssao_sat_gl *g, ssao_sat__gl_target *t, unsigned internal, int width, int height)
+static sat_result ssao_sat__gl_make_target(ssao_sat_gl *g, ssao_sat__gl_target *t, unsigned internal, int width,
+                                           int height)
 {
     sat_result result = sat__gl_texture(&g->gl, &t->texture, internal, width, height, NULL);
     t->width = width;
@@ -2839,17 +3030,20 @@ static sat_result ssao_sat__gl_make_targets(ssao_sat_gl *g)
     int tile_rows = slabs ? (g->options.slabs + g->tiles - 1) / g->tiles : 1;
     sat_result result = SAT_OK;
     for (i = 0; i < 2 && result == SAT_OK; i++)
-        result = ssao_sat__gl_make_target(g, &g->range[i], SAT__GL_RG32F, i ? 1 : SSAO_SAT__GRID / 2, i ? 1 : SSAO_SAT__GRID / 2);
+        result = ssao_sat__gl_make_target(g, &g->range[i], SAT__GL_RG32F, i ? 1 : SSAO_SAT__GRID / 2,
+                                          i ? 1 : SSAO_SAT__GRID / 2);
     if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->shares, SAT__GL_R32F, SSAO_SAT__BINS + 1, 1);
     if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->edges, SAT__GL_RGBA32F, g->options.slabs + 1, 1);
     for (i = 0; i < 2 && result == SAT_OK; i++)
-        result = ssao_sat__gl_make_target(g, &g->table[i], slabs ? SAT__GL_RGBA32UI : SAT__GL_R32UI, g->columns * g->tiles, g->rows * tile_rows);
+        result = ssao_sat__gl_make_target(g, &g->table[i], slabs ? SAT__GL_RGBA32UI : SAT__GL_R32UI,
+                                          g->columns * g->tiles, g->rows * tile_rows);
     if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->open, SAT__GL_R32F, g->columns, g->rows);
     if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->out, SAT__GL_R32F, g->width, g->height);
     return result;
 }
 
-SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *get_proc, int width, int height, const ssao_sat_options *options)
+SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *get_proc, int width, int height,
+                                           const ssao_sat_options *options)
 {
     ssao_sat_options o = options ? *options : ssao_sat_defaults();
     sat_allocator allocator;
@@ -2859,7 +3053,8 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *g
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (width < 1 || height < 1 || width > 32768 || height > 32768 || !ssao_sat__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    if (width < 1 || height < 1 || width > 32768 || height > 32768 || !ssao_sat__options_are_valid(&o))
+        return SAT_ERR_ARGUMENT;
     if (!sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     g = (ssao_sat_gl *)sat__alloc(&allocator, sizeof *g);
     if (!g) return SAT_ERR_MEMORY;
@@ -2886,9 +3081,11 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_set_options(ssao_sat_gl *gl, const ssao_sat_
 {
     ssao_sat_options o = options ? *options : ssao_sat_defaults();
     if (!gl || !gl->is_built || !ssao_sat__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
-    if (o.method != gl->options.method || o.half_resolution != gl->options.half_resolution || o.slabs != gl->options.slabs ||
-        o.scales != gl->options.scales || o.plane_boxes != gl->options.plane_boxes || o.refine_levels != gl->options.refine_levels ||
-        o.as_printed != gl->options.as_printed || o.inverted_depth != gl->options.inverted_depth) return SAT_ERR_MISMATCH;
+    if (o.method != gl->options.method || o.half_resolution != gl->options.half_resolution ||
+        o.slabs != gl->options.slabs || o.scales != gl->options.scales || o.plane_boxes != gl->options.plane_boxes ||
+        o.refine_levels != gl->options.refine_levels || o.as_printed != gl->options.as_printed ||
+        o.inverted_depth != gl->options.inverted_depth)
+        return SAT_ERR_MISMATCH;
     o.allocator = gl->options.allocator;
     gl->options = o;
     return SAT_OK;
@@ -2924,7 +3121,8 @@ SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl)
 }
 
 /* Starts a pass with the uniforms that most of them share. */
-static unsigned ssao_sat__gl_pass(ssao_sat_gl *g, int which, const ssao_sat__gl_target *to, unsigned depth, unsigned normals)
+static unsigned ssao_sat__gl_pass(ssao_sat_gl *g, int which, const ssao_sat__gl_target *to, unsigned depth,
+                                  unsigned normals)
 {
     unsigned program = g->programs[normals && ssao_sat__gl_reads_normals(which)][which];
     sat__gl *gl = &g->gl;
@@ -3039,7 +3237,8 @@ static sat_result ssao_sat__gl_run(ssao_sat_gl *g, unsigned out, unsigned depth,
     return SAT_OK;
 }
 
-SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigned depth, unsigned normals, const ssao_sat_input *input)
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigned depth, unsigned normals,
+                                          const ssao_sat_input *input)
 {
     sat__gl_state state;
     sat_result result;
@@ -3070,9 +3269,9 @@ SAT__IEEE_END
    are in the file LICENSE.
 
    MIT No Attribution. Copyright 2026 the lightscan authors. Permission is hereby granted, free of charge, to any person
-   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software without
-   restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute, sublicense,
-   and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
+   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software
+   without restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute,
+   sublicense, and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
 
    THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE
    WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR

@@ -1,6 +1,7 @@
 /* tonemap.h - 0.1.0 - tone mapping of high dynamic range pictures - SPDX-License-Identifier: MIT-0 OR Unlicense
 
-   The photographic operator with local contrast on exact sums, mesopic vision, Ashikhmin's operator, adaptation over time.
+   The photographic operator with local contrast on exact sums, mesopic vision, Ashikhmin's operator, adaptation over
+   time.
 
    USE
 
@@ -17,67 +18,71 @@
    WHAT IT DOES
 
      photographic   Reinhard 2002 as in Slomp 2012, appendix A: the metered luminance becomes the key (eq A.1, A.2), and
-                    each pixel is compressed by the mean of the largest even neighbourhood around it (eq A.4 to A.9) or by
-                    itself (eq A.3). Optional: burn-out above a white; key and white estimated (Reinhard 2003)
+                    each pixel is compressed by the mean of the largest even neighbourhood around it (eq A.4 to A.9) or
+                    by itself (eq A.3). Optional: burn-out above a white; key and white estimated (Reinhard 2003)
      mesopic        reds fade in dim light, by the whole picture or by each neighbourhood (eq A.10 to A.14)
      Ashikhmin      threshold against intensity, local and global (Michael 2010, section 4.3)
      colours        those beyond the display come back along their hue, dimmed and faded (gamut); nothing turns cyan
      leaving out    searches that cannot change what is seen (tolerance_codes), with a proven bound; searches away from
                     edges (selective; Michael 2010, section 4.4), without one
-     metering       as a camera: between percentiles, in steps, within limits; or eq A.1's log-average; or a fixed exposure
-     adaptation     the metered light, key, white and range approach those of the picture with a time constant in seconds,
-                    one for brighter and one for darker; what wavers by less than 1/64 octave moves nothing
+     metering       as a camera: between percentiles, in steps, within limits; or eq A.1's log-average; or a fixed
+                    exposure
+     adaptation     the metered light, key, white and range approach those of the picture with a time constant in
+                    seconds, one for brighter and one for darker; what wavers by less than 1/64 octave moves nothing
 
    WHAT IT DOES NOT
 
      read files, resize, grade colours, show HDR displays, model glare or the loss of acuity at night, keep a history of
-     pixels (so nothing smears when the camera turns), or store anything but its options and five numbers between frames.
+     pixels (so nothing smears when the camera turns), or store anything but its options and five numbers between
+     frames.
 
    OPTIONS (define before the implementation)
 
      TONEMAP_STATIC         every function private to the file
-     TONEMAP_NO_MESOPIC, TONEMAP_NO_ASHIKHMIN, TONEMAP_NO_SELECTIVE, TONEMAP_NO_SKIPPING, TONEMAP_NO_SOFT, TONEMAP_NO_WHITE
+     TONEMAP_NO_MESOPIC, TONEMAP_NO_ASHIKHMIN, TONEMAP_NO_SELECTIVE, TONEMAP_NO_SKIPPING, TONEMAP_NO_SOFT,
+     TONEMAP_NO_WHITE
                             leave that code out; asking for it is then SAT_ERR_ARGUMENT
      TONEMAP_GL             the OpenGL part
      and those of sat.h: SAT_NO_SIMD, SAT_NO_STDLIB, SAT_ASSERT
 
    MEMORY, THREADS, ERRORS
 
-     One allocation of about 4 bytes a pixel of the picture, and 50 rows of that for each worker; none in a frame. threads
-     shares out bands of 64 rows. Every call checks its arguments and answers with a sat_result; on an error the output is
-     untouched. An object serves one call at a time.
+     One allocation of about 4 bytes a pixel of the picture, and 50 rows of that for each worker; none in a frame.
+     threads shares out bands of 64 rows. Every call checks its arguments and answers with a sat_result; on an error the
+     output is untouched. An object serves one call at a time.
 
    NUMERICS
 
-     Sums are integers: the scaled luminance is rounded to 2^-12 and cut at 256, where the display has 0.4 % left; box means
-     are then exact, and beyond the cut La is taken to grow with the pixel. The logarithms of the log-average are added as
-     integers too. So the result has the same bits for any number of workers, for vector and plain code (without fused
-     multiply-add), and for pictures in units that differ by a power of two from 2^-20 to 2^20.
-     Against OpenGL at most 1 code differs, in 2 % of codes (on a software renderer). 8-bit codes are at most one from the
-     rounded value, and that in 2 % of cases, within 0.1 of a step.
-     Luminances below 2^-100 are black, those above 2^100 count as 2^100. NaN and negative luminances count as 0, infinity
-     is white; none of them enters the log-average, and none changes a pixel outside the 41 x 41 around it (1e30 does not
-     either, but where the meter is within a hair of a step). A pixel of
+     Sums are integers: the scaled luminance is rounded to 2^-12 and cut at 256, where the display has 0.4 % left; box
+     means are then exact, and beyond the cut La is taken to grow with the pixel. The logarithms of the log-average are
+     added as integers too. So the result has the same bits for any number of workers, for vector and plain code
+     (without fused multiply-add), and for pictures in units that differ by a power of two from 2^-20 to 2^20.
+     Against OpenGL at most 1 code differs, in 2 % of codes (on a software renderer). 8-bit codes are at most one from
+     the rounded value, and that in 2 % of cases, within 0.1 of a step.
+     Luminances below 2^-100 are black, those above 2^100 count as 2^100. NaN and negative luminances count as 0,
+     infinity is white; none of them enters the log-average, and none changes a pixel outside the 41 x 41 around it
+     (1e30 does not either, but where the meter is within a hair of a step). A pixel of
      NaN or negative luminance (ringing beside lamps) shows the mean of what the usable ones around it show, up to 3
-     pixels away. A negative component of a positive luminance is kept until the display cuts it. Output lies in [0, 1] for any input bits.
-     Black pictures stay black and leave the adaptation alone; constant ones get the key (to half of the meter's step of
-     1/64 octave).
-     Deviations from the sources: eq A.1 averages positive luminances only and has no delta, which would depend on the unit;
-     s in eq A.5 is the length in pixels; eq A.7 takes the centre of the first step that fails; the Lab of eq A.12 has the
-     pixel's own luminance as white, so that the filter does not depend on exposure; Ashikhmin's range is between the
-     0.05 % and 99.95 % quantiles, and his capacity is made continuous; the gradient of selective mapping is that of the
-     scaled luminance; what adapts over time is the whole picture's light, not each pixel's La.
+     pixels away. A negative component of a positive luminance is kept until the display cuts it. Output lies in [0, 1]
+     for any input bits. Black pictures stay black and leave the adaptation alone; constant ones get the key (to half of
+     the meter's step of 1/64 octave).
+     Deviations from the sources: eq A.1 averages positive luminances only and has no delta, which would depend on the
+     unit; s in eq A.5 is the length in pixels; eq A.7 takes the centre of the first step that fails; the Lab of eq A.12
+     has the pixel's own luminance as white, so that the filter does not depend on exposure; Ashikhmin's range is
+     between the 0.05 % and 99.95 % quantiles, and his capacity is made continuous; the gradient of selective mapping is
+     that of the scaled luminance; what adapts over time is the whole picture's light, not each pixel's La.
 
    COST (tests/bench/bench_tonemap.cpp; one core, SSE2, 2 megapixels of float RGB to 8 bits)
 
-     local 7.5 ns a pixel: the luminance and its logarithm 18 %, sums 8 %, search 45 %, colour and sRGB 25 %. Times this:
-     global 0.4, + mesopic 1.25, soft scales 1.4, Ashikhmin 1.7; SAT_NO_SIMD 1.9 (clang -O2) to 2.4 (gcc -O2); OpenCV's
-     global Drago operator 3.8, pfstmo_reinhard02 -s 24. SSIM against the operator with exact Gaussians 0.987 to 0.998.
-     tolerance_codes = 2 skips 32 % (StillLife) and 42 % (night) of the searches, but the bounds take about as long as
-     what they save: the time is between 1.0 and 1.2. On noise it looks at an eighth of the tiles, sees that nothing can be
-     skipped, and costs 1.03. selective pays where few pixels are near edges, 0.9 to 1.1, and for Ashikhmin, 0.6, at an SSIM
-     of only 0.9.
-     Against flicker: 0.5 % of noise moves single pixels by up to 56 codes with soft = 0 and by less than 1 with soft = 1. */
+     local 7.5 ns a pixel: the luminance and its logarithm 18 %, sums 8 %, search 45 %, colour and sRGB 25 %. Times
+     this: global 0.4, + mesopic 1.25, soft scales 1.4, Ashikhmin 1.7; SAT_NO_SIMD 1.9 (clang -O2) to 2.4 (gcc -O2);
+     OpenCV's global Drago operator 3.8, pfstmo_reinhard02 -s 24. SSIM against the operator with exact Gaussians 0.987
+     to 0.998. tolerance_codes = 2 skips 32 % (StillLife) and 42 % (night) of the searches, but the bounds take about as
+     long as what they save: the time is between 1.0 and 1.2. On noise it looks at an eighth of the tiles, sees that
+     nothing can be skipped, and costs 1.03. selective pays where few pixels are near edges, 0.9 to 1.1, and for
+     Ashikhmin, 0.6, at an SSIM of only 0.9.
+     Against flicker: 0.5 % of noise moves single pixels by up to 56 codes with soft = 0 and by less than 1 with soft =
+     1. */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(TONEMAP_IMPLEMENTATION)
 #define TONEMAP_IMPLEMENTATION
@@ -136,29 +141,34 @@ typedef enum tonemap_mesopic {
 
 /* Which luminance becomes the key. */
 typedef enum tonemap_metering {
-    TONEMAP_METERING_PERCENTILES, /* between meter_low and meter_high; what is 18 to 24 octaves below the bright end counts
-                                     less and less; in steps of 1/64 octave: a bad texel, a lamp or residue moves nothing */
+    TONEMAP_METERING_PERCENTILES, /* between meter_low and meter_high; what is 18 to 24 octaves below the bright end
+                                     counts less and less; in steps of 1/64 octave: a bad texel, a lamp or residue moves
+                                     nothing */
     TONEMAP_METERING_LOG_AVERAGE  /* of every positive luminance, eq A.1 */
 } tonemap_metering;
 
 typedef struct tonemap_options {
     tonemap_operator operation; /* TONEMAP_PHOTOGRAPHIC_LOCAL */
     double key;                 /* 0.18; -1e6..10; the display value of the metered luminance before compression;
-                                   <= 0: estimated from the log-average's place between dark and bright (Reinhard 2003) */
-    double white;               /* INFINITY; 0..1e12 or infinity (no burn-out); the smallest luminance shown as white, in
-                                   units in which the log-average is the key; 0: estimated, at least 1 */
+                                   <= 0: estimated from the log-average's place between dark and bright (Reinhard
+                                   2003) */
+    double white;               /* INFINITY; 0..1e12 or infinity (no burn-out); the smallest luminance shown as white,
+                                   in units in which the log-average is the key; 0: estimated, at least 1 */
     double phi;                 /* 8; -16..16; sharpening of the scale test, eq A.5 */
     double epsilon;             /* 0.05; 1e-9..1e9; threshold of the scale test, eq A.7 */
     int scales;                 /* 8; 1..8; how many of the box lengths 1 3 5 7 11 17 27 41 */
-    double soft;                /* 1; 0..1; half width of the band around epsilon in which scales are mixed, as a share of
-                                   epsilon; 0: the paper's hard choice, which flickers (and the default with TONEMAP_NO_SOFT) */
-    double gamut;               /* 0.5; 0..1 or negative; how colours beyond the display come back: 0 keeps their luminance
-                                   and fades them, 1 dims them and keeps their saturation; negative: each channel is clipped */
+    double soft;                /* 1; 0..1; half width of the band around epsilon in which scales are mixed, as a share
+                                   of epsilon; 0: the paper's hard choice, which flickers (and the default with
+                                   TONEMAP_NO_SOFT) */
+    double gamut;               /* 0.5; 0..1 or negative; how colours beyond the display come back: 0 keeps their
+                                   luminance and fades them, 1 dims them and keeps their saturation; negative: each
+                                   channel is clipped */
     tonemap_metering metering;  /* TONEMAP_METERING_PERCENTILES */
     double meter_low;           /* 0.02; 0..0.5; share of the darkest that percentile metering leaves out */
     double meter_high;          /* 0.98; 0.5..1; where it stops */
     tonemap_mesopic mesopic;    /* TONEMAP_MESOPIC_OFF */
-    double cd_per_unit;         /* 0; 0..1e30; cd/m2 of a luminance of 1; 0: unknown, the log-average counts as 10 cd/m2 */
+    double cd_per_unit;         /* 0; 0..1e30; cd/m2 of a luminance of 1; 0: unknown, the log-average counts as 10
+                                   cd/m2 */
     double lux_per_cd;          /* 1; 0..1e6; illuminance that belongs to a luminance of 1 cd/m2, eq A.10 */
     double tolerance_codes;     /* 0; 0..255; 0: every pixel is searched; else pixels whose display value is known to
                                    within so many 8-bit sRGB codes without a search are not searched (local operator) */
@@ -167,9 +177,10 @@ typedef struct tonemap_options {
     double adapt_seconds;       /* 0; 0..1e30; time constant of the eye's adaptation; 0: each picture for itself */
     double darker_seconds;      /* 0; 0..1e30; the same while it grows darker; 0: as adapt_seconds */
     double adapt_low;           /* 0; 0..1e30; the metered luminance counts as at least this: nights stay dark */
-    double adapt_high;          /* INFINITY; 1e-30..1e30 or infinity; and as at most this, or as adapt_low if that is more */
-    double exposure;            /* 0; 0..1e30; 0: metered; else the key is at the luminance key / exposure, at once: what a
-                                   camera model gives, as 1 / (1.2 exp2(EV100)) for luminances in cd/m2 */
+    double adapt_high;          /* INFINITY; 1e-30..1e30 or infinity; and as at most this, or as adapt_low if that is
+                                   more */
+    double exposure;            /* 0; 0..1e30; 0: metered; else the key is at the luminance key / exposure, at once:
+                                   what a camera model gives, as 1 / (1.2 exp2(EV100)) for luminances in cd/m2 */
     sat_allocator allocator;    /* malloc; used by create and destroy only */
     sat_threads threads;        /* serial; same bits for any worker count */
 } tonemap_options;
@@ -214,7 +225,8 @@ TONEMAP_DEF sat_result tonemap_apply_f32(tonemap *map, float *out, ptrdiff_t out
 /* One sentence that names the first argument of tonemap_create or tonemap_gl_create that is refused, and its range; ""
    when none is. Written into text (cut to size, always ended); returns text. */
 TONEMAP_DEF const char *tonemap_explain(char *text, size_t size, int width, int height, const tonemap_options *options);
-/* Other options from the next picture on; the adaptation goes on, and what only the new options need starts with it. Allocator and worker count stay those of create. */
+/* Other options from the next picture on; the adaptation goes on, and what only the new options need starts with it.
+   Allocator and worker count stay those of create. */
 TONEMAP_DEF sat_result tonemap_set_options(tonemap *map, const tonemap_options *options);
 TONEMAP_DEF void tonemap_destroy(tonemap *map); /* NULL is fine */
 
@@ -234,24 +246,25 @@ TONEMAP_DEF void tonemap_destroy(tonemap *map); /* NULL is fine */
 extern "C" {
 #endif
 
-/* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL state
-   as it was (but for pending errors, which are lost). Nothing waits for the GPU: the log-average and the adaptation stay
-   there. All options but threads and tolerance_codes work. Metering by percentiles (the default), an estimated key or
-   white, and Ashikhmin's range take a histogram that draws one point a pixel, and on ES EXT_float_blend;
-   TONEMAP_METERING_LOG_AVERAGE does without. */
+/* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL
+   state as it was (but for pending errors, which are lost). Nothing waits for the GPU: the log-average and the
+   adaptation stay there. All options but threads and tolerance_codes work. Metering by percentiles (the default), an
+   estimated key or white, and Ashikhmin's range take a histogram that draws one point a pixel, and on ES
+   EXT_float_blend; TONEMAP_METERING_LOG_AVERAGE does without. */
 typedef struct tonemap_gl tonemap_gl;
 
 /* On an OpenGL error *out only answers tonemap_gl_message, and is to be destroyed; on the others it is NULL. */
 TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_proc, int width, int height,
                                          const tonemap_options *options);
-/* Maps the 2D texture hdr (float RGB or RGBA, of the created size, level 0) to sRGB codes and alpha 1 in the texture ldr
-   (RGBA8, of that size), or, when ldr is 0, in tonemap_gl_texture(). */
+/* Maps the 2D texture hdr (float RGB or RGBA, of the created size, level 0) to sRGB codes and alpha 1 in the texture
+   ldr (RGBA8, of that size), or, when ldr is 0, in tonemap_gl_texture(). */
 TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned hdr, double dt_seconds);
 TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl);
 /* Other options from the next picture on; the adaptation goes on. Costs nothing: key, white, exposure, the seconds, the
    limits of adaptation, cd_per_unit and lux_per_cd are uniforms. What the shaders are compiled for is SAT_ERR_ARGUMENT,
-   and nothing changes: another value of any other option, a key or white that is estimated where it was not or the other
-   way round, a white that is infinite where it was not. Allocator, threads and tolerance_codes are not looked at. */
+   and nothing changes: another value of any other option, a key or white that is estimated where it was not or the
+   other way round, a white that is infinite where it was not. Allocator, threads and tolerance_codes are not looked
+   at. */
 TONEMAP_DEF sat_result tonemap_gl_set_options(tonemap_gl *gl, const tonemap_options *options);
 /* What the last SAT_ERR_GL_... was about; never NULL. */
 TONEMAP_DEF const char *tonemap_gl_message(const tonemap_gl *gl);
@@ -326,7 +339,8 @@ enum { TONEMAP__HAS_WHITE = 1 };
 
 enum {
     TONEMAP__LENGTHS = 8,  /* box lengths of the photographic operator */
-    TONEMAP__ASHIKHMIN = 10, /* neighbourhoods of Ashikhmin's operator; each is compared with the one of twice its size */
+    TONEMAP__ASHIKHMIN = 10, /* neighbourhoods of Ashikhmin's operator; each is compared with the one of twice its
+                                size */
     TONEMAP__BOXES = 20,   /* room for the boxes of one row */
     TONEMAP__GROUP = 16,   /* pixels searched together */
     TONEMAP__TILE = 8,     /* side of the tiles of which skipping bounds the result */
@@ -341,7 +355,8 @@ enum {
 #define TONEMAP__DARKEST 7.8886090522101181e-31f  /* 2^-100 */
 #define TONEMAP__BRIGHTEST 1.2676506002282294e30f /* 2^100 */
 #define TONEMAP__DARKEST_BITS 0x0d800000u
-#define TONEMAP__UNUSABLE 0x80000000u /* -0: a luminance that counts as 0 and says that the pixel shows its neighbours */
+#define TONEMAP__UNUSABLE 0x80000000u /* -0: a luminance that counts as 0 and says that the pixel shows its
+                                         neighbours */
 #define TONEMAP__LOCAL_CAP 256.0f     /* of the scaled luminance in the sums; the display has 0.4 % left beyond it */
 #define TONEMAP__QUANTUM 4096.0f      /* steps a unit: 41 * 41 * 256 * 4096 < 2^31 */
 #define TONEMAP__ASHIKHMIN_QUANTUM 1048576.0f /* the same for luminances up to 1: 35 * 35 * 2^20 < 2^31 */
@@ -394,10 +409,12 @@ static inline const char *tonemap__left_out(const tonemap_options *o)
 {
     if (!TONEMAP__HAS_ASHIKHMIN && (o->operation == TONEMAP_ASHIKHMIN || o->operation == TONEMAP_ASHIKHMIN_GLOBAL))
         return "operation is Ashikhmin's; TONEMAP_NO_ASHIKHMIN left it out";
-    if (!TONEMAP__HAS_MESOPIC && o->mesopic != TONEMAP_MESOPIC_OFF) return "mesopic is on; TONEMAP_NO_MESOPIC left it out";
+    if (!TONEMAP__HAS_MESOPIC && o->mesopic != TONEMAP_MESOPIC_OFF)
+        return "mesopic is on; TONEMAP_NO_MESOPIC left it out";
     if (!TONEMAP__HAS_WHITE && !tonemap__is_infinite(o->white)) return "white is finite; TONEMAP_NO_WHITE left it out";
     if (!TONEMAP__HAS_SELECTIVE && o->selective > 0) return "selective is above 0; TONEMAP_NO_SELECTIVE left it out";
-    if (!TONEMAP__HAS_SKIPPING && o->tolerance_codes > 0) return "tolerance_codes is above 0; TONEMAP_NO_SKIPPING left it out";
+    if (!TONEMAP__HAS_SKIPPING && o->tolerance_codes > 0)
+        return "tolerance_codes is above 0; TONEMAP_NO_SKIPPING left it out";
     if (!TONEMAP__HAS_SOFT && o->soft > 0) return "soft is above 0; TONEMAP_NO_SOFT left it out";
     return NULL;
 }
@@ -442,7 +459,15 @@ typedef struct tonemap__worker {
 } tonemap__worker;
 
 /* What adapts over time, all as base-2 logarithms. */
-enum { TONEMAP__AVERAGE, TONEMAP__KEY, TONEMAP__WHITE, TONEMAP__LOW, TONEMAP__HIGH, TONEMAP__STATES, TONEMAP__HELD = TONEMAP__STATES };
+enum {
+    TONEMAP__AVERAGE,
+    TONEMAP__KEY,
+    TONEMAP__WHITE,
+    TONEMAP__LOW,
+    TONEMAP__HIGH,
+    TONEMAP__STATES,
+    TONEMAP__HELD = TONEMAP__STATES
+};
 
 /* The numbers of one picture that every pixel needs. */
 typedef struct tonemap__frame {
@@ -466,7 +491,8 @@ struct tonemap {
     size_t block_size;
     int width, height, row, ring_row, workers, tiles_x, tiles_y, started, skipping;
     unsigned known;         /* bit i: state[i] was measured, not only set */
-    double held;            /* what percentile metering said, until it moves by more than a step; see tonemap__metered */
+    double held;            /* what percentile metering said, until it moves by more than a step; see
+                               tonemap__metered */
     float *luminance;       /* the picture, rows `row` floats apart */
     float *row_sum;         /* of each row */
     unsigned char *row_unusable; /* some pixel of the row shows its neighbours */
@@ -524,16 +550,20 @@ static inline sat__f32x4 tonemap__octave4(sat__i32x4 bits)
 
 static inline sat__f32x4 tonemap__log2_4(sat__f32x4 v)
 {
-    sat__i32x4 bits = sat__f32x4_bits(v), exponent = sat__i32x4_sub(sat__i32x4_shift_right(bits, 23), sat__i32x4_set1(127));
+    sat__i32x4 bits = sat__f32x4_bits(v),
+               exponent = sat__i32x4_sub(sat__i32x4_shift_right(bits, 23), sat__i32x4_set1(127));
     return sat__f32x4_add(sat__i32x4_to_f32(exponent), tonemap__log2_octave4(tonemap__octave4(bits)));
 }
 
 static inline sat__f32x4 tonemap__exp2_4(sat__f32x4 v)
 {
     sat__f32x4 one = sat__f32x4_set1(1);
-    sat__f32x4 whole = sat__f32x4_sub(sat__i32x4_to_f32(sat__f32x4_truncate(sat__f32x4_add(v, sat__f32x4_set1(64)))), sat__f32x4_set1(64));
-    sat__f32x4 t = sat__f32x4_sub(v, whole), q = sat__f32x4_add(sat__f32x4_set1(-0.0654462594f), sat__f32x4_mul(t, sat__f32x4_set1(-0.0137019985f)));
-    sat__i32x4 octave = sat__f32x4_truncate(sat__f32x4_mul(sat__f32x4_add(whole, sat__f32x4_set1(127)), sat__f32x4_set1(8388608.0f)));
+    sat__f32x4 whole = sat__f32x4_sub(sat__i32x4_to_f32(sat__f32x4_truncate(sat__f32x4_add(v, sat__f32x4_set1(64)))),
+                                      sat__f32x4_set1(64));
+    sat__f32x4 t = sat__f32x4_sub(v, whole),
+               q = sat__f32x4_add(sat__f32x4_set1(-0.0654462594f), sat__f32x4_mul(t, sat__f32x4_set1(-0.0137019985f)));
+    sat__i32x4 octave =
+        sat__f32x4_truncate(sat__f32x4_mul(sat__f32x4_add(whole, sat__f32x4_set1(127)), sat__f32x4_set1(8388608.0f)));
     q = sat__f32x4_add(sat__f32x4_set1(-0.306996076f), sat__f32x4_mul(t, q));
     q = sat__f32x4_mul(sat__f32x4_mul(t, sat__f32x4_sub(one, t)), q);
     return sat__f32x4_mul(sat__f32x4_from_bits(octave), sat__f32x4_add(sat__f32x4_add(one, t), q));
@@ -558,8 +588,8 @@ static inline float tonemap__sane_luminance(float y, tonemap_stats *stats)
 }
 
 /* Pixels [x, end) of a row. lane[x % 4] sums the luminances, so that four pixels at a time give the same sum. */
-static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, float *peak, float *lane, const float *pixels,
-                                          int channels, int x, int end)
+static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, float *peak, float *lane,
+                                          const float *pixels, int channels, int x, int end)
 {
     int64_t log_sum = 0;
     size_t positive = 0;
@@ -601,7 +631,8 @@ static inline sat__f32x4 tonemap__load_pixels(const float *p, int channels, sat_
 
 static inline sat__f32x4 tonemap__luminance4(int channels, sat__f32x4 r, sat__f32x4 g, sat__f32x4 b)
 {
-    sat__f32x4 y = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(0.2126729f), r), sat__f32x4_mul(sat__f32x4_set1(0.7151522f), g));
+    sat__f32x4 y =
+        sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(0.2126729f), r), sat__f32x4_mul(sat__f32x4_set1(0.7151522f), g));
     return channels == 1 ? r : sat__f32x4_add(y, sat__f32x4_mul(sat__f32x4_set1(0.0721750f), b));
 }
 
@@ -609,15 +640,17 @@ static inline void tonemap__count4(uint32_t *histogram, sat__i32x4 bits)
 {
     int32_t bin[4];
     int i;
-    sat__i32x4_store(bin, sat__i32x4_shift_right(sat__i32x4_sub(bits, sat__i32x4_set1((int32_t)TONEMAP__DARKEST_BITS)), 19));
+    sat__i32x4_store(bin,
+                     sat__i32x4_shift_right(sat__i32x4_sub(bits, sat__i32x4_set1((int32_t)TONEMAP__DARKEST_BITS)), 19));
     for (i = 0; i < 4; i++) histogram[bin[i]]++;
 }
 
 /* Whole groups of four of a row of at most 2^16 pixels; returns where it stopped. */
-static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, float *peak, float *lane, const float *pixels,
-                                          int channels, int x, int end)
+static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, float *peak, float *lane,
+                                          const float *pixels, int channels, int x, int end)
 {
-    sat__f32x4 sum = sat__f32x4_load(lane), low = sat__f32x4_set1(TONEMAP__DARKEST), high = sat__f32x4_set1(TONEMAP__BRIGHTEST);
+    sat__f32x4 sum = sat__f32x4_load(lane), low = sat__f32x4_set1(TONEMAP__DARKEST),
+               high = sat__f32x4_set1(TONEMAP__BRIGHTEST);
     sat__i32x4 exponents = sat__i32x4_set1(0), fractions = sat__i32x4_set1(0);
     int32_t e[4], f[4];
     int i, groups = 0;
@@ -633,7 +666,9 @@ static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, 
             continue;
         }
         sat__f32x4_store(luminance + x, y);
-        if (peak) sat__f32x4_store(peak + x, sat__f32x4_max(sat__f32x4_max(sat__f32x4_max(r, g), b), sat__f32x4_load(peak + x)));
+        if (peak)
+            sat__f32x4_store(peak + x,
+                             sat__f32x4_max(sat__f32x4_max(sat__f32x4_max(r, g), b), sat__f32x4_load(peak + x)));
         sum = sat__f32x4_add(sum, y);
         bits = sat__f32x4_bits(y);
         exponents = sat__i32x4_add(exponents, sat__i32x4_shift_right(bits, 23));
@@ -651,7 +686,8 @@ static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, 
 }
 #endif
 
-static inline float tonemap__measure_row(tonemap__worker *w, float *luminance, float *peak, const float *pixels, int channels, int width)
+static inline float tonemap__measure_row(tonemap__worker *w, float *luminance, float *peak, const float *pixels,
+                                         int channels, int width)
 {
     float lane[4] = {0, 0, 0, 0};
     int x = 0, end;
@@ -710,15 +746,18 @@ static void tonemap__measure_bands(int begin, int end, int worker, void *context
     const tonemap__job *job = (const tonemap__job *)context;
     tonemap *map = job->map;
     tonemap__worker *w = &map->worker[worker];
-    int x, y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height), skips = tonemap__skips(&map->options);
+    int x, y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height),
+           skips = tonemap__skips(&map->options);
     for (; y < y1; y++) {
         float *luminance = map->luminance + (size_t)y * (size_t)map->row;
         const float *pixels = tonemap__float_row(w->pixels, job->hdr, y);
         size_t unusable = w->stats.nan + w->stats.negative;
-        map->row_sum[y] = tonemap__measure_row(w, luminance, skips ? w->peak : NULL, pixels, job->hdr->channels, map->width);
+        map->row_sum[y] =
+            tonemap__measure_row(w, luminance, skips ? w->peak : NULL, pixels, job->hdr->channels, map->width);
         map->row_unusable[y] = (unsigned char)(w->stats.nan + w->stats.negative > unusable);
         for (x = map->width; x < map->row; x++) luminance[x] = luminance[map->width - 1];
-        if (skips && (y % TONEMAP__TILE == TONEMAP__TILE - 1 || y + 1 == map->height)) tonemap__store_peaks(map, w, y / TONEMAP__TILE);
+        if (skips && (y % TONEMAP__TILE == TONEMAP__TILE - 1 || y + 1 == map->height))
+            tonemap__store_peaks(map, w, y / TONEMAP__TILE);
     }
 }
 
@@ -766,7 +805,8 @@ static inline int tonemap__is_ashikhmin(const tonemap_options *o)
 
 static inline int tonemap__needs_histogram(const tonemap_options *o, const tonemap_stats *stats)
 {
-    return stats != NULL || o->metering == TONEMAP_METERING_PERCENTILES || o->key <= 0 || o->white <= 0 || tonemap__is_ashikhmin(o);
+    return stats != NULL || o->metering == TONEMAP_METERING_PERCENTILES || o->key <= 0 || o->white <= 0 ||
+           tonemap__is_ashikhmin(o);
 }
 
 /* log2 of the log-average, eq A.1, over positive luminances only: a mean of integers, so that neither the order of the
@@ -779,9 +819,11 @@ static inline double tonemap__log_average(int64_t log_sum, size_t positive)
 
 /* Percentile metering: how far the mean between the percentiles is from that of all, in bins of the histogram, so that
    a flat picture has exactly its log-average. */
-static inline double tonemap__metered(const uint32_t *histogram, size_t positive, double average, const tonemap_options *o)
+static inline double tonemap__metered(const uint32_t *histogram, size_t positive, double average,
+                                      const tonemap_options *o)
 {
-    double top = tonemap__quantile(histogram, positive, 0.99), all = 0, whole = 0, inner = 0, sum = 0, seen = 0, octave[16], low, high;
+    double top = tonemap__quantile(histogram, positive, 0.99), all = 0, whole = 0, inner = 0, sum = 0, seen = 0,
+           octave[16], low, high;
     int bin, i;
     for (i = 0; i < 16; i++) octave[i] = log2(1 + (i + 0.5) / 16);
     for (bin = 0; bin < TONEMAP__BINS; bin++) {
@@ -792,7 +834,10 @@ static inline double tonemap__metered(const uint32_t *histogram, size_t positive
     low = o->meter_low * all;
     high = o->meter_high * all;
     for (bin = 0; bin < TONEMAP__BINS; bin++) {
-        double v = bin / 16 - 100 + octave[bin % 16], w = (v - (top - 24)) / 6, next = seen + (double)histogram[bin] * (w < 0 ? 0 : w > 1 ? 1 : w);
+        double v = bin / 16 - 100 + octave[bin % 16], w = (v - (top - 24)) / 6,
+               next = seen + (double)histogram[bin] * (w < 0   ? 0
+                                                       : w > 1 ? 1
+                                                               : w);
         double n = (next < high ? next : high) - (seen > low ? seen : low);
         if (n > 0) {
             inner += n;
@@ -857,7 +902,8 @@ static inline int tonemap__measured_state(tonemap *map, double *state)
     }
     map->stats.log_average = exp2(average);
     if (o->metering == TONEMAP_METERING_PERCENTILES) {
-        if (map->started && map->stats.positive * 1000 < (size_t)map->width * (size_t)map->height) return 0; /* as good as black */
+        if (map->started && map->stats.positive * 1000 < (size_t)map->width * (size_t)map->height)
+            return 0; /* as good as black */
         average = tonemap__hold(map, tonemap__metered(histogram, map->stats.positive, average, o));
     }
     state[TONEMAP__AVERAGE] = average = tonemap__limited(average, o);
@@ -888,7 +934,8 @@ static inline void tonemap__adapt(tonemap *map, const double *measured, double d
     if (!(o->white > 0)) used |= 1u << TONEMAP__WHITE;
     if (tonemap__is_ashikhmin(o)) used |= 1u << TONEMAP__LOW | 1u << TONEMAP__HIGH;
     for (i = 0; i < TONEMAP__STATES; i++) {
-        if (weight >= 1 || !(map->known & used & 1u << i)) map->state[i] = measured[i]; /* what nobody knew yet is there at once */
+        if (weight >= 1 || !(map->known & used & 1u << i))
+            map->state[i] = measured[i]; /* what nobody knew yet is there at once */
         else map->state[i] += weight * (measured[i] - map->state[i]);
     }
     map->known = used;
@@ -907,8 +954,8 @@ static inline float tonemap__capacity(float cd)
     return -3.56579561f + ln * (1 / 0.0556f);
 }
 
-/* Eq A.10 and A.11 as a polynomial of log2 of the illuminance from 2^-24 to 10 lux, within 0.001 (0.2 codes) and exactly 1
-   from 10 lux on. The printed form is not finite at 0, where this is 22 / 57. */
+/* Eq A.10 and A.11 as a polynomial of log2 of the illuminance from 2^-24 to 10 lux, within 0.001 (0.2 codes) and
+   exactly 1 from 10 lux on. The printed form is not finite at 0, where this is 22 / 57. */
 #define TONEMAP__RHO_LOW 5.9604645e-8f /* 2^-24 lux */
 #define TONEMAP__RHO_CENTRE -10.339036f
 #define TONEMAP__RHO_WIDTH 0.073201276f
@@ -920,7 +967,8 @@ static inline float tonemap__rho(float lux)
     if (!(i < 10)) return 1;
     bits = sat__float_bits(i);
     t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
-    u = (float)((int32_t)bits - 0x3f800000) * 1.1920929e-7f + t * (1 - t) * (0.422865337f + t * -0.159220122f); /* log2 */
+    u = (float)((int32_t)bits - 0x3f800000) * 1.1920929e-7f +
+        t * (1 - t) * (0.422865337f + t * -0.159220122f); /* log2 */
     u = (u - TONEMAP__RHO_CENTRE) * TONEMAP__RHO_WIDTH;
     q = u * (u * -0.0893071936f + -0.150544156f) + 0.0254077498f;
     q = u * (u * (u * q + 0.287330944f) + 0.475713817f) + 0.582037485f;
@@ -952,11 +1000,13 @@ static inline void tonemap__prepare_frame(tonemap *map)
 {
     const tonemap_options *o = &map->options;
     tonemap__frame *f = &map->frame;
-    double average = map->started ? map->state[TONEMAP__AVERAGE] : 0, key = map->started ? exp2(map->state[TONEMAP__KEY]) : 0.18;
+    double average = map->started ? map->state[TONEMAP__AVERAGE] : 0,
+           key = map->started ? exp2(map->state[TONEMAP__KEY]) : 0.18;
     double white = o->white > 0 ? o->white : exp2(map->state[TONEMAP__WHITE]);
     double cd;
     memset(f, 0, sizeof *f);
-    if (o->exposure > 0) map->state[TONEMAP__AVERAGE] = average = log2(key / o->exposure); /* a meter starts from there */
+    if (o->exposure > 0)
+        map->state[TONEMAP__AVERAGE] = average = log2(key / o->exposure); /* a meter starts from there */
     cd = o->cd_per_unit > 0 ? o->cd_per_unit : 10 / exp2(average);
     f->scale = (float)(o->exposure > 0 ? o->exposure : key * exp2(-average));
     f->cap = TONEMAP__LOCAL_CAP;
@@ -975,10 +1025,13 @@ static inline void tonemap__prepare_frame(tonemap *map)
         f->cd = (float)(cd * exp2(ceil(high)));
         f->curve_low = tonemap__capacity((float)(cd * exp2(low)));
         f->curve_factor = 1 / (tonemap__capacity((float)(cd * exp2(high))) - f->curve_low);
-        if (!tonemap__has_range(low, high)) f->curve_low = f->curve_factor = 0; /* a flat picture has no range: it gets the key */
+        if (!tonemap__has_range(low, high))
+            f->curve_low = f->curve_factor = 0; /* a flat picture has no range: it gets the key */
     }
     f->lux = (float)(cd * o->lux_per_cd / (double)f->scale);
-    f->rho = TONEMAP__HAS_MESOPIC && o->mesopic == TONEMAP_MESOPIC_UNIFORM ? tonemap__rho((float)(map->stats.mean * cd * o->lux_per_cd)) : 1;
+    f->rho = TONEMAP__HAS_MESOPIC && o->mesopic == TONEMAP_MESOPIC_UNIFORM
+                 ? tonemap__rho((float)(map->stats.mean * cd * o->lux_per_cd))
+                 : 1;
     tonemap__frame_boxes(f, o, key);
     map->stats.adapted = exp2(average);
     map->stats.key = key;
@@ -987,12 +1040,12 @@ static inline void tonemap__prepare_frame(tonemap *map)
 
 /* ---- guaranteed skipping: which tiles need no search
 
-   La is the mean over a box, or the pixel itself. Every length above 1 is a sum of twos and threes, so the mean over any
-   box lies between the smallest and the largest mean over the windows of 2 x 2, 3 x 2, 2 x 3 and 3 x 3 pixels inside it:
-   a much narrower range than that of the pixels, which are noisy. With La in [low, high], the display value of a
-   component v (of the input, scaled) lies between v / (1 + high) and v / (1 + low). The tile gets the La whose display
-   value stands in the middle, in sRGB codes. How far that can be off grows with v until the display value reaches 1, so
-   the tile's largest component is the worst case. */
+   La is the mean over a box, or the pixel itself. Every length above 1 is a sum of twos and threes, so the mean over
+   any box lies between the smallest and the largest mean over the windows of 2 x 2, 3 x 2, 2 x 3 and 3 x 3 pixels
+   inside it: a much narrower range than that of the pixels, which are noisy. With La in [low, high], the display value
+   of a component v (of the input, scaled) lies between v / (1 + high) and v / (1 + low). The tile gets the La whose
+   display value stands in the middle, in sRGB codes. How far that can be off grows with v until the display value
+   reaches 1, so the tile's largest component is the worst case. */
 
 typedef struct tonemap__range { float low, high, pixel_low, pixel_high; } tonemap__range;
 
@@ -1086,9 +1139,11 @@ static inline void tonemap__tile_range_vector(tonemap__range *range, const float
             high33 = sat__f32x4_max(high33, sum3);
         }
     }
-    low22 = sat__f32x4_min(sat__f32x4_mul(low22, sat__f32x4_set1(1 / 4.0f)), sat__f32x4_mul(low33, sat__f32x4_set1(1 / 9.0f)));
+    low22 = sat__f32x4_min(sat__f32x4_mul(low22, sat__f32x4_set1(1 / 4.0f)),
+                           sat__f32x4_mul(low33, sat__f32x4_set1(1 / 9.0f)));
     low23 = sat__f32x4_mul(sat__f32x4_min(low23, low32), sat__f32x4_set1(1 / 6.0f));
-    high22 = sat__f32x4_max(sat__f32x4_mul(high22, sat__f32x4_set1(1 / 4.0f)), sat__f32x4_mul(high33, sat__f32x4_set1(1 / 9.0f)));
+    high22 = sat__f32x4_max(sat__f32x4_mul(high22, sat__f32x4_set1(1 / 4.0f)),
+                            sat__f32x4_mul(high33, sat__f32x4_set1(1 / 9.0f)));
     high23 = sat__f32x4_mul(sat__f32x4_max(high23, high32), sat__f32x4_set1(1 / 6.0f));
     range->low = tonemap__lowest4(sat__f32x4_min(low22, low23));
     range->high = tonemap__highest4(sat__f32x4_max(high22, high23));
@@ -1111,7 +1166,8 @@ static inline const float *tonemap__gather_tiles(const tonemap *map, tonemap__wo
     float *rows = (float *)(void *)w->sums;
     int i;
     for (i = 0; i < TONEMAP__TILE + 2; i++)
-        memcpy(rows + (size_t)i * (size_t)map->row, map->luminance + (size_t)sat__min_int(ty * TONEMAP__TILE + i, map->height - 1) * (size_t)map->row,
+        memcpy(rows + (size_t)i * (size_t)map->row,
+               map->luminance + (size_t)sat__min_int(ty * TONEMAP__TILE + i, map->height - 1) * (size_t)map->row,
                (size_t)map->row * sizeof(float));
     return rows;
 }
@@ -1127,7 +1183,8 @@ static inline void tonemap__find_range(tonemap *map, const float *rows, int tx, 
 #endif
 }
 
-/* v^(1 / 2.4): sRGB codes are 269.025 times it less 14.025. Below 0.0031308 they are fewer; the bound is larger there. */
+/* v^(1 / 2.4): sRGB codes are 269.025 times it less 14.025. Below 0.0031308 they are fewer; the bound is larger
+   there. */
 static inline float tonemap__power(float v) { return tonemap__exp2(tonemap__log2(v) * (1 / 2.4f)); }
 
 /* What 1 / (1 + La) can be, and the largest component that the display does not clip. */
@@ -1160,9 +1217,11 @@ static inline int tonemap__may_skip(const tonemap *map, const tonemap__bound *b)
 /* The La of a tile that needs no search, or -1; *error is how many codes it may be off. */
 static inline float tonemap__skipped_local(const tonemap *map, const tonemap__bound *b, float *error)
 {
-    float upper = tonemap__power(b->most), lower = tonemap__power(b->least), middle = (upper + lower) / 2, peak = tonemap__power(b->peak);
+    float upper = tonemap__power(b->most), lower = tonemap__power(b->least), middle = (upper + lower) / 2,
+          peak = tonemap__power(b->peak);
     float above = 269.025f * peak * (upper - middle);
-    float below = 269.025f * (peak * upper < 0.9999f ? peak : 1 / middle) * (middle - lower); /* a clipped component: up to its own limit */
+    float below = 269.025f * (peak * upper < 0.9999f ? peak : 1 / middle) *
+                  (middle - lower); /* a clipped component: up to its own limit */
     *error = (above > below ? above : below) + 0.05f; /* of the polynomials */
     return *error <= (float)map->options.tolerance_codes ? tonemap__exp2(-2.4f * tonemap__log2(middle)) - 1 : -1;
 }
@@ -1214,7 +1273,8 @@ static void tonemap__range_tiles(int begin, int end, int worker, void *context)
 
 static inline void tonemap__bound_tile(tonemap *map, tonemap__worker *w, int tx, int ty)
 {
-    int reach = (map->frame.reach + TONEMAP__TILE - 1) / TONEMAP__TILE, y = sat__max_int(ty - reach, 0), y1 = sat__min_int(ty + reach + 1, map->tiles_y);
+    int reach = (map->frame.reach + TONEMAP__TILE - 1) / TONEMAP__TILE, y = sat__max_int(ty - reach, 0),
+        y1 = sat__min_int(ty + reach + 1, map->tiles_y);
     size_t at = (size_t)ty * (size_t)map->tiles_x + (size_t)tx;
     tonemap__range range = map->tile_range[at];
     tonemap__bound bound;
@@ -1271,7 +1331,8 @@ static inline void tonemap__quantize(int32_t *out, const float *luminance, int w
     sat__f32x4 scale = sat__f32x4_set1(f->scale), cap = sat__f32x4_set1(f->cap), quantum = sat__f32x4_set1(f->quantum);
     for (; x + 4 <= width; x += 4) {
         sat__f32x4 v = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), scale), cap);
-        sat__i32x4_store(out + x, sat__f32x4_truncate(sat__f32x4_add(sat__f32x4_mul(v, quantum), sat__f32x4_set1(0.5f))));
+        sat__i32x4_store(out + x,
+                         sat__f32x4_truncate(sat__f32x4_add(sat__f32x4_mul(v, quantum), sat__f32x4_set1(0.5f))));
     }
 #endif
     for (; x < width; x++) {
@@ -1349,9 +1410,11 @@ static inline sat__f32x4 tonemap__inverse4(const tonemap__window *window, const 
 static inline sat__f32x4 tonemap__box_sum4(const tonemap__window *window, const tonemap__frame *f, int k, int x)
 {
     int r = f->radius[k];
-    const int32_t *top = (const int32_t *)(const void *)(window->top[k] + x), *bottom = (const int32_t *)(const void *)(window->bottom[k] + x);
-    return sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_sub(sat__i32x4_load(bottom + r + 1), sat__i32x4_load(bottom - r)),
-                                            sat__i32x4_sub(sat__i32x4_load(top + r + 1), sat__i32x4_load(top - r))));
+    const int32_t *top = (const int32_t *)(const void *)(window->top[k] + x),
+                  *bottom = (const int32_t *)(const void *)(window->bottom[k] + x);
+    return sat__i32x4_to_f32(
+        sat__i32x4_sub(sat__i32x4_sub(sat__i32x4_load(bottom + r + 1), sat__i32x4_load(bottom - r)),
+                       sat__i32x4_sub(sat__i32x4_load(top + r + 1), sat__i32x4_load(top - r))));
 }
 
 /* All ones where x + lane < end. */
@@ -1368,8 +1431,8 @@ static inline sat__i32x4 tonemap__inside4(int x, int end)
    that fails gives its centre; when none fails, the last box is taken. (Eq A.7 does not say what happens when the first
    step fails; this is the reading under which it has an answer.) */
 
-static inline void tonemap__search_one(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                       size_t *scale, int x)
+static inline void tonemap__search_one(float *local, const float *luminance, const tonemap__window *window,
+                                       const tonemap__frame *f, size_t *scale, int x)
 {
     float c = luminance[x] * f->scale;
     int k;
@@ -1385,8 +1448,8 @@ static inline void tonemap__search_one(float *local, const float *luminance, con
 
 /* Sixteen pixels side by side without a branch, in loops that compilers turn into vector code by themselves: limit -
    |c - v| > 0 is asked of its bits, because a comparison of floats would stop them. */
-static inline void tonemap__search_sixteen(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                           size_t *scale, int x)
+static inline void tonemap__search_sixteen(float *local, const float *luminance, const tonemap__window *window,
+                                           const tonemap__frame *f, size_t *scale, int x)
 {
     enum { N = TONEMAP__GROUP };
     float c[N], v[N], room[N];
@@ -1421,8 +1484,8 @@ static inline void tonemap__search_sixteen(float *local, const float *luminance,
     memcpy(local + x, c, sizeof c);
 }
 
-static inline void tonemap__search_plain(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                         size_t *scale, int x, int end)
+static inline void tonemap__search_plain(float *local, const float *luminance, const tonemap__window *window,
+                                         const tonemap__frame *f, size_t *scale, int x, int end)
 {
     while (x < end) {
         if (x >= f->reach && x + TONEMAP__GROUP <= end && x + TONEMAP__GROUP + f->reach <= window->width) {
@@ -1437,7 +1500,8 @@ static inline void tonemap__search_plain(float *local, const float *luminance, c
 
 #ifdef SAT__VECTOR
 /* One step for four pixels: where it holds, the centre becomes the surround; else the pixel is done and keeps it. */
-static inline sat__i32x4 tonemap__step4(sat__f32x4 *c, sat__i32x4 *live, sat__f32x4 v, sat__f32x4 epsilon, sat__f32x4 term)
+static inline sat__i32x4 tonemap__step4(sat__f32x4 *c, sat__i32x4 *live, sat__f32x4 v, sat__f32x4 epsilon,
+                                        sat__f32x4 term)
 {
     sat__f32x4 limit = sat__f32x4_add(sat__f32x4_mul(epsilon, *c), term);
     *live = sat__i32x4_and(*live, sat__f32x4_less(sat__f32x4_abs(sat__f32x4_sub(*c, v)), limit));
@@ -1446,8 +1510,8 @@ static inline sat__i32x4 tonemap__step4(sat__f32x4 *c, sat__i32x4 *live, sat__f3
 }
 
 /* Sixteen pixels, spelt out to stay in registers; done when the last of them is. */
-static inline void tonemap__search_group(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                         sat__i32x4 *passed, int x)
+static inline void tonemap__search_group(float *local, const float *luminance, const tonemap__window *window,
+                                         const tonemap__frame *f, sat__i32x4 *passed, int x)
 {
     sat__f32x4 factor = sat__f32x4_set1(f->scale), cap = sat__f32x4_set1(f->cap), epsilon = sat__f32x4_set1(f->epsilon);
     sat__f32x4 c0 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), factor), cap);
@@ -1458,10 +1522,17 @@ static inline void tonemap__search_group(float *local, const float *luminance, c
     int k;
     for (k = 0; k + 1 < f->boxes; k++) {
         sat__f32x4 inverse = sat__f32x4_set1(window->inverse[k + 1]), term = sat__f32x4_set1(f->term[k]);
-        alive = tonemap__step4(&c0, &live0, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), epsilon, term);
-        alive = sat__i32x4_add(alive, tonemap__step4(&c1, &live1, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 4), inverse), epsilon, term));
-        alive = sat__i32x4_add(alive, tonemap__step4(&c2, &live2, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 8), inverse), epsilon, term));
-        alive = sat__i32x4_add(alive, tonemap__step4(&c3, &live3, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 12), inverse), epsilon, term));
+        alive =
+            tonemap__step4(&c0, &live0, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), epsilon, term);
+        alive = sat__i32x4_add(
+            alive, tonemap__step4(&c1, &live1, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 4), inverse),
+                                  epsilon, term));
+        alive = sat__i32x4_add(
+            alive, tonemap__step4(&c2, &live2, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 8), inverse),
+                                  epsilon, term));
+        alive = sat__i32x4_add(
+            alive, tonemap__step4(&c3, &live3, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 12), inverse),
+                                  epsilon, term));
         if (!sat__i32x4_any(alive)) break;
         passed[k] = sat__i32x4_sub(passed[k], alive);
     }
@@ -1472,10 +1543,11 @@ static inline void tonemap__search_group(float *local, const float *luminance, c
 }
 
 /* Four pixels, where boxes are clipped or a run ends. */
-static inline void tonemap__search_four(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                        sat__i32x4 *passed, int x, int end)
+static inline void tonemap__search_four(float *local, const float *luminance, const tonemap__window *window,
+                                        const tonemap__frame *f, sat__i32x4 *passed, int x, int end)
 {
-    sat__f32x4 epsilon = sat__f32x4_set1(f->epsilon), c = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale));
+    sat__f32x4 epsilon = sat__f32x4_set1(f->epsilon),
+               c = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale));
     sat__i32x4 live = tonemap__inside4(x, end);
     int k, border = x < f->reach || x + 4 + f->reach > window->width;
     c = sat__f32x4_min(c, sat__f32x4_set1(f->cap));
@@ -1501,8 +1573,8 @@ static inline void tonemap__move_on(size_t *scale, const sat__i32x4 *passed, int
     }
 }
 
-static inline void tonemap__search_vector(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                          size_t *scale, int x, int end)
+static inline void tonemap__search_vector(float *local, const float *luminance, const tonemap__window *window,
+                                          const tonemap__frame *f, size_t *scale, int x, int end)
 {
     sat__i32x4 passed[TONEMAP__LENGTHS];
     int k;
@@ -1522,8 +1594,8 @@ static inline void tonemap__search_vector(float *local, const float *luminance, 
 
 /* The same with scales mixed: the weight of what lies beyond a step falls from 1 to 0 while the step's contrast grows
    through a band around epsilon, so that noise moves La a little instead of across a scale. */
-static inline void tonemap__search_soft_plain(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                              size_t *scale, int x, int end)
+static inline void tonemap__search_soft_plain(float *local, const float *luminance, const tonemap__window *window,
+                                              const tonemap__frame *f, size_t *scale, int x, int end)
 {
     float top = 1 + f->soft, slope = 1 / (2 * f->soft);
     for (; x < end; x++) {
@@ -1547,9 +1619,11 @@ static inline void tonemap__search_soft_plain(float *local, const float *luminan
 
 #ifdef SAT__VECTOR
 /* What a step of soft scales takes and changes. */
-static inline sat__i32x4 tonemap__soft_step4(sat__f32x4 *c, sat__f32x4 *taken, sat__f32x4 *weight, sat__f32x4 v, const tonemap__frame *f, int k)
+static inline sat__i32x4 tonemap__soft_step4(sat__f32x4 *c, sat__f32x4 *taken, sat__f32x4 *weight, sat__f32x4 v,
+                                             const tonemap__frame *f, int k)
 {
-    sat__f32x4 limit = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(f->epsilon), *c), sat__f32x4_set1(f->term[k])), difference = sat__f32x4_sub(v, *c);
+    sat__f32x4 limit = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(f->epsilon), *c), sat__f32x4_set1(f->term[k])),
+               difference = sat__f32x4_sub(v, *c);
     sat__f32x4 pass = sat__f32x4_sub(sat__f32x4_set1(1 + f->soft), sat__f32x4_div(sat__f32x4_abs(difference), limit));
     pass = sat__f32x4_mul(pass, sat__f32x4_set1(1 / (2 * f->soft)));
     *weight = sat__f32x4_mul(*weight, sat__f32x4_min(sat__f32x4_max(pass, sat__f32x4_set1(0)), sat__f32x4_set1(1)));
@@ -1559,11 +1633,12 @@ static inline sat__i32x4 tonemap__soft_step4(sat__f32x4 *c, sat__f32x4 *taken, s
 }
 
 /* Sixteen pixels, spelt out to stay in registers; done when the last of them is. */
-static inline void tonemap__soft_group(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                       sat__i32x4 *passed, int x)
+static inline void tonemap__soft_group(float *local, const float *luminance, const tonemap__window *window,
+                                       const tonemap__frame *f, sat__i32x4 *passed, int x)
 {
     sat__f32x4 factor = sat__f32x4_set1(f->scale), cap = sat__f32x4_set1(f->cap), half = sat__f32x4_set1(0.5f);
-    sat__f32x4 c0 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), factor), cap), t0 = c0, w0 = sat__f32x4_set1(1);
+    sat__f32x4 c0 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), factor), cap), t0 = c0,
+               w0 = sat__f32x4_set1(1);
     sat__f32x4 c1 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 4), factor), cap), t1 = c1, w1 = w0;
     sat__f32x4 c2 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 8), factor), cap), t2 = c2, w2 = w0;
     sat__f32x4 c3 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 12), factor), cap), t3 = c3, w3 = w0;
@@ -1571,10 +1646,17 @@ static inline void tonemap__soft_group(float *local, const float *luminance, con
     for (k = 0; k + 1 < f->boxes; k++) {
         sat__f32x4 inverse = sat__f32x4_set1(window->inverse[k + 1]);
         sat__i32x4 alive, n;
-        alive = tonemap__soft_step4(&c0, &t0, &w0, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), f, k);
-        alive = sat__i32x4_or(alive, tonemap__soft_step4(&c1, &t1, &w1, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 4), inverse), f, k));
-        alive = sat__i32x4_or(alive, tonemap__soft_step4(&c2, &t2, &w2, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 8), inverse), f, k));
-        alive = sat__i32x4_or(alive, tonemap__soft_step4(&c3, &t3, &w3, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 12), inverse), f, k));
+        alive =
+            tonemap__soft_step4(&c0, &t0, &w0, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), f, k);
+        alive = sat__i32x4_or(
+            alive, tonemap__soft_step4(&c1, &t1, &w1,
+                                       sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 4), inverse), f, k));
+        alive = sat__i32x4_or(
+            alive, tonemap__soft_step4(&c2, &t2, &w2,
+                                       sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 8), inverse), f, k));
+        alive = sat__i32x4_or(
+            alive, tonemap__soft_step4(&c3, &t3, &w3,
+                                       sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 12), inverse), f, k));
         if (!sat__i32x4_any(alive)) break;
         n = sat__i32x4_add(sat__f32x4_less_equal(half, w0), sat__f32x4_less_equal(half, w1));
         n = sat__i32x4_add(n, sat__i32x4_add(sat__f32x4_less_equal(half, w2), sat__f32x4_less_equal(half, w3)));
@@ -1587,22 +1669,26 @@ static inline void tonemap__soft_group(float *local, const float *luminance, con
 }
 
 /* Four pixels, where boxes are clipped or a run ends. */
-static inline void tonemap__soft_four(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                      sat__i32x4 *passed, int x, int end)
+static inline void tonemap__soft_four(float *local, const float *luminance, const tonemap__window *window,
+                                      const tonemap__frame *f, sat__i32x4 *passed, int x, int end)
 {
-    sat__f32x4 c = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale)), sat__f32x4_set1(f->cap)), taken = c;
+    sat__f32x4 c = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale)),
+                                  sat__f32x4_set1(f->cap)),
+               taken = c;
     sat__f32x4 weight = sat__f32x4_select(tonemap__inside4(x, end), sat__f32x4_set1(1), sat__f32x4_set1(0));
     int k, border = x < f->reach || x + 4 + f->reach > window->width;
     for (k = 0; k + 1 < f->boxes; k++) {
         sat__f32x4 inverse = border ? tonemap__inverse4(window, f, k + 1, x) : sat__f32x4_set1(window->inverse[k + 1]);
-        if (!sat__i32x4_any(tonemap__soft_step4(&c, &taken, &weight, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), f, k))) break;
+        if (!sat__i32x4_any(tonemap__soft_step4(&c, &taken, &weight,
+                                                sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), f, k)))
+            break;
         passed[k] = sat__i32x4_sub(passed[k], sat__f32x4_less_equal(sat__f32x4_set1(0.5f), weight));
     }
     sat__f32x4_store(local + x, taken);
 }
 
-static inline void tonemap__search_soft_vector(float *local, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                               size_t *scale, int x, int end)
+static inline void tonemap__search_soft_vector(float *local, const float *luminance, const tonemap__window *window,
+                                               const tonemap__frame *f, size_t *scale, int x, int end)
 {
     sat__i32x4 passed[TONEMAP__LENGTHS];
     int k;
@@ -1655,11 +1741,15 @@ static inline void tonemap__search_ashikhmin_vector(float *local, const float *l
         sat__i32x4 live = tonemap__inside4(x, end);
         for (s = 0; s + 1 < TONEMAP__ASHIKHMIN; s++) {
             int k = 2 * s + 1;
-            sat__f32x4 wide = sat__f32x4_mul(tonemap__box_sum4(window, f, k, x), border ? tonemap__inverse4(window, f, k, x) : sat__f32x4_set1(window->inverse[k]));
-            live = sat__i32x4_and(live, sat__f32x4_less(sat__f32x4_abs(sat__f32x4_sub(g, wide)), sat__f32x4_mul(half, g)));
+            sat__f32x4 wide =
+                sat__f32x4_mul(tonemap__box_sum4(window, f, k, x),
+                               border ? tonemap__inverse4(window, f, k, x) : sat__f32x4_set1(window->inverse[k]));
+            live =
+                sat__i32x4_and(live, sat__f32x4_less(sat__f32x4_abs(sat__f32x4_sub(g, wide)), sat__f32x4_mul(half, g)));
             if (!sat__i32x4_any(live)) break;
             k = s + 1;
-            g = sat__f32x4_mul(tonemap__box_sum4(window, f, k, x), border ? tonemap__inverse4(window, f, k, x) : sat__f32x4_set1(window->inverse[k]));
+            g = sat__f32x4_mul(tonemap__box_sum4(window, f, k, x),
+                               border ? tonemap__inverse4(window, f, k, x) : sat__f32x4_set1(window->inverse[k]));
             taken = sat__f32x4_select(live, g, taken);
             passed[s] = sat__i32x4_sub(passed[s], live);
         }
@@ -1670,18 +1760,22 @@ static inline void tonemap__search_ashikhmin_vector(float *local, const float *l
 #endif
 
 /* Searches pixels [x, end) of a row and may overwrite what follows them in the group; x is a multiple of the tile. */
-static inline void tonemap__search(tonemap__worker *w, const float *luminance, const tonemap__window *window, const tonemap__frame *f,
-                                   int ashikhmin, int x, int end)
+static inline void tonemap__search(tonemap__worker *w, const float *luminance, const tonemap__window *window,
+                                   const tonemap__frame *f, int ashikhmin, int x, int end)
 {
     size_t *scale = w->stats.scale;
 #ifdef SAT__VECTOR
     scale[0] += (size_t)(end - x);
-    if (TONEMAP__HAS_ASHIKHMIN && ashikhmin) tonemap__search_ashikhmin_vector(w->local, luminance, window, f, scale, x, end);
-    else if (TONEMAP__HAS_SOFT && f->soft > 0) tonemap__search_soft_vector(w->local, luminance, window, f, scale, x, end);
+    if (TONEMAP__HAS_ASHIKHMIN && ashikhmin)
+        tonemap__search_ashikhmin_vector(w->local, luminance, window, f, scale, x, end);
+    else if (TONEMAP__HAS_SOFT && f->soft > 0)
+        tonemap__search_soft_vector(w->local, luminance, window, f, scale, x, end);
     else tonemap__search_vector(w->local, luminance, window, f, scale, x, end);
 #else
-    if (TONEMAP__HAS_ASHIKHMIN && ashikhmin) tonemap__search_ashikhmin_plain(w->local, luminance, window, f, scale, x, end);
-    else if (TONEMAP__HAS_SOFT && f->soft > 0) tonemap__search_soft_plain(w->local, luminance, window, f, scale, x, end);
+    if (TONEMAP__HAS_ASHIKHMIN && ashikhmin)
+        tonemap__search_ashikhmin_plain(w->local, luminance, window, f, scale, x, end);
+    else if (TONEMAP__HAS_SOFT && f->soft > 0)
+        tonemap__search_soft_plain(w->local, luminance, window, f, scale, x, end);
     else tonemap__search_plain(w->local, luminance, window, f, scale, x, end);
 #endif
     w->stats.searched += (size_t)(end - x);
@@ -1703,8 +1797,10 @@ static inline void tonemap__sobel_row(float *out, const float *above, const floa
     out[0] = tonemap__sobel(above, row, below, 0, 0, width > 1);
 #ifdef SAT__VECTOR
     for (; x + 5 <= width; x += 4) {
-        sat__f32x4 a0 = sat__f32x4_load(above + x - 1), a1 = sat__f32x4_load(above + x), a2 = sat__f32x4_load(above + x + 1);
-        sat__f32x4 b0 = sat__f32x4_load(below + x - 1), b1 = sat__f32x4_load(below + x), b2 = sat__f32x4_load(below + x + 1);
+        sat__f32x4 a0 = sat__f32x4_load(above + x - 1), a1 = sat__f32x4_load(above + x),
+                   a2 = sat__f32x4_load(above + x + 1);
+        sat__f32x4 b0 = sat__f32x4_load(below + x - 1), b1 = sat__f32x4_load(below + x),
+                   b2 = sat__f32x4_load(below + x + 1);
         sat__f32x4 r0 = sat__f32x4_load(row + x - 1), r2 = sat__f32x4_load(row + x + 1), two = sat__f32x4_set1(2);
         sat__f32x4 gx = sat__f32x4_sub(sat__f32x4_add(sat__f32x4_add(a2, sat__f32x4_mul(two, r2)), b2),
                                        sat__f32x4_add(sat__f32x4_add(a0, sat__f32x4_mul(two, r0)), b0));
@@ -1718,7 +1814,8 @@ static inline void tonemap__sobel_row(float *out, const float *above, const floa
 
 /* ---- La for one row */
 
-/* The pixel for itself: what the global operators take, and, capped as in the sums, pixels that are not worth a search. */
+/* The pixel for itself: what the global operators take, and, capped as in the sums, pixels that are not worth a
+   search. */
 static inline void tonemap__own_luminance(float *local, const float *luminance, float scale, float cap, int x, int end)
 {
 #ifdef SAT__VECTOR
@@ -1735,7 +1832,8 @@ static inline int tonemap__has_edge(const float *edge, float threshold, int x, i
 {
 #ifdef SAT__VECTOR
     sat__i32x4 above = sat__i32x4_set1(0);
-    for (; x + 4 <= end; x += 4) above = sat__i32x4_or(above, sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x)));
+    for (; x + 4 <= end; x += 4)
+        above = sat__i32x4_or(above, sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x)));
     if (sat__i32x4_any(above)) return 1;
 #endif
     for (; x < end; x++)
@@ -1744,12 +1842,14 @@ static inline int tonemap__has_edge(const float *edge, float threshold, int x, i
 }
 
 /* Where it is not, the pixel stands for itself. */
-static inline void tonemap__reset_flat(float *local, const float *luminance, const float *edge, float threshold, float scale, float cap, int x, int end)
+static inline void tonemap__reset_flat(float *local, const float *luminance, const float *edge, float threshold,
+                                       float scale, float cap, int x, int end)
 {
 #ifdef SAT__VECTOR
     for (; x + 4 <= end; x += 4) {
         sat__i32x4 above = sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x));
-        sat__f32x4 own = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale)), sat__f32x4_set1(cap));
+        sat__f32x4 own = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale)),
+                                        sat__f32x4_set1(cap));
         sat__f32x4_store(local + x, sat__f32x4_select(above, sat__f32x4_load(local + x), own));
     }
 #endif
@@ -1758,13 +1858,16 @@ static inline void tonemap__reset_flat(float *local, const float *luminance, con
 }
 
 /* Tiles without a search get their constant; runs of the others are searched. */
-static inline void tonemap__search_tiles(tonemap *map, tonemap__worker *w, const float *luminance, const tonemap__window *window, int y)
+static inline void tonemap__search_tiles(tonemap *map, tonemap__worker *w, const float *luminance,
+                                         const tonemap__window *window, int y)
 {
     const float *tile = map->tile_local + (size_t)(y / TONEMAP__TILE) * (size_t)map->tiles_x;
     int t = 0, tiles = map->tiles_x, begin, x, end;
     while (t < tiles) {
         for (begin = t; t < tiles && tile[t] < 0; t++) {}
-        if (t > begin) tonemap__search(w, luminance, window, &map->frame, 0, begin * TONEMAP__TILE, sat__min_int(t * TONEMAP__TILE, map->width));
+        if (t > begin)
+            tonemap__search(w, luminance, window, &map->frame, 0, begin * TONEMAP__TILE,
+                            sat__min_int(t * TONEMAP__TILE, map->width));
         for (; t < tiles && !(tile[t] < 0); t++) {
             end = sat__min_int((t + 1) * TONEMAP__TILE, map->width);
             for (x = t * TONEMAP__TILE; x < end; x++) w->local[x] = tile[t];
@@ -1773,10 +1876,12 @@ static inline void tonemap__search_tiles(tonemap *map, tonemap__worker *w, const
     }
 }
 
-static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const float *luminance, const tonemap__window *window, int y)
+static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const float *luminance,
+                                         const tonemap__window *window, int y)
 {
     const tonemap__frame *f = &map->frame;
-    const float *above = y > 0 ? luminance - map->row : luminance, *below = y + 1 < map->height ? luminance + map->row : luminance;
+    const float *above = y > 0 ? luminance - map->row : luminance,
+                *below = y + 1 < map->height ? luminance + map->row : luminance;
     float threshold = (float)map->options.selective / f->scale, *edge = w->edge;
     int x, end;
     threshold *= threshold;
@@ -1816,7 +1921,8 @@ static inline void tonemap__local_row(tonemap *map, tonemap__worker *w, int y)
 
 static inline float tonemap__cbrt(float q)
 {
-    float y = sat__float_from_bits((uint32_t)(int32_t)((float)(int32_t)sat__float_bits(q) * (1 / 3.0f)) + 0x2a514067u), y3 = y * y * y;
+    float y = sat__float_from_bits((uint32_t)(int32_t)((float)(int32_t)sat__float_bits(q) * (1 / 3.0f)) + 0x2a514067u),
+          y3 = y * y * y;
     return y * ((y3 + 2 * q) / (2 * y3 + q)); /* Halley; error below 3e-5 */
 }
 
@@ -1856,8 +1962,10 @@ static inline void tonemap__rho_row(float *rho, const float *local, float lux, i
         t = tonemap__octave4(bits);
         u = sat__f32x4_add(sat__f32x4_set1(0.422865337f), sat__f32x4_mul(t, sat__f32x4_set1(-0.159220122f)));
         u = sat__f32x4_mul(sat__f32x4_mul(t, sat__f32x4_sub(one, t)), u);
-        t = sat__f32x4_mul(sat__i32x4_to_f32(sat__i32x4_sub(bits, sat__i32x4_set1(0x3f800000))), sat__f32x4_set1(1.1920929e-7f));
-        u = sat__f32x4_mul(sat__f32x4_sub(sat__f32x4_add(t, u), sat__f32x4_set1(TONEMAP__RHO_CENTRE)), sat__f32x4_set1(TONEMAP__RHO_WIDTH));
+        t = sat__f32x4_mul(sat__i32x4_to_f32(sat__i32x4_sub(bits, sat__i32x4_set1(0x3f800000))),
+                           sat__f32x4_set1(1.1920929e-7f));
+        u = sat__f32x4_mul(sat__f32x4_sub(sat__f32x4_add(t, u), sat__f32x4_set1(TONEMAP__RHO_CENTRE)),
+                           sat__f32x4_set1(TONEMAP__RHO_WIDTH));
         q = sat__f32x4_add(sat__f32x4_mul(u, sat__f32x4_set1(-0.0893071936f)), sat__f32x4_set1(-0.150544156f));
         q = sat__f32x4_add(sat__f32x4_mul(u, q), sat__f32x4_set1(0.0254077498f));
         q = sat__f32x4_add(sat__f32x4_mul(u, q), sat__f32x4_set1(0.287330944f));
@@ -1873,10 +1981,13 @@ static inline void tonemap__rho_row(float *rho, const float *local, float lux, i
 #ifdef SAT__VECTOR
 static inline sat__f32x4 tonemap__cbrt4(sat__f32x4 q)
 {
-    sat__i32x4 third = sat__f32x4_truncate(sat__f32x4_mul(sat__i32x4_to_f32(sat__f32x4_bits(q)), sat__f32x4_set1(1 / 3.0f)));
-    sat__f32x4 y = sat__f32x4_from_bits(sat__i32x4_add(third, sat__i32x4_set1(0x2a514067))), y3 = sat__f32x4_mul(sat__f32x4_mul(y, y), y);
+    sat__i32x4 third =
+        sat__f32x4_truncate(sat__f32x4_mul(sat__i32x4_to_f32(sat__f32x4_bits(q)), sat__f32x4_set1(1 / 3.0f)));
+    sat__f32x4 y = sat__f32x4_from_bits(sat__i32x4_add(third, sat__i32x4_set1(0x2a514067))),
+               y3 = sat__f32x4_mul(sat__f32x4_mul(y, y), y);
     sat__f32x4 two = sat__f32x4_set1(2);
-    return sat__f32x4_mul(y, sat__f32x4_div(sat__f32x4_add(y3, sat__f32x4_mul(two, q)), sat__f32x4_add(sat__f32x4_mul(two, y3), q)));
+    return sat__f32x4_mul(
+        y, sat__f32x4_div(sat__f32x4_add(y3, sat__f32x4_mul(two, q)), sat__f32x4_add(sat__f32x4_mul(two, y3), q)));
 }
 
 static inline sat__f32x4 tonemap__root4(sat__f32x4 q)
@@ -1886,12 +1997,16 @@ static inline sat__f32x4 tonemap__root4(sat__f32x4 q)
     p = sat__f32x4_add(sat__f32x4_set1(0.0339404425f), sat__f32x4_mul(v, sat__f32x4_set1(-0.00595350893f)));
     p = sat__f32x4_add(sat__f32x4_set1(-0.0999134065f), sat__f32x4_mul(v, p));
     p = sat__f32x4_mul(v, sat__f32x4_add(sat__f32x4_set1(0.331779718f), sat__f32x4_mul(v, p)));
-    return sat__i32x4_any(far_out) ? sat__f32x4_select(far_out, sat__f32x4_sub(tonemap__cbrt4(q), sat__f32x4_set1(1)), p) : p;
+    return sat__i32x4_any(far_out)
+               ? sat__f32x4_select(far_out, sat__f32x4_sub(tonemap__cbrt4(q), sat__f32x4_set1(1)), p)
+               : p;
 }
 
-static inline void tonemap__shift_red4(sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 luminance, sat__f32x4 rho)
+static inline void tonemap__shift_red4(sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 luminance,
+                                       sat__f32x4 rho)
 {
-    sat__f32x4 one = sat__f32x4_set1(1), x = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(0.4124564f), *r), sat__f32x4_mul(sat__f32x4_set1(0.3575761f), *g));
+    sat__f32x4 one = sat__f32x4_set1(1), x = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(0.4124564f), *r),
+                                                            sat__f32x4_mul(sat__f32x4_set1(0.3575761f), *g));
     sat__f32x4 y = sat__f32x4_mul(sat__f32x4_set1(0.95047f), luminance), q, c, dx;
     sat__i32x4 red;
     x = sat__f32x4_add(x, sat__f32x4_mul(sat__f32x4_set1(0.1804375f), *b));
@@ -1910,17 +2025,20 @@ static inline void tonemap__shift_red4(sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 
 
 /* ---- the factor from input to display, Ld / L: multiplying R, G and B by it is what replacing Y in Yxy does */
 
-/* Eq A.3 and A.4 with burn-out: Ld = Lr (1 + Lr / white^2) / (1 + La), and Lr = scale L. Where Lr is beyond the cap of the
-   sums, La grows with it, so that the brightest places keep their colour as with the global operator. */
-static inline void tonemap__gain_photographic(float *gain, const float *local, const float *luminance, const tonemap__frame *f, int end)
+/* Eq A.3 and A.4 with burn-out: Ld = Lr (1 + Lr / white^2) / (1 + La), and Lr = scale L. Where Lr is beyond the cap of
+   the sums, La grows with it, so that the brightest places keep their colour as with the global operator. */
+static inline void tonemap__gain_photographic(float *gain, const float *local, const float *luminance,
+                                              const tonemap__frame *f, int end)
 {
     int x = 0;
     float most = 1.1529215e18f; /* 2^60: larger scaled luminances are white too, and infinity times 0 is no number */
 #ifdef SAT__VECTOR
-    sat__f32x4 one = sat__f32x4_set1(1), zero = sat__f32x4_set1(0), scale = sat__f32x4_set1(f->scale), burn = sat__f32x4_set1(f->inverse_white2);
+    sat__f32x4 one = sat__f32x4_set1(1), zero = sat__f32x4_set1(0), scale = sat__f32x4_set1(f->scale),
+               burn = sat__f32x4_set1(f->inverse_white2);
     sat__f32x4 inverse_cap = sat__f32x4_set1(f->inverse_cap);
     for (; x + 4 <= end; x += 4) {
-        sat__f32x4 y = sat__f32x4_load(luminance + x), lr = sat__f32x4_min(sat__f32x4_mul(y, scale), sat__f32x4_set1(most));
+        sat__f32x4 y = sat__f32x4_load(luminance + x),
+                   lr = sat__f32x4_min(sat__f32x4_mul(y, scale), sat__f32x4_set1(most));
         sat__f32x4 v = sat__f32x4_mul(scale, sat__f32x4_add(one, sat__f32x4_mul(lr, burn)));
         lr = sat__f32x4_max(sat__f32x4_mul(lr, inverse_cap), one);
         v = sat__f32x4_div(v, sat__f32x4_add(one, sat__f32x4_mul(sat__f32x4_load(local + x), lr)));
@@ -1946,10 +2064,12 @@ static inline float tonemap__ashikhmin_gain(float local, float luminance, const 
 #ifdef SAT__VECTOR
 static inline sat__f32x4 tonemap__capacity4(sat__f32x4 cd)
 {
-    sat__f32x4 ln = sat__f32x4_mul(sat__f32x4_set1(0.693147181f), tonemap__log2_4(sat__f32x4_max(cd, sat__f32x4_set1(TONEMAP__DARKEST))));
+    sat__f32x4 ln = sat__f32x4_mul(sat__f32x4_set1(0.693147181f),
+                                   tonemap__log2_4(sat__f32x4_max(cd, sat__f32x4_set1(TONEMAP__DARKEST))));
     sat__f32x4 c1 = sat__f32x4_mul(cd, sat__f32x4_set1(1 / 0.0014f)), c2, c3, c4;
     c2 = sat__f32x4_add(sat__f32x4_set1(16.5431894f), sat__f32x4_mul(ln, sat__f32x4_set1(1 / 0.4027f)));
-    c3 = sat__f32x4_add(sat__f32x4_set1(16.5431894f), sat__f32x4_mul(sat__f32x4_sub(cd, sat__f32x4_set1(1)), sat__f32x4_set1(1 / 0.4027f)));
+    c3 = sat__f32x4_add(sat__f32x4_set1(16.5431894f),
+                        sat__f32x4_mul(sat__f32x4_sub(cd, sat__f32x4_set1(1)), sat__f32x4_set1(1 / 0.4027f)));
     c4 = sat__f32x4_add(sat__f32x4_set1(-3.56579561f), sat__f32x4_mul(ln, sat__f32x4_set1(1 / 0.0556f)));
     c4 = sat__f32x4_select(sat__f32x4_less(cd, sat__f32x4_set1(7.2444f)), c3, c4);
     c4 = sat__f32x4_select(sat__f32x4_less(cd, sat__f32x4_set1(1)), c2, c4);
@@ -1957,15 +2077,19 @@ static inline sat__f32x4 tonemap__capacity4(sat__f32x4 cd)
 }
 #endif
 
-static inline void tonemap__gain_ashikhmin(float *gain, const float *local, const float *luminance, const tonemap__frame *f, float key, int end)
+static inline void tonemap__gain_ashikhmin(float *gain, const float *local, const float *luminance,
+                                           const tonemap__frame *f, float key, int end)
 {
     int x = 0;
 #ifdef SAT__VECTOR
-    sat__f32x4 zero = sat__f32x4_set1(0), scale = sat__f32x4_set1(f->scale), low = sat__f32x4_set1(f->curve_low), factor = sat__f32x4_set1(f->curve_factor);
+    sat__f32x4 zero = sat__f32x4_set1(0), scale = sat__f32x4_set1(f->scale), low = sat__f32x4_set1(f->curve_low),
+               factor = sat__f32x4_set1(f->curve_factor);
     for (; f->curve_factor > 0 && x + 4 <= end; x += 4) {
         sat__f32x4 la = sat__f32x4_max(sat__f32x4_load(local + x), sat__f32x4_set1(TONEMAP__DARKEST));
-        sat__f32x4 display = sat__f32x4_mul(sat__f32x4_sub(tonemap__capacity4(sat__f32x4_mul(la, sat__f32x4_set1(f->cd))), low), factor);
-        sat__i32x4 shown = sat__i32x4_and(sat__f32x4_less(zero, sat__f32x4_load(luminance + x)), sat__f32x4_less(zero, display));
+        sat__f32x4 display =
+            sat__f32x4_mul(sat__f32x4_sub(tonemap__capacity4(sat__f32x4_mul(la, sat__f32x4_set1(f->cd))), low), factor);
+        sat__i32x4 shown =
+            sat__i32x4_and(sat__f32x4_less(zero, sat__f32x4_load(luminance + x)), sat__f32x4_less(zero, display));
         sat__f32x4_store(gain + x, sat__f32x4_select(shown, sat__f32x4_div(sat__f32x4_mul(display, scale), la), zero));
     }
 #endif
@@ -1990,8 +2114,9 @@ static inline void tonemap__gain_row(tonemap *map, tonemap__worker *w, int y)
 
 typedef float tonemap__planes[3][TONEMAP__CHUNK];
 
-/* Colours beyond the display: the largest component is top > 1. Both ways keep the hue: dimming by top^-gamut, then going
-   towards the grey of the same luminance until the largest component is 1. Clipping each channel turns skies cyan. */
+/* Colours beyond the display: the largest component is top > 1. Both ways keep the hue: dimming by top^-gamut, then
+   going towards the grey of the same luminance until the largest component is 1. Clipping each channel turns skies
+   cyan. */
 #define TONEMAP__GAMUT_TOP 5.7646075e17f /* 2^59 */
 
 static inline void tonemap__gamut_plain(float *v, float top, float grey, float gamut, float floor)
@@ -2014,7 +2139,8 @@ static inline void tonemap__gamut_plain(float *v, float top, float grey, float g
 #ifdef SAT__VECTOR
 static inline void tonemap__gamut4(sat__f32x4 *v, sat__f32x4 top, sat__f32x4 grey, float gamut, sat__f32x4 least)
 {
-    sat__f32x4 one = sat__f32x4_set1(1), highest = sat__f32x4_set1(TONEMAP__GAMUT_TOP), tiny = sat__f32x4_set1(1e-20f), dim, share;
+    sat__f32x4 one = sat__f32x4_set1(1), highest = sat__f32x4_set1(TONEMAP__GAMUT_TOP), tiny = sat__f32x4_set1(1e-20f),
+               dim, share;
     sat__i32x4 over = sat__f32x4_less(one, top);
     int c;
     top = sat__f32x4_max(sat__f32x4_min(top, highest), one);
@@ -2032,8 +2158,9 @@ static inline void tonemap__gamut4(sat__f32x4 *v, sat__f32x4 top, sat__f32x4 gre
 
 /* Pixels [x, x + n) times their gain, clipped to [floor, 1]. rho is NULL where nothing is mesopic. Comparisons are
    written so that NaN becomes the floor: it comes from pixels that are black. */
-static inline void tonemap__shade_plain(tonemap__planes out, const float *pixels, int channels, const float *luminance, const float *gain,
-                                        const float *rho, float floor, float gamut, int x, int i, int n, size_t *clamped)
+static inline void tonemap__shade_plain(tonemap__planes out, const float *pixels, int channels, const float *luminance,
+                                        const float *gain, const float *rho, float floor, float gamut, int x, int i,
+                                        int n, size_t *clamped)
 {
     for (; i < n; i++) {
         const float *p = pixels + (size_t)(x + i) * (size_t)channels;
@@ -2056,8 +2183,9 @@ static inline void tonemap__shade_plain(tonemap__planes out, const float *pixels
 }
 
 #ifdef SAT__VECTOR
-static inline int tonemap__shade_vector(tonemap__planes out, const float *pixels, int channels, const float *luminance, const float *gain,
-                                        const float *rho, float floor, float gamut, int x, int n, size_t *clamped)
+static inline int tonemap__shade_vector(tonemap__planes out, const float *pixels, int channels, const float *luminance,
+                                        const float *gain, const float *rho, float floor, float gamut, int x, int n,
+                                        size_t *clamped)
 {
     sat__f32x4 one = sat__f32x4_set1(1), least = sat__f32x4_set1(floor);
     sat__i32x4 over = sat__i32x4_set1(0);
@@ -2068,14 +2196,16 @@ static inline int tonemap__shade_vector(tonemap__planes out, const float *pixels
         sat__i32x4 beyond;
         int c;
         tonemap__load_pixels(pixels + (size_t)(x + i) * (size_t)channels, channels, &r, &g, &b);
-        if (TONEMAP__HAS_MESOPIC && rho) tonemap__shift_red4(&r, &g, &b, sat__f32x4_load(luminance + x + i), sat__f32x4_load(rho + x + i));
+        if (TONEMAP__HAS_MESOPIC && rho)
+            tonemap__shift_red4(&r, &g, &b, sat__f32x4_load(luminance + x + i), sat__f32x4_load(rho + x + i));
         v[0] = sat__f32x4_max(sat__f32x4_mul(r, factor), least);
         v[1] = sat__f32x4_max(sat__f32x4_mul(g, factor), least);
         v[2] = sat__f32x4_max(sat__f32x4_mul(b, factor), least);
         top = sat__f32x4_max(sat__f32x4_max(v[0], v[1]), v[2]);
         beyond = sat__f32x4_less(one, top);
         over = sat__i32x4_sub(over, beyond);
-        if (gamut >= 0 && sat__i32x4_any(beyond)) tonemap__gamut4(v, top, sat__f32x4_mul(sat__f32x4_load(luminance + x + i), factor), gamut, least);
+        if (gamut >= 0 && sat__i32x4_any(beyond))
+            tonemap__gamut4(v, top, sat__f32x4_mul(sat__f32x4_load(luminance + x + i), factor), gamut, least);
         for (c = 0; c < 3; c++) sat__f32x4_store(out[c] + i, sat__f32x4_min(v[c], one));
     }
     sat__i32x4_store(count, over);
@@ -2084,8 +2214,8 @@ static inline int tonemap__shade_vector(tonemap__planes out, const float *pixels
 }
 #endif
 
-/* sRGB codes by a table over the float's exponent and 9 bits of its mantissa, from 2^-13 (code 0) to 1: at most one code
-   from the rounded value, and that only within 0.1 of a step. */
+/* sRGB codes by a table over the float's exponent and 9 bits of its mantissa, from 2^-13 (code 0) to 1: at most one
+   code from the rounded value, and that only within 0.1 of a step. */
 enum { TONEMAP__CODE_BASE = 0xe400, TONEMAP__CODE_SHIFT = 14 };
 #define TONEMAP__CODE_FLOOR 0.0001220703125f /* 2^-13 */
 
@@ -2127,7 +2257,8 @@ static inline void tonemap__write_f32(float *out, int channels, tonemap__planes 
 
 static inline float tonemap__unit(float v) { return v > 0 ? v < 1 ? v : 1 : 0; }
 
-static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *w, const float *pixels, const float *rho, int y)
+static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *w, const float *pixels,
+                                      const float *rho, int y)
 {
     tonemap *map = job->map;
     const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
@@ -2162,7 +2293,8 @@ static void tonemap__map_bands(int begin, int end, int worker, void *context)
     tonemap *map = job->map;
     tonemap__worker *w = &map->worker[worker];
     const tonemap__frame *f = &map->frame;
-    int y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height), next = sat__max_int(y - f->reach, 0), x;
+    int y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height),
+        next = sat__max_int(y - f->reach, 0), x;
     int mesopic = TONEMAP__HAS_MESOPIC && map->options.mesopic != TONEMAP_MESOPIC_OFF && job->hdr->channels > 1;
     if (mesopic && map->options.mesopic == TONEMAP_MESOPIC_UNIFORM) {
         mesopic = f->rho < 1;
@@ -2174,14 +2306,16 @@ static void tonemap__map_bands(int begin, int end, int worker, void *context)
         if (f->reach > 0)
             for (; next < sat__min_int(y + f->reach + 1, map->height); next++) tonemap__add_ring_row(map, w, next);
         tonemap__local_row(map, w, y);
-        if (mesopic && map->options.mesopic == TONEMAP_MESOPIC_LOCAL) tonemap__rho_row(w->rho, w->local, f->lux, map->width);
+        if (mesopic && map->options.mesopic == TONEMAP_MESOPIC_LOCAL)
+            tonemap__rho_row(w->rho, w->local, f->lux, map->width);
         tonemap__gain_row(map, w, y);
         tonemap__write_row(job, w, pixels, mesopic ? w->rho : NULL, y);
     }
 }
 
 /* ---- unusable pixels: NaN and negative luminances, which resampling leaves beside lamps, show the mean of what the
-   usable ones around them show, out of the nearest square that has some. After the picture: in place the input is gone. */
+   usable ones around them show, out of the nearest square that has some. After the picture: in place the input is
+   gone. */
 
 static inline int tonemap__is_unusable(const tonemap *map, int x, int y)
 {
@@ -2257,7 +2391,8 @@ TONEMAP_DEF sat_result tonemap_create(tonemap **out, int width, int height, cons
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (width < 1 || height < 1 || width > 1 << 24 || height > 1 << 24 || !tonemap__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    if (width < 1 || height < 1 || width > 1 << 24 || height > 1 << 24 || !tonemap__options_are_valid(&o))
+        return SAT_ERR_ARGUMENT;
     memset(&shape, 0, sizeof shape);
     if (!sat__resolve_allocator(&shape.allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     shape.options = o;
@@ -2298,7 +2433,8 @@ TONEMAP_DEF void tonemap_destroy(tonemap *map)
 TONEMAP_DEF sat_result tonemap_set_options(tonemap *map, const tonemap_options *options)
 {
     tonemap_options o = options ? *options : tonemap_defaults();
-    if (!map || !tonemap__options_are_valid(&o) || sat__worker_count(&o.threads) > map->workers) return SAT_ERR_ARGUMENT;
+    if (!map || !tonemap__options_are_valid(&o) || sat__worker_count(&o.threads) > map->workers)
+        return SAT_ERR_ARGUMENT;
     map->options = o;
     return SAT_OK;
 }
@@ -2342,8 +2478,8 @@ static inline sat_result tonemap__apply(tonemap__job *job, double dt_seconds, to
     return SAT_OK;
 }
 
-static inline sat_result tonemap__check_call(const tonemap *map, const void *out, ptrdiff_t out_stride, size_t element, const sat_image *hdr,
-                                             double dt_seconds)
+static inline sat_result tonemap__check_call(const tonemap *map, const void *out, ptrdiff_t out_stride, size_t element,
+                                             const sat_image *hdr, double dt_seconds)
 {
     size_t step = out_stride < 0 ? (size_t)0 - (size_t)out_stride : (size_t)out_stride;
     if (!map || !out || !sat__image_is_valid(hdr) || hdr->channels == 2) return SAT_ERR_ARGUMENT;
@@ -2353,8 +2489,8 @@ static inline sat_result tonemap__check_call(const tonemap *map, const void *out
     return tonemap__in_range(dt_seconds, 0, 1e300) || tonemap__is_infinite(dt_seconds) ? SAT_OK : SAT_ERR_ARGUMENT;
 }
 
-static inline sat_result tonemap__call(tonemap *map, void *out, ptrdiff_t out_stride, int as_float, const sat_image *hdr, double dt_seconds,
-                                       tonemap_stats *stats)
+static inline sat_result tonemap__call(tonemap *map, void *out, ptrdiff_t out_stride, int as_float,
+                                       const sat_image *hdr, double dt_seconds, tonemap_stats *stats)
 {
     sat_result result = tonemap__check_call(map, out, out_stride, as_float ? sizeof(float) : 1, hdr, dt_seconds);
     tonemap__job job;
@@ -2520,8 +2656,8 @@ static const char tonemap__glsl_count[] =
     "out float value;\n"
     "void main() { value = 1.0; }\n";
 
-/* The state, two texels: log2 of average, key and white, and 1; log2 of low and high, the mean, and what the meter holds.
-   An empty picture keeps the old one. */
+/* The state, two texels: log2 of average, key and white, and 1; log2 of low and high, the mean, and what the meter
+   holds. An empty picture keeps the old one. */
 static const char tonemap__glsl_state[] =
     "uniform highp isampler2D sums;\n"
     "uniform sampler2D old, histogram;\n"
@@ -2720,7 +2856,8 @@ struct tonemap_gl {
     sat_allocator allocator;
     sat_gl *sat;                /* NULL for the global operators */
     int width, height, levels, current, histogram; /* histogram: 0, or the estimates it serves, see the state shader */
-    unsigned luminance_program, first_program, reduce_program, scatter_program, state_program, quantize_program, map_program;
+    unsigned luminance_program, first_program, reduce_program, scatter_program, state_program, quantize_program,
+        map_program;
     unsigned luminance, quanta, out, bins, state[2], level[TONEMAP__LEVELS]; /* textures */
     unsigned luminance_target, quanta_target, out_target, bins_target, state_target[2], level_target[TONEMAP__LEVELS];
 };
@@ -2757,8 +2894,8 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define_float(gl, "TONEMAP_STEPS", ashikhmin ? TONEMAP__ASHIKHMIN_QUANTUM : TONEMAP__QUANTUM);
 }
 
-static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, const char *name, const char *vertex, const char *frame,
-                                             const char *search, const char *body)
+static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, const char *name, const char *vertex,
+                                             const char *frame, const char *search, const char *body)
 {
     const char *library[3], *fragment[4], *points[2];
     sat__gl_shaders shaders;
@@ -2783,18 +2920,27 @@ static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, c
 
 static inline sat_result tonemap__gl_programs(tonemap_gl *g)
 {
-    sat_result r = tonemap__gl_program(g, &g->luminance_program, "tonemap: luminance", NULL, NULL, NULL, tonemap__glsl_luminance);
-    if (r == SAT_OK) r = tonemap__gl_program(g, &g->reduce_program, "tonemap: reduction", NULL, NULL, NULL, tonemap__glsl_reduce);
+    sat_result r =
+        tonemap__gl_program(g, &g->luminance_program, "tonemap: luminance", NULL, NULL, NULL, tonemap__glsl_luminance);
+    if (r == SAT_OK)
+        r = tonemap__gl_program(g, &g->reduce_program, "tonemap: reduction", NULL, NULL, NULL, tonemap__glsl_reduce);
     sat__gl_define(&g->gl, "TONEMAP_FIRST", 1);
-    if (r == SAT_OK) r = tonemap__gl_program(g, &g->first_program, "tonemap: log-average", NULL, NULL, NULL, tonemap__glsl_reduce);
-    if (r == SAT_OK) r = tonemap__gl_program(g, &g->state_program, "tonemap: adaptation", NULL, NULL, NULL, tonemap__glsl_state);
-    if (r == SAT_OK && g->histogram) r = tonemap__gl_program(g, &g->scatter_program, "tonemap: histogram", tonemap__glsl_scatter, NULL, NULL, tonemap__glsl_count);
-    if (r == SAT_OK && g->sat) r = tonemap__gl_program(g, &g->quantize_program, "tonemap: rounding", NULL, tonemap__glsl_frame, NULL, tonemap__glsl_quantize);
+    if (r == SAT_OK)
+        r = tonemap__gl_program(g, &g->first_program, "tonemap: log-average", NULL, NULL, NULL, tonemap__glsl_reduce);
+    if (r == SAT_OK)
+        r = tonemap__gl_program(g, &g->state_program, "tonemap: adaptation", NULL, NULL, NULL, tonemap__glsl_state);
+    if (r == SAT_OK && g->histogram)
+        r = tonemap__gl_program(g, &g->scatter_program, "tonemap: histogram", tonemap__glsl_scatter, NULL, NULL,
+                                tonemap__glsl_count);
+    if (r == SAT_OK && g->sat)
+        r = tonemap__gl_program(g, &g->quantize_program, "tonemap: rounding", NULL, tonemap__glsl_frame, NULL,
+                                tonemap__glsl_quantize);
     if (r == SAT_OK) r = tonemap__gl_program(g, &g->map_program, "tonemap: mapping", NULL, tonemap__glsl_frame, g->sat ? tonemap__glsl_search : NULL, tonemap__glsl_map);
     return r;
 }
 
-static inline sat_result tonemap__gl_target(tonemap_gl *g, unsigned *texture, unsigned *framebuffer, unsigned internal, int width, int height)
+static inline sat_result tonemap__gl_target(tonemap_gl *g, unsigned *texture, unsigned *framebuffer, unsigned internal,
+                                            int width, int height)
 {
     sat_result r = sat__gl_texture(&g->gl, texture, internal, width, height, NULL);
     return r == SAT_OK ? sat__gl_framebuffer(&g->gl, framebuffer, texture, 1, 0) : r;
@@ -2806,7 +2952,8 @@ static inline sat_result tonemap__gl_targets(tonemap_gl *g)
     sat_result r = tonemap__gl_target(g, &g->luminance, &g->luminance_target, SAT__GL_R32F, width, height);
     if (r == SAT_OK && g->sat) r = tonemap__gl_target(g, &g->quanta, &g->quanta_target, SAT__GL_R32UI, width, height);
     if (r == SAT_OK) r = tonemap__gl_target(g, &g->out, &g->out_target, SAT__GL_RGBA8, width, height);
-    if (r == SAT_OK && g->histogram) r = tonemap__gl_target(g, &g->bins, &g->bins_target, SAT__GL_R32F, 64, TONEMAP__BIN_ROWS);
+    if (r == SAT_OK && g->histogram)
+        r = tonemap__gl_target(g, &g->bins, &g->bins_target, SAT__GL_R32F, 64, TONEMAP__BIN_ROWS);
     for (i = 0; i < 2 && r == SAT_OK; i++) {
         static const float nothing[4] = {0, 0, 0, 0};
         r = tonemap__gl_target(g, &g->state[i], &g->state_target[i], SAT__GL_RGBA32F, 2, 1);
@@ -2835,7 +2982,8 @@ static inline sat_result tonemap__gl_make(tonemap_gl *g, sat_gl_get_proc *get_pr
         r = sat_gl_create(&g->sat, get_proc, &table);
         if (r != SAT_OK) return r;
     }
-    g->histogram = (tonemap__is_ashikhmin(o) ? 1 : 0) + (o->key > 0 ? 0 : 2) + (o->white > 0 ? 0 : 4) + (o->metering == TONEMAP_METERING_PERCENTILES ? 8 : 0);
+    g->histogram = (tonemap__is_ashikhmin(o) ? 1 : 0) + (o->key > 0 ? 0 : 2) + (o->white > 0 ? 0 : 4) +
+                   (o->metering == TONEMAP_METERING_PERCENTILES ? 8 : 0);
     sat__gl_begin(&g->gl, &state, TONEMAP__GL_UNITS);
     r = tonemap__gl_targets(g);
     if (r == SAT_OK) r = tonemap__gl_programs(g);
@@ -2852,7 +3000,8 @@ TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (!get_proc || width < 1 || height < 1 || width > 1 << 24 || height > 1 << 24 || !tonemap__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    if (!get_proc || width < 1 || height < 1 || width > 1 << 24 || height > 1 << 24 || !tonemap__options_are_valid(&o))
+        return SAT_ERR_ARGUMENT;
     if (!sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     g = (tonemap_gl *)sat__alloc(&allocator, sizeof *g);
     if (!g) return SAT_ERR_MEMORY;
@@ -2868,9 +3017,10 @@ TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_
 /* Whether two sets of options have the same shaders. */
 static inline int tonemap__gl_same_programs(const tonemap_options *a, const tonemap_options *b)
 {
-    return a->operation == b->operation && a->mesopic == b->mesopic && a->metering == b->metering && a->scales == b->scales &&
-           !(a->phi < b->phi || a->phi > b->phi) && !(a->epsilon < b->epsilon || a->epsilon > b->epsilon) &&
-           !(a->soft < b->soft || a->soft > b->soft) && !(a->gamut < b->gamut || a->gamut > b->gamut) &&
+    return a->operation == b->operation && a->mesopic == b->mesopic && a->metering == b->metering &&
+           a->scales == b->scales && !(a->phi < b->phi || a->phi > b->phi) &&
+           !(a->epsilon < b->epsilon || a->epsilon > b->epsilon) && !(a->soft < b->soft || a->soft > b->soft) &&
+           !(a->gamut < b->gamut || a->gamut > b->gamut) &&
            !(a->selective < b->selective || a->selective > b->selective) &&
            !(a->meter_low < b->meter_low || a->meter_low > b->meter_low) &&
            !(a->meter_high < b->meter_high || a->meter_high > b->meter_high) && (a->key > 0) == (b->key > 0) &&
@@ -2880,7 +3030,8 @@ static inline int tonemap__gl_same_programs(const tonemap_options *a, const tone
 TONEMAP_DEF sat_result tonemap_gl_set_options(tonemap_gl *gl, const tonemap_options *options)
 {
     tonemap_options o = options ? *options : tonemap_defaults();
-    if (!gl || !gl->map_program || !tonemap__options_are_valid(&o) || !tonemap__gl_same_programs(&gl->options, &o)) return SAT_ERR_ARGUMENT;
+    if (!gl || !gl->map_program || !tonemap__options_are_valid(&o) || !tonemap__gl_same_programs(&gl->options, &o))
+        return SAT_ERR_ARGUMENT;
     gl->options = o;
     return SAT_OK;
 }
@@ -3025,9 +3176,9 @@ SAT__IEEE_END
    are in the file LICENSE.
 
    MIT No Attribution. Copyright 2026 the lightscan authors. Permission is hereby granted, free of charge, to any person
-   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software without
-   restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute, sublicense,
-   and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
+   obtaining a copy of this software and associated documentation files (the "Software"), to deal in the Software
+   without restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute,
+   sublicense, and/or sell copies of the Software, and to permit persons to whom the Software is furnished to do so.
 
    THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE
    WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR

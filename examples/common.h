@@ -1,9 +1,9 @@
 /* common.h - what the examples share: threads, clock, progress, command line, labels on pictures.
    SPDX-License-Identifier: MIT-0 OR Unlicense
 
-   Every example has the same command line: arguments without a name are inputs, the output is -o or --out FILE (behind a
-   single input it may stand without), and without that out/PROGRAM.png; its path is printed. A program declares its own
-   options in a table, with their defaults and ranges, and gets --out, --threads, --stats and --help besides:
+   Every example has the same command line: arguments without a name are inputs, the output is -o or --out FILE (behind
+   a single input it may stand without), and without that out/PROGRAM.png; its path is printed. A program declares its
+   own options in a table, with their defaults and ranges, and gets --out, --threads, --stats and --help besides:
 
        int main(int argc, char **argv)
        {
@@ -98,8 +98,9 @@ static inline sat_threads common_threads(int *workers)
 typedef struct common_option {
     const char *name;
     char type;           /* f float, d double, i int, z int[2] as in 1280x720, m float with or without "mm" behind it;
-                            b int set to 1, s const char *, w int: which word of `help`, that begins with "one|two|three";
-                            P, M const char *: path of a picture, of a mesh, that may stand without the option's name */
+                            b int set to 1, s const char *, w int: which word of `help`, that begins with
+                            "one|two|three"; P, M const char *: path of a picture, of a mesh, that may stand without the
+                            option's name */
     void *value;         /* holds the default; what P, M and s point to may be NULL */
     double low, high;    /* of f d i z m; high = INFINITY: no limit */
     const char *help;
@@ -127,7 +128,8 @@ static inline int common_say(const common_settings *common, const char *sentence
 }
 
 /* What a library call said, or better the sentence of the header's explain function; returns 0. */
-static inline int common_say_result(const common_settings *common, const char *what, sat_result result, const char *explained)
+static inline int common_say_result(const common_settings *common, const char *what, sat_result result,
+                                    const char *explained)
 {
     fprintf(stderr, "%s: %s: %s\n", common->name, what, explained && *explained ? explained : sat_result_text(result));
     return 0;
@@ -140,7 +142,10 @@ static inline void common_leave(const common_settings *common, int status, const
     exit(status);
 }
 
-static inline void common_number(char *text, size_t size, double v) { snprintf(text, size, v == floor(v) && fabs(v) < 1e15 ? "%.0f" : "%.7g", v); }
+static inline void common_number(char *text, size_t size, double v)
+{
+    snprintf(text, size, v == floor(v) && fabs(v) < 1e15 ? "%.0f" : "%.7g", v);
+}
 
 /* "one|two|three words" becomes "one, two or three". */
 static inline void common_words(char *text, size_t size, const char *words)
@@ -182,7 +187,8 @@ static inline void common_default(char *text, size_t size, const common_option *
     else if (o->type == 'w') {
         for (k = 0; k < *i; ++k) word += strcspn(word, "| ") + 1;
         snprintf(text, size, "%.*s", (int)strcspn(word, "| "), word);
-    } else if (o->type != 'b' && *(const char *const *)o->value) snprintf(text, size, "%s", *(const char *const *)o->value);
+    } else if (o->type != 'b' && *(const char *const *)o->value)
+        snprintf(text, size, "%s", *(const char *const *)o->value);
 }
 
 static inline void common_help(const char *name, const common_option *options, int count, int inputs)
@@ -190,11 +196,16 @@ static inline void common_help(const char *name, const common_option *options, i
     int i;
     printf("usage: %s [options]", name);
     for (i = 0; i < count; ++i)
-        if (options[i].type == 'P' || options[i].type == 'M') printf(" [%s]", options[i].type == 'P' ? "PICTURE" : "MESH");
+        if (options[i].type == 'P' || options[i].type == 'M')
+            printf(" [%s]", options[i].type == 'P' ? "PICTURE" : "MESH");
     printf("%s\n\n", inputs == 1 ? " [OUT]" : "");
     for (i = 0; i < count; ++i) {
         const common_option *o = &options[i];
-        const char *argument = o->type == 'b' ? "" : o->type == 'z' ? " WxH" : strchr("fdim", o->type) ? " N" : o->type == 'w' ? " WORD" : " FILE";
+        const char *argument = o->type == 'b'            ? ""
+                               : o->type == 'z'          ? " WxH"
+                               : strchr("fdim", o->type) ? " N"
+                               : o->type == 'w'          ? " WORD"
+                                                         : " FILE";
         char value[80], range[160];
         common_default(value, sizeof value, o);
         common_range(range, sizeof range, o);
@@ -246,11 +257,14 @@ static inline int common_set(const common_option *o, const char *text)
 
 static inline int common_is_picture(const char *path)
 {
-    return image_ends_with(path, ".exr") || image_ends_with(path, ".hdr") || image_ends_with(path, ".pfm") || image_ends_with(path, ".png") ||
-           image_ends_with(path, ".jpg") || image_ends_with(path, ".jpeg");
+    return image_ends_with(path, ".exr") || image_ends_with(path, ".hdr") || image_ends_with(path, ".pfm") ||
+           image_ends_with(path, ".png") || image_ends_with(path, ".jpg") || image_ends_with(path, ".jpeg");
 }
 
-static inline int common_is_mesh(const char *path) { return image_ends_with(path, ".ply") || image_ends_with(path, ".obj"); }
+static inline int common_is_mesh(const char *path)
+{
+    return image_ends_with(path, ".ply") || image_ends_with(path, ".obj");
+}
 
 /* 1 when the path ends with one of the endings, ".png .exr". */
 static inline int common_ends_with(const char *path, const char *endings)
@@ -277,7 +291,8 @@ static inline const char *common_refuses(char *text, size_t size, const common_s
         return text;
     }
     for (i = 0; file_identify(&id, path) && i < common->input_count; ++i)
-        if (common->inputs[i].volume == id.volume && common->inputs[i].number == id.number) return "is one of the files that are read";
+        if (common->inputs[i].volume == id.volume && common->inputs[i].number == id.number)
+            return "is one of the files that are read";
     return NULL;
 }
 
@@ -317,10 +332,12 @@ static inline int common_may_write(const common_settings *common, const char *pa
 }
 
 /* A PNG of 8-bit pixels. */
-static inline int common_save_u8(const common_settings *common, const char *path, const unsigned char *bytes, int width, int height, int channels)
+static inline int common_save_u8(const common_settings *common, const char *path, const unsigned char *bytes, int width,
+                                 int height, int channels)
 {
     char why[FILE_MESSAGE];
-    return common_may_write(common, path) && common_wrote(common, path, image_save_u8(why, path, bytes, width, height, channels), why);
+    return common_may_write(common, path) &&
+           common_wrote(common, path, image_save_u8(why, path, bytes, width, height, channels), why);
 }
 
 /* Floats in the format that the ending says. */
@@ -342,7 +359,8 @@ static inline int common_path(const common_settings *common, char out[FILE_PATH]
 }
 
 /* An argument without a name: the next picture or mesh, or behind a single input the output. */
-static inline void common_argument(common_settings *common, const common_option *options, int count, int inputs, const char *path)
+static inline void common_argument(common_settings *common, const common_option *options, int count, int inputs,
+                                   const char *path)
 {
     const char *type = common_is_picture(path) ? "P" : common_is_mesh(path) ? "M" : "", *first = NULL;
     int i, takes[2] = {0, 0};
@@ -358,7 +376,8 @@ static inline void common_argument(common_settings *common, const common_option 
     }
     if (inputs == 1 && first && !common->out) {
         const char *dot = strrchr(first, '.');
-        if (file_identify(&id, path) && file_identify(&own, first) && id.volume == own.volume && id.number == own.number)
+        if (file_identify(&id, path) && file_identify(&own, first) && id.volume == own.volume &&
+            id.number == own.number)
             common_leave(common, 2, path, "is the input");
         if (dot && image_ends_with(path, dot) && file_identify(&id, path))
             common_leave(common, 2, path, "is there already and looks like another input; to write over it say --out");
@@ -387,15 +406,16 @@ static inline void common_open(common_settings *common, const common_option *opt
     if (common->out && !file_can_write(common->out, why)) common_leave(common, 1, "", why);
 }
 
-/* Reads the command line into the options' values. Prints help or what is wrong, and leaves the program, by itself. writes:
-   the endings of what can be written; with a '?' in front the program writes only when --out asks for it. */
+/* Reads the command line into the options' values. Prints help or what is wrong, and leaves the program, by itself.
+   writes: the endings of what can be written; with a '?' in front the program writes only when --out asks for it. */
 static inline void common_parse(common_settings *common, int argc, char **argv, const char *name, const char *writes,
                                 const common_option *options, int count)
 {
-    const common_option shared[4] = {{"out", 's', (void *)&common->out, 0, 0, "file to write; -o for short"},
-                                     {"threads", 'i', &common->workers, 0, 64, "worker threads; 0: as many as there are processors"},
-                                     {"stats", 'b', &common->stats, 0, 0, "print times and what was left out"},
-                                     {"help", 'b', NULL, 0, 0, "this list"}};
+    const common_option shared[4] = {
+        {"out", 's', (void *)&common->out, 0, 0, "file to write; -o for short"},
+        {"threads", 'i', &common->workers, 0, 64, "worker threads; 0: as many as there are processors"},
+        {"stats", 'b', &common->stats, 0, 0, "print times and what was left out"},
+        {"help", 'b', NULL, 0, 0, "this list"}};
     common_option all[COMMON_MAX_OPTIONS + 4];
     struct option words[COMMON_MAX_OPTIONS + 5];
     int i, found, picked = 0, inputs = 0, n = count < COMMON_MAX_OPTIONS ? count : COMMON_MAX_OPTIONS;
@@ -414,7 +434,8 @@ static inline void common_parse(common_settings *common, int argc, char **argv, 
         if (found == 'o') picked = n;
         if (found == 'h' || picked == n + 3) {
             common_help(name, all, n + 4, inputs);
-            printf("\nwrites %s; without --out %s%s%s\n", common->writes, writes[0] == '?' ? "nothing" : "out/", writes[0] == '?' ? "" : name, writes[0] == '?' ? "" : ".png");
+            printf("\nwrites %s; without --out %s%s%s\n", common->writes, writes[0] == '?' ? "nothing" : "out/",
+                   writes[0] == '?' ? "" : name, writes[0] == '?' ? "" : ".png");
             exit(0);
         }
         if (!common_set(&all[picked], optarg)) {
@@ -475,7 +496,8 @@ static inline void common_text(common_canvas *canvas, int left, int top, const c
 typedef struct common_cell { const unsigned char *rgb; int width, height; const char *label; } common_cell;
 
 /* Writes a PNG of all cells, `columns` a row, each under its label: 1, or 0 with a sentence on stderr. */
-static inline int common_contact_sheet(const common_settings *common, const char *path, const common_cell *cells, int count, int columns)
+static inline int common_contact_sheet(const common_settings *common, const char *path, const common_cell *cells,
+                                       int count, int columns)
 {
     enum { GAP = 4, BAR = 14 };
     common_canvas sheet;

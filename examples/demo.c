@@ -4,7 +4,8 @@
        demo --hour night --rate 20mm --out night.png
        demo forest.exr bunny.ply                      other light, another sculpture
        demo --no-shadows --no-occlusion               each stage can be left out
-       demo --mosaic                                  the picture again, from tiles cut out of it, each used once: out/demo_mosaic.png
+       demo --mosaic                                  the picture again, from tiles cut out of it, each used once:
+                                                      out/demo_mosaic.png
        demo --frames 60 --out rain.png                rain_0000.png and so on, 30 a second
 
    A .png is tone-mapped; .exr, .hdr and .pfm hold what comes before that. */
@@ -47,8 +48,8 @@ static void print_table(const pipeline *p, const gl_context *context)
     printf("%-10s %9s  %-28s %s\n", "stage", "ms", "error (reference)", "what was left out");
     snprintf(rest, sizeof rest, "%d lights split off with %.0f %% of the light", p->light_stats.lights, 100 * (double)p->light_stats.light_share);
     print_row("light", p->seconds[PIPELINE_LIGHT], "-", rest);
-    snprintf(rest, sizeof rest, "%zu + %zu masks in %.1f MB, once for a shape", p->mask_stats[0].rasterised, p->mask_stats[1].rasterised,
-             1e-6 * (double)(p->mask_stats[0].bytes + p->mask_stats[1].bytes));
+    snprintf(rest, sizeof rest, "%zu + %zu masks in %.1f MB, once for a shape", p->mask_stats[0].rasterised,
+             p->mask_stats[1].rasterised, 1e-6 * (double)(p->mask_stats[0].bytes + p->mask_stats[1].bytes));
     print_row("masks", p->seconds[PIPELINE_MASKS], "-", rest);
     print_row("scene", p->seconds[PIPELINE_SCENE], "-", "");
     if (p->options.shadows && p->gl)
@@ -61,8 +62,9 @@ static void print_table(const pipeline *p, const gl_context *context)
     if (p->options.occlusion && p->gl)
         print_row("occlusion", p->seconds[PIPELINE_OCCLUSION], percent(error, sizeof error, reference_occlusion_error(p), "rms (CPU, all pixels)"), gpu);
     else if (p->options.occlusion) {
-        snprintf(rest, sizeof rest, "sky %.0f %%, flat %.0f %%, too small %.0f %% of %zu pixels", 100 * (double)a->sky / (double)a->pixels,
-                 100 * (double)a->flat / (double)a->pixels, 100 * (double)a->tiny / (double)a->pixels, a->pixels);
+        snprintf(rest, sizeof rest, "sky %.0f %%, flat %.0f %%, too small %.0f %% of %zu pixels",
+                 100 * (double)a->sky / (double)a->pixels, 100 * (double)a->flat / (double)a->pixels,
+                 100 * (double)a->tiny / (double)a->pixels, a->pixels);
         print_row("occlusion", p->seconds[PIPELINE_OCCLUSION], percent(error, sizeof error, reference_occlusion_error(p), "rms (all pixels)"), rest);
     }
     print_row("shade", p->seconds[PIPELINE_SHADE], "-", "");
@@ -78,8 +80,8 @@ static void print_table(const pipeline *p, const gl_context *context)
         return;
     }
     snprintf(rest, sizeof rest, "%.1f decades; key %.3g; %.1f %% clipped; neighbourhoods searched %zu, skipped %zu",
-             t->low > 0 ? log10(t->high / t->low) : 0.0, t->key, 100 * (double)t->clamped / (double)(p->hdr.width * p->hdr.height),
-             t->searched, t->skipped);
+             t->low > 0 ? log10(t->high / t->low) : 0.0, t->key,
+             100 * (double)t->clamped / (double)(p->hdr.width * p->hdr.height), t->searched, t->skipped);
     print_row("tone", p->seconds[PIPELINE_TONE], "0 (exact search)", rest);
 }
 
@@ -125,7 +127,8 @@ static int run(pipeline *p, const gl_context *context, int frames, const common_
 int main(int argc, char **argv)
 {
     const char *env = NULL, *shape = NULL;
-    int hour = 0, operation = 0, mesopic, size[2] = {1280, 720}, frames = 1, gl = 0, mosaic = 0, no_shadows = 0, no_occlusion = 0, no_rain = 0, no_tone = 0, ok;
+    int hour = 0, operation = 0, mesopic, size[2] = {1280, 720}, frames = 1, gl = 0, mosaic = 0, no_shadows = 0,
+        no_occlusion = 0, no_rain = 0, no_tone = 0, ok;
     pipeline_options o = pipeline_defaults();
     const common_option options[] = {
         {"env", 'P', (void *)&env, 0, 0, "equirectangular picture of the light; without it a sky of our own"},
@@ -155,7 +158,8 @@ int main(int argc, char **argv)
     gl_context context;
     pipeline p;
     mesopic = o.mesopic;
-    common_parse(&common, argc, argv, "demo", ".png .exr .hdr .pfm", options, (int)(sizeof options / sizeof options[0]));
+    common_parse(&common, argc, argv, "demo", ".png .exr .hdr .pfm", options,
+                 (int)(sizeof options / sizeof options[0]));
     o.hour = (scene_hour)hour;
     o.operation = (tonemap_operator)operation;
     o.mesopic = (tonemap_mesopic)mesopic;

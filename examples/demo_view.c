@@ -39,8 +39,18 @@
     proc = glfwGetProcAddress("gl" #name);                                                         \
     memcpy(&v->name, &proc, sizeof proc);                                                          \
     if (!proc) return 0;
-enum { VIEW_TEXTURE_2D = 0x0DE1, VIEW_RGB = 0x1907, VIEW_UNSIGNED_BYTE = 0x1401, VIEW_UNPACK_ALIGNMENT = 0x0CF5, VIEW_PACK_ALIGNMENT = 0x0D05,
-       VIEW_READ_FRAMEBUFFER = 0x8CA8, VIEW_FRAMEBUFFER = 0x8D40, VIEW_COLOR_ATTACHMENT0 = 0x8CE0, VIEW_COLOR_BUFFER_BIT = 0x4000, VIEW_LINEAR = 0x2601 };
+enum {
+    VIEW_TEXTURE_2D = 0x0DE1,
+    VIEW_RGB = 0x1907,
+    VIEW_UNSIGNED_BYTE = 0x1401,
+    VIEW_UNPACK_ALIGNMENT = 0x0CF5,
+    VIEW_PACK_ALIGNMENT = 0x0D05,
+    VIEW_READ_FRAMEBUFFER = 0x8CA8,
+    VIEW_FRAMEBUFFER = 0x8D40,
+    VIEW_COLOR_ATTACHMENT0 = 0x8CE0,
+    VIEW_COLOR_BUFFER_BIT = 0x4000,
+    VIEW_LINEAR = 0x2601
+};
 
 typedef struct view {
     VIEW_FUNCTIONS(VIEW_MEMBER)
@@ -130,16 +140,25 @@ static void view_key(GLFWwindow *window, int key, int scan, int action, int modi
 static void view_overlay(view *v, double seconds)
 {
     static const char *const names[] = {"", "", "scene", "shadows", "occlusion", "shade", "rain", "tone"};
-    static const char *const keys[] = {"S O R T     shadows, occlusion, rain, tone mapping", "G H M P     OpenGL, hour, mesopic vision, operator",
-        "left right  turn the light", "up down     exposure", "page keys   rain", "home end    reach of occlusion", "space Esc   pause, quit"};
+    static const char *const keys[] = {"S O R T     shadows, occlusion, rain, tone mapping",
+                                       "G H M P     OpenGL, hour, mesopic vision, operator",
+                                       "left right  turn the light",
+                                       "up down     exposure",
+                                       "page keys   rain",
+                                       "home end    reach of occlusion",
+                                       "space Esc   pause, quit"};
     common_canvas canvas;
     char text[160];
     size_t i;
     int k, n;
     canvas.rgb = v->p.pixels, canvas.width = v->p.options.width, canvas.height = v->p.options.height;
-    for (i = 0; i < (size_t)(v->help ? 110 : 28) * (size_t)canvas.width * 3 && i < (size_t)canvas.height * (size_t)canvas.width * 3; ++i) canvas.rgb[i] /= 3;
+    for (i = 0; i < (size_t)(v->help ? 110 : 28) * (size_t)canvas.width * 3 &&
+                i < (size_t)canvas.height * (size_t)canvas.width * 3;
+         ++i)
+        canvas.rgb[i] /= 3;
     n = snprintf(text, sizeof text, "%s %.0f ms ", v->p.options.get_proc ? "OpenGL" : "CPU", 1e3 * seconds);
-    for (k = PIPELINE_SCENE; k < PIPELINE_STAGES; ++k) n += snprintf(text + n, sizeof text - (size_t)n, " %s %.0f", names[k], 1e3 * v->p.seconds[k]);
+    for (k = PIPELINE_SCENE; k < PIPELINE_STAGES; ++k)
+        n += snprintf(text + n, sizeof text - (size_t)n, " %s %.0f", names[k], 1e3 * v->p.seconds[k]);
     common_text(&canvas, 6, 6, text, 1);
     snprintf(text, sizeof text, "%.0f mm/h  reach %.2f m  light %+.0f deg  exposure %+.2f  F1 keys", (double)v->wanted.rate,
              (double)v->wanted.ao_radius, (double)v->wanted.turn, (double)v->wanted.exposure);

@@ -1,6 +1,7 @@
 /* demo_web - the demo in a browser: demo_web.html calls these functions.  SPDX-License-Identifier: MIT-0 OR Unlicense
 
-   `make web` builds it with emscripten into out/web/index.html; without a browser it is a program that draws one frame. */
+   `make web` builds it with emscripten into out/web/index.html; without a browser it is a program that draws one
+   frame. */
 
 #define _POSIX_C_SOURCE 200809L
 #define LIGHTSCAN_IMPLEMENTATION
@@ -90,7 +91,8 @@ static web_function *web_get_proc(const char *name)
     return (web_function *)(function ? function : emscripten_webgl1_get_proc_address(name));
 }
 
-/* From the next picture on every stage by WebGL 2, on the canvas #stages; 0 when the browser has not what that needs. */
+/* From the next picture on every stage by WebGL 2, on the canvas #stages; 0 when the browser has not what that
+   needs. */
 EMSCRIPTEN_KEEPALIVE int web_use_gl(int on)
 {
     static EMSCRIPTEN_WEBGL_CONTEXT_HANDLE context;
@@ -195,7 +197,8 @@ EMSCRIPTEN_KEEPALIVE int web_photo_set(const char *name, double value)
 EMSCRIPTEN_KEEPALIVE const unsigned char *web_photo(void)
 {
     size_t i, pixels = (size_t)photo.width * (size_t)photo.height;
-    if (!photo.pixels || tonemap_once_u8(photo_rgba, photo.pixels, photo.width, photo.height, 3, &photo_options) != SAT_OK) {
+    if (!photo.pixels ||
+        tonemap_once_u8(photo_rgba, photo.pixels, photo.width, photo.height, 3, &photo_options) != SAT_OK) {
         if (photo.pixels) tonemap_explain(message, sizeof message, photo.width, photo.height, &photo_options);
         return NULL;
     }
@@ -219,7 +222,9 @@ int main(int argc, char **argv)
     const common_option options[] = {{"env", 'P', (void *)&light, 0, 0, "equirectangular picture of the light; without it a sky of our own"}};
     common_settings common;
     common_parse(&common, argc, argv, "demo_web", ".png", options, 1);
-    ok = ((!light || web_open(light)) && web_create(640, 360, SCENE_DUSK) && web_prepare() == 1 && web_prepare() == 0 && web_frame(0)) || common_say(&common, message);
+    ok = ((!light || web_open(light)) && web_create(640, 360, SCENE_DUSK) && web_prepare() == 1 && web_prepare() == 0 &&
+          web_frame(0)) ||
+         common_say(&common, message);
     ok = ok && common_save_u8(&common, common.out, rgba, 640, 360, 4);
     pipeline_destroy(&web);
     image_free(&dropped[0]), image_free(&dropped[1]), image_free(&dropped[2]);

@@ -5,9 +5,9 @@
        if (file_open(&file, "out.png", why)) file_put(&file, bytes, count);
        if (!file_close(&file, 1, why)) { fprintf(stderr, "%s\n", why); return 1; }
 
-   The bytes go into a file beside the named one, which takes its name when all of them are on the disk: a full disk, or a
-   program that is stopped, leaves the old file as it was. Symbolic links are followed. What is no plain file (a device, a
-   pipe) is written as it is. Needs POSIX, or Windows' C library with its POSIX names (mingw). */
+   The bytes go into a file beside the named one, which takes its name when all of them are on the disk: a full disk, or
+   a program that is stopped, leaves the old file as it was. Symbolic links are followed. What is no plain file (a
+   device, a pipe) is written as it is. Needs POSIX, or Windows' C library with its POSIX names (mingw). */
 
 #ifndef FILE_H
 #define FILE_H
@@ -57,11 +57,14 @@ static inline int file_fail_errno(char *why, const char *path, int error)
     struct stat s;
     snprintf(folder, sizeof folder, "%.*s.", (int)file_folder(path), path);
     snprintf(text, sizeof text, "cannot be written: %.100s",
-             error != ENOENT ? strerror(error) : stat(folder, &s) ? "there is no such folder" : "files cannot be made in this folder");
+             error != ENOENT    ? strerror(error)
+             : stat(folder, &s) ? "there is no such folder"
+                                : "files cannot be made in this folder");
     return file_fail(why, path, text);
 }
 
-/* The path of what the symbolic links at its end lead to, there or not: 0 when they lead nowhere or the path is too long. */
+/* The path of what the symbolic links at its end lead to, there or not: 0 when they lead nowhere or the path is too
+   long. */
 static inline int file_follow(char *out, const char *path)
 {
     size_t n = strlen(path);
@@ -99,7 +102,9 @@ static inline int file_identify(file_id *id, const char *path)
         int i;
         if (!_fullpath(full, path, FILE_PATH)) return 0;
         id->volume = 0, id->number = 14695981039346656037ull; /* FNV-1a of the whole path */
-        for (i = 0; full[i]; ++i) id->number = (id->number ^ (unsigned char)(full[i] >= 'A' && full[i] <= 'Z' ? full[i] + 32 : full[i])) * 1099511628211ull;
+        for (i = 0; full[i]; ++i)
+            id->number = (id->number ^ (unsigned char)(full[i] >= 'A' && full[i] <= 'Z' ? full[i] + 32 : full[i])) *
+                         1099511628211ull;
     }
 #else
     id->volume = (unsigned long long)s.st_dev, id->number = (unsigned long long)s.st_ino;
@@ -190,7 +195,9 @@ static inline unsigned char *file_read(const char *path, size_t *size, char *why
     unsigned char *bytes = NULL;
     size_t room = 0, n;
     *size = 0;
-    if (!file) return file_fail(why, path, errno == ENOENT ? "cannot be opened: there is no such file" : strerror(errno)), (unsigned char *)NULL;
+    if (!file)
+        return file_fail(why, path, errno == ENOENT ? "cannot be opened: there is no such file" : strerror(errno)),
+               (unsigned char *)NULL;
     errno = 0;
     do {
         if (*size == room) {

@@ -25,7 +25,8 @@ int main(void)
     for (y = 0; y < SKY / 4; y++) /* blue above the horizon, and a sun */
         for (x = 0; x < SKY; x++)
             for (c = 0; c < 3; c++)
-                sky[3 * (y * SKY + x) + c] = (x > 38 && x < 44 && y > 12 && y < 18) ? 160 - 20 * (float)c : 0.6f + 0.3f * (float)c;
+                sky[3 * (y * SKY + x) + c] =
+                    (x > 38 && x < 44 && y > 12 && y < 18) ? 160 - 20 * (float)c : 0.6f + 0.3f * (float)c;
     for (y = 0; y < SIDE; y++)
         for (x = 0; x < SIDE; x++) {
             float *p = points + 3 * (y * SIDE + x);
@@ -33,8 +34,9 @@ int main(void)
             up[3 * (y * SIDE + x) + 1] = 1;
         }
     result = fiv_environment_create(&environment, &picture, NULL, NULL);
-    if (!result) result = fiv_occluder_create(&occluder, corners, 6, triangles, 8, NULL, NULL); /* slow, once for a shape */
-    if (!result) result = fiv_occluder_light(occluder, environment, NULL);                   /* when the light changes */
+    if (!result)
+        result = fiv_occluder_create(&occluder, corners, 6, triangles, 8, NULL, NULL); /* slow, once for a shape */
+    if (!result) result = fiv_occluder_light(occluder, environment, NULL); /* when the light changes */
     instance.occluder = occluder;
     if (!result) result = fiv_irradiance(light, points, up, SIDE * SIDE, environment, &instance, 1, NULL, NULL);
     if (result) {

@@ -19,7 +19,8 @@ int main(void)
     for (y = 0; y < HEIGHT; y++) /* rings on squares */
         for (x = 0; x < WIDTH; x++) {
             int dx = x % 160 - 80, dy = y % 120 - 60;
-            pixels[y * WIDTH + x] = (float)(((x / 10 + y / 10) % 2 ? 60 : 120) + ((dx * dx + dy * dy) / 400 % 2 ? 120 : 0));
+            pixels[y * WIDTH + x] =
+                (float)(((x / 10 + y / 10) % 2 ? 60 : 120) + ((dx * dx + dy * dy) / 400 % 2 ? 120 : 0));
         }
     result = sat_create(&table, WIDTH, HEIGHT, 1, NULL); /* the only allocation */
     if (result == SAT_OK) result = sat_build(table, &image);

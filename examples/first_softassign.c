@@ -7,7 +7,17 @@
 #include "../softassign.h"
 #include "png.h"
 
-enum { GRID = 32, SHEET = 64, TILE = 12, SIDE = GRID * TILE, WIDE = SHEET * TILE, CELLS = GRID * GRID, TILES = SHEET * SHEET, PARTS = 2, FEATURES = PARTS * PARTS * 3 };
+enum {
+    GRID = 32,
+    SHEET = 64,
+    TILE = 12,
+    SIDE = GRID * TILE,
+    WIDE = SHEET * TILE,
+    CELLS = GRID * GRID,
+    TILES = SHEET * SHEET,
+    PARTS = 2,
+    FEATURES = PARTS * PARTS * 3
+};
 static unsigned char target[3 * SIDE * SIDE], other[3 * WIDE * WIDE], mosaic[3 * SIDE * SIDE];
 static float wanted[CELLS * FEATURES], offered[TILES * FEATURES];
 static int tile_of_cell[CELLS];
@@ -32,12 +42,15 @@ int main(void)
         for (x = 0; x < SIDE; x++)
             for (c = 0; c < 3; c++) {
                 int dx = x - 200, dy = y - 170, sun = dx * dx + dy * dy < 9000, sea = y > 240;
-                target[3 * (y * SIDE + x) + c] = (unsigned char)(sun && !sea ? 240 - 50 * c : sea ? 30 + 40 * c : 190 - y / 3 - 15 * c);
+                target[3 * (y * SIDE + x) + c] = (unsigned char)(sun && !sea ? 240 - 50 * c
+                                                                 : sea       ? 30 + 40 * c
+                                                                             : 190 - y / 3 - 15 * c);
             }
     for (y = 0; y < WIDE; y++) /* waves of many colours */
         for (x = 0; x < WIDE; x++)
             for (c = 0; c < 3; c++)
-                other[3 * (y * WIDE + x) + c] = (unsigned char)(128 + 80 * sin(0.011 * x + 0.3 * c) + 40 * sin(0.017 * y * (1 + c) + sin(0.1 * x)));
+                other[3 * (y * WIDE + x) + c] =
+                    (unsigned char)(128 + 80 * sin(0.011 * x + 0.3 * c) + 40 * sin(0.017 * y * (1 + c) + sin(0.1 * x)));
     result = softassign_features(wanted, &target_view, GRID, GRID, PARTS, PARTS, NULL); /* what the cells look like */
     if (!result) result = softassign_features(offered, &other_view, SHEET, SHEET, PARTS, PARTS, NULL);
     memset(&problem, 0, sizeof problem);
@@ -45,7 +58,8 @@ int main(void)
     problem.row_features = wanted, problem.column_features = offered;
     problem.feature_count = FEATURES;
     if (!result) result = softassign_solve(tile_of_cell, &problem, NULL, &report);
-    if (!result) result = softassign_mosaic(mosaic, 3 * SIDE, &other_view, TILE, TILE, tile_of_cell, GRID, GRID, NULL, 0);
+    if (!result)
+        result = softassign_mosaic(mosaic, 3 * SIDE, &other_view, TILE, TILE, tile_of_cell, GRID, GRID, NULL, 0);
     if (result) {
         fprintf(stderr, "%s\n", sat_result_text(result));
         return 1;

@@ -36,7 +36,8 @@ int main(void)
     float s = (float)tan(fov / 2) * 2 / HEIGHT;
     int x, y;
     for (y = 0; y < HEIGHT; y++)
-        for (x = 0; x < WIDTH; x++) depth[y * WIDTH + x] = meet(((float)x + 0.5f - WIDTH / 2) * s, (HEIGHT / 2 - (float)y - 0.5f) * s);
+        for (x = 0; x < WIDTH; x++)
+            depth[y * WIDTH + x] = meet(((float)x + 0.5f - WIDTH / 2) * s, (HEIGHT / 2 - (float)y - 0.5f) * s);
     options.radius = 0.6; /* how far away an occluder counts, in units of depth */
     if (ssao_sat_create(&ao, WIDTH, HEIGHT, &options) != SAT_OK) {
         fprintf(stderr, "%s\n", ssao_sat_explain(why, sizeof why, WIDTH, HEIGHT, &options));

@@ -57,7 +57,8 @@ static void make_sky(image *out)
         for (x = 0; x < 512; ++x) {
             float up = cosf(3.14159265f * ((float)y + 0.5f) / 256), turn = 6.2831853f * ((float)x + 0.5f) / 512;
             float *p = out->pixels + 3 * (y * 512 + x), glow = expf(-4 * (1 - cosf(turn - 4)) - 8 * fabsf(up - 0.35f));
-            static const float zenith[3] = {0.25f, 0.30f, 1.0f}, horizon[3] = {0.9f, 0.8f, 0.75f}, ground[3] = {0.15f, 0.13f, 0.1f};
+            static const float zenith[3] = {0.25f, 0.30f, 1.0f}, horizon[3] = {0.9f, 0.8f, 0.75f},
+                               ground[3] = {0.15f, 0.13f, 0.1f};
             for (c = 0; c < 3; ++c) {
                 p[c] = up > 0 ? horizon[c] + (zenith[c] - horizon[c]) * sqrtf(up) + glow * (5 - (float)c) : ground[c];
                 if (abs(x - 326) < 3 && abs(y - 72) < 3) p[c] = 1200 - 200 * (float)c;
@@ -80,7 +81,8 @@ static void make_normals(object *o)
             b[k] = o->positions[3 * i[2] + (unsigned)k] - o->positions[3 * i[0] + (unsigned)k];
         }
         for (j = 0; j < 3; ++j)
-            for (k = 0; k < 3; ++k) o->normals[3 * i[j] + (unsigned)k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+            for (k = 0; k < 3; ++k)
+                o->normals[3 * i[j] + (unsigned)k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
     }
     for (v = 0; v < o->vertices; ++v) {
         float *n = o->normals + 3 * v, length = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
@@ -95,8 +97,11 @@ static void turn_outwards(object *o)
     size_t t;
     int k;
     for (t = 0; t < o->triangles; ++t) {
-        const float *a = o->positions + 3 * o->indices[3 * t], *b = o->positions + 3 * o->indices[3 * t + 1], *c = o->positions + 3 * o->indices[3 * t + 2];
-        for (k = 0; k < 3; ++k) volume += (double)a[k] * ((double)b[(k + 1) % 3] * (double)c[(k + 2) % 3] - (double)b[(k + 2) % 3] * (double)c[(k + 1) % 3]);
+        const float *a = o->positions + 3 * o->indices[3 * t], *b = o->positions + 3 * o->indices[3 * t + 1],
+                    *c = o->positions + 3 * o->indices[3 * t + 2];
+        for (k = 0; k < 3; ++k)
+            volume += (double)a[k] * ((double)b[(k + 1) % 3] * (double)c[(k + 2) % 3] -
+                                      (double)b[(k + 2) % 3] * (double)c[(k + 1) % 3]);
     }
     for (t = 0; t < o->triangles && volume < 0; ++t) {
         unsigned swap = o->indices[3 * t + 1];
@@ -174,12 +179,14 @@ static void look(view *v)
     length = sqrtf(v->axes[0][0] * v->axes[0][0] + v->axes[0][2] * v->axes[0][2]);
     for (k = 0; k < 3; ++k) v->axes[0][k] /= length;
     for (k = 0; k < 3; ++k)
-        v->axes[1][k] = v->axes[0][(k + 1) % 3] * v->axes[2][(k + 2) % 3] - v->axes[0][(k + 2) % 3] * v->axes[2][(k + 1) % 3];
+        v->axes[1][k] =
+            v->axes[0][(k + 1) % 3] * v->axes[2][(k + 2) % 3] - v->axes[0][(k + 2) % 3] * v->axes[2][(k + 1) % 3];
 }
 
 static void pixel_ray(float d[3], const view *v, int x, int y)
 {
-    float s = 2 * 0.30f / (float)v->height, a = ((float)x + 0.5f - 0.5f * (float)v->width) * s, b = (0.5f * (float)v->height - (float)y - 0.5f) * s;
+    float s = 2 * 0.30f / (float)v->height, a = ((float)x + 0.5f - 0.5f * (float)v->width) * s,
+          b = (0.5f * (float)v->height - (float)y - 0.5f) * s;
     int k;
     for (k = 0; k < 3; ++k) d[k] = v->axes[2][k] + a * v->axes[0][k] + b * v->axes[1][k];
 }
@@ -211,8 +218,10 @@ static void draw_triangle(view *v, float p[3][3], float n[3][3], unsigned char w
         for (k = 0; k < 3; ++k) d[k] = p[j][k] - v->eye[k];
         for (k = 0; k < 3; ++k) c[k] = d[0] * v->axes[k][0] + d[1] * v->axes[k][1] + d[2] * v->axes[k][2];
         if (c[2] < 0.1f) return;
-        q[j][0] = c[0] / c[2] * s + 0.5f * (float)v->width, q[j][1] = 0.5f * (float)v->height - c[1] / c[2] * s, q[j][2] = 1 / c[2];
-        for (k = 0; k < 2; ++k) low[k] = q[j][k] < low[k] ? q[j][k] : low[k], high[k] = q[j][k] > high[k] ? q[j][k] : high[k];
+        q[j][0] = c[0] / c[2] * s + 0.5f * (float)v->width, q[j][1] = 0.5f * (float)v->height - c[1] / c[2] * s,
+        q[j][2] = 1 / c[2];
+        for (k = 0; k < 2; ++k)
+            low[k] = q[j][k] < low[k] ? q[j][k] : low[k], high[k] = q[j][k] > high[k] ? q[j][k] : high[k];
     }
     area = (q[1][0] - q[0][0]) * (q[2][1] - q[0][1]) - (q[2][0] - q[0][0]) * (q[1][1] - q[0][1]);
     if (area == 0) return;
@@ -260,7 +269,8 @@ static void draw_object(view *v, const object *o, unsigned char what)
 /* ---- light ---- */
 
 /* Irradiance of all pixels that show `what`: gathered into a row, lit, and put back. */
-static void light_pixels(view *v, const object *objects, int what, const fiv_environment *e, const fiv_irradiance_options *options)
+static void light_pixels(view *v, const object *objects, int what, const fiv_environment *e,
+                         const fiv_irradiance_options *options)
 {
     size_t i, n = 0, pixels = (size_t)v->width * (size_t)v->height;
     float *row = (float *)malloc(9 * pixels * sizeof *row), *normals = row + 3 * pixels, *rgb = row + 6 * pixels;
@@ -270,12 +280,16 @@ static void light_pixels(view *v, const object *objects, int what, const fiv_env
     if (!row) fail("no memory");
     for (i = 0; i < pixels; ++i)
         if (v->what[i] == what) {
-            for (k = 0; k < 3; ++k) row[3 * n + (size_t)k] = v->points[3 * i + (size_t)k] + 0.002f * v->normals[3 * i + (size_t)k];
+            for (k = 0; k < 3; ++k)
+                row[3 * n + (size_t)k] = v->points[3 * i + (size_t)k] + 0.002f * v->normals[3 * i + (size_t)k];
             memcpy(normals + 3 * n++, v->normals + 3 * i, 3 * sizeof *normals);
         }
     for (k = 0; k < OBJECTS; ++k)
         if (k + 2 != what) casters[others++] = objects[k].instance;
-    if (what >= 2) check(fiv_self_irradiance(rgb, row, normals, n, e, &objects[what - 2].instance, casters, (size_t)others, options, &stats), "self");
+    if (what >= 2)
+        check(fiv_self_irradiance(rgb, row, normals, n, e, &objects[what - 2].instance, casters, (size_t)others,
+                                  options, &stats),
+              "self");
     else check(fiv_irradiance(rgb, row, normals, n, e, casters, (size_t)others, options, &stats), "irradiance");
     for (i = n = 0; i < pixels; ++i)
         if (v->what[i] == what) memcpy(v->light + 3 * i, rgb + 3 * n++, 3 * sizeof *rgb);
@@ -338,7 +352,8 @@ static void shade(view *v, const object *objects, const image *sky, const float 
             size_t i = (size_t)(y * v->width + x);
             const float *colour = v->what[i] >= 2 ? objects[v->what[i] - 2].colour : ground;
             if (v->what[i]) {
-                for (k = 0; k < 3; ++k) v->radiance[3 * i + (size_t)k] = v->light[3 * i + (size_t)k] * colour[k] * 0.318309886f;
+                for (k = 0; k < 3; ++k)
+                    v->radiance[3 * i + (size_t)k] = v->light[3 * i + (size_t)k] * colour[k] * 0.318309886f;
             } else {
                 float d[3], w[3], u;
                 int px, py;
@@ -346,8 +361,11 @@ static void shade(view *v, const object *objects, const image *sky, const float 
                 for (k = 0; k < 3; ++k) w[k] = turn[k] * d[0] + turn[3 + k] * d[1] + turn[6 + k] * d[2];
                 u = atan2f(w[0], -w[2]) / 6.2831853f + 0.5f;
                 px = sat__clamp_int((int)(u * (float)sky->width), 0, sky->width - 1);
-                py = sat__clamp_int((int)(acosf(w[1] / sqrtf(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])) / 3.14159265f * (float)sky->height), 0, sky->height - 1);
-                memcpy(v->radiance + 3 * i, sky->pixels + 3 * ((size_t)py * (size_t)sky->width + (size_t)px), 3 * sizeof(float));
+                py = sat__clamp_int((int)(acosf(w[1] / sqrtf(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])) / 3.14159265f *
+                                          (float)sky->height),
+                                    0, sky->height - 1);
+                memcpy(v->radiance + 3 * i, sky->pixels + 3 * ((size_t)py * (size_t)sky->width + (size_t)px),
+                       3 * sizeof(float));
             }
         }
 }
@@ -412,10 +430,13 @@ static void open_program(program *p, const char *environment, const char *meshes
         object *o = &p->objects[i];
         double start = common_clock();
         open_object(o, meshes[i], i);
-        check(fiv_occluder_create(&o->occluder, o->positions, o->vertices, o->indices, o->triangles, &options, &o->stats), "occluder");
+        check(
+            fiv_occluder_create(&o->occluder, o->positions, o->vertices, o->indices, o->triangles, &options, &o->stats),
+            "occluder");
         if (p->common.stats)
             printf("%lu triangles: %lu masks in %.2f s, vectors %.2f MB, masks %.2f MB\n", (unsigned long)o->triangles,
-                   (unsigned long)o->stats.rasterised, common_clock() - start, 1e-6 * (double)o->stats.table_bytes, 1e-6 * (double)o->stats.mask_bytes);
+                   (unsigned long)o->stats.rasterised, common_clock() - start, 1e-6 * (double)o->stats.table_bytes,
+                   1e-6 * (double)o->stats.mask_bytes);
         memcpy(o->colour, colours[i], sizeof o->colour);
     }
     p->v.width = size[0], p->v.height = size[1];
@@ -472,7 +493,8 @@ int main(int argc, char **argv)
         cells[i].width = size[0], cells[i].height = size[1];
         cells[i].label = compare ? (i == 0 ? "vectors" : i == 1 ? "rays" : "difference x 4") : labels[i];
         if (compare && i == 2) break;
-        cells[i].rgb = picture(&p, !compare && i < 3 ? 70.0f * (float)i : 0.0f, i >= 3 ? 70.0f * (float)(i - 3) : 0.0f, compare && i == 1);
+        cells[i].rgb = picture(&p, !compare && i < 3 ? 70.0f * (float)i : 0.0f, i >= 3 ? 70.0f * (float)(i - 3) : 0.0f,
+                               compare && i == 1);
     }
     if (compare) {
         difference = (unsigned char *)malloc(3 * (size_t)size[0] * (size_t)size[1]);

@@ -175,7 +175,8 @@ static inline int gl_context_open_egl(gl_context *gl, int major, int minor)
     gl->get_proc = egl.get_proc;
     if (egl.platform_display && egl.devices && egl.devices(16, devices, &count))
         for (i = 0; i < count; ++i)   /* EGL_PLATFORM_DEVICE_EXT */
-            if (gl_context_try_display(gl, &egl, egl.platform_display(0x313F, devices[i], NULL), major, minor)) return 1;
+            if (gl_context_try_display(gl, &egl, egl.platform_display(0x313F, devices[i], NULL), major, minor))
+                return 1;
     if (egl.platform_display &&       /* EGL_PLATFORM_SURFACELESS_MESA */
         gl_context_try_display(gl, &egl, egl.platform_display(0x31DD, NULL, NULL), major, minor)) return 1;
     if (gl_context_try_display(gl, &egl, egl.get_display(NULL), major, minor)) return 1;

@@ -52,7 +52,8 @@ static inline int image_create(image *out, int width, int height, int channels)
 {
     memset(out, 0, sizeof *out);
     if (width < 1 || height < 1 || channels < 1 || width > IMAGE_MAX_SIDE || height > IMAGE_MAX_SIDE || channels > 4) {
-        snprintf(out->message, sizeof out->message, "%d x %d pixels of %d channels is no picture", width, height, channels);
+        snprintf(out->message, sizeof out->message, "%d x %d pixels of %d channels is no picture", width, height,
+                 channels);
         return 0;
     }
     out->pixels = (float *)calloc((size_t)width * (size_t)height, (size_t)channels * sizeof(float));
@@ -134,7 +135,10 @@ static inline int image_save_pfm(image *picture, const char *path)
             for (c = 0; c < channels; ++c) {
                 unsigned char bytes[4];
                 uint32_t bits;
-                memcpy(&bits, picture->pixels + ((size_t)y * (size_t)picture->width + (size_t)x) * (size_t)picture->channels + c, 4);
+                memcpy(&bits,
+                       picture->pixels + ((size_t)y * (size_t)picture->width + (size_t)x) * (size_t)picture->channels +
+                           c,
+                       4);
                 bytes[0] = (unsigned char)bits, bytes[1] = (unsigned char)(bits >> 8);
                 bytes[2] = (unsigned char)(bits >> 16), bytes[3] = (unsigned char)(bits >> 24);
                 file_put(&file, bytes, 4);
@@ -142,9 +146,11 @@ static inline int image_save_pfm(image *picture, const char *path)
     return file_close(&file, 1, picture->message);
 }
 
-/* ---- Radiance HDR: lines of text, then rows of bytes R G B and a common exponent (Ward, Graphics Gems II, 1991) ---- */
+/* ---- Radiance HDR: lines of text, then rows of bytes R G B and a common exponent (Ward, Graphics Gems II, 1991)
+   ---- */
 
-/* One row of four bytes a pixel: run lengths a component since 1991, before that plain pixels. 0: the bytes end too early. */
+/* One row of four bytes a pixel: run lengths a component since 1991, before that plain pixels. 0: the bytes end too
+   early. */
 static inline int image_hdr_row(unsigned char *row, int width, const unsigned char **at, const unsigned char *end)
 {
     const unsigned char *p = *at;
@@ -203,15 +209,16 @@ static inline int image_load_hdr(image *out, const char *path)
         if (!image_hdr_row(row, width, &at, end)) why = "ends too early or is damaged";
         for (x = 0; !why && x < width; ++x)
             for (c = 0; c < 3; ++c)
-                out->pixels[3 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c] = row[4 * x + 3] ? (float)ldexp(row[4 * x + c], row[4 * x + 3] - 136) : 0.0f;
+                out->pixels[3 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c] =
+                    row[4 * x + 3] ? (float)ldexp(row[4 * x + c], row[4 * x + 3] - 136) : 0.0f;
     }
     free(row);
     free(bytes);
     return why ? image_fail(out, path, why) : 1;
 }
 
-/* The common exponent is that of the largest component: the others keep what is above 1/256 of it. NaN and what is below
-   0 become 0. */
+/* The common exponent is that of the largest component: the others keep what is above 1/256 of it. NaN and what is
+   below 0 become 0. */
 static inline void image_hdr_pixel(unsigned char *out, const float *rgb, int channels)
 {
     double v[3], most = 0;
@@ -251,9 +258,13 @@ static inline int image_save_hdr(image *picture, const char *path)
 #include <stb/stb_image.h>
 #include <stb/stb_image_write.h>
 
-static inline int image_jpeg_u16(const unsigned char *p, int little) { return little ? p[0] | p[1] << 8 : p[0] << 8 | p[1]; }
+static inline int image_jpeg_u16(const unsigned char *p, int little)
+{
+    return little ? p[0] | p[1] << 8 : p[0] << 8 | p[1];
+}
 
-/* What the camera says about the way it was held (EXIF 2.3, tag 0x0112): 1 to 8, 1 when it says nothing. p: an APP1 segment. */
+/* What the camera says about the way it was held (EXIF 2.3, tag 0x0112): 1 to 8, 1 when it says nothing. p: an APP1
+   segment. */
 static inline int image_jpeg_turn(const unsigned char *p, size_t size)
 {
     size_t ifd, i, entries;
@@ -261,7 +272,8 @@ static inline int image_jpeg_turn(const unsigned char *p, size_t size)
     if (size < 22 || memcmp(p, "Exif\0\0", 6) != 0) return 1;
     p += 6, size -= 6;
     little = p[0] == 'I';
-    ifd = little ? (size_t)p[4] | (size_t)p[5] << 8 | (size_t)p[6] << 16 : (size_t)p[7] | (size_t)p[6] << 8 | (size_t)p[5] << 16;
+    ifd = little ? (size_t)p[4] | (size_t)p[5] << 8 | (size_t)p[6] << 16
+                 : (size_t)p[7] | (size_t)p[6] << 8 | (size_t)p[5] << 16;
     if (ifd + 2 > size) return 1;
     entries = (size_t)image_jpeg_u16(p + ifd, little);
     for (i = 0; i < entries && ifd + 14 + 12 * i <= size; ++i) {
@@ -289,19 +301,25 @@ static inline const char *image_jpeg_check(const unsigned char *p, size_t size, 
     return "ends too early";
 }
 
-/* The picture as the camera was held. Bit 0 of `how`: mirror left and right; 1: top and bottom; 2: swap x and y afterwards. */
+/* The picture as the camera was held. Bit 0 of `how`: mirror left and right; 1: top and bottom; 2: swap x and y
+   afterwards. */
 static inline int image_turn(image *picture, int turn)
 {
     static const unsigned char ways[8] = {0, 1, 3, 2, 4, 6, 7, 5};
     int how = ways[turn - 1], x, y;
     image from = *picture;
     if (how == 0) return 1;
-    if (!image_create(picture, how & 4 ? from.height : from.width, how & 4 ? from.width : from.height, 3)) { image_free(&from); return 0; }
+    if (!image_create(picture, how & 4 ? from.height : from.width, how & 4 ? from.width : from.height, 3)) {
+        image_free(&from);
+        return 0;
+    }
     for (y = 0; y < from.height; ++y)
         for (x = 0; x < from.width; ++x) {
             int u = how & 1 ? from.width - 1 - x : x, v = how & 2 ? from.height - 1 - y : y;
-            size_t to = how & 4 ? (size_t)u * (size_t)picture->width + (size_t)v : (size_t)v * (size_t)picture->width + (size_t)u;
-            memcpy(picture->pixels + 3 * to, from.pixels + 3 * ((size_t)y * (size_t)from.width + (size_t)x), 3 * sizeof(float));
+            size_t to = how & 4 ? (size_t)u * (size_t)picture->width + (size_t)v
+                                : (size_t)v * (size_t)picture->width + (size_t)u;
+            memcpy(picture->pixels + 3 * to, from.pixels + 3 * ((size_t)y * (size_t)from.width + (size_t)x),
+                   3 * sizeof(float));
         }
     image_free(&from);
     return 1;
@@ -317,14 +335,16 @@ static inline int image_load_stb(image *out, const char *path)
     if (!file) return 0;
     if (size > 0x7fffffff) why = "is too large";
     else if (size > 2 && file[0] == 0xff && file[1] == 0xd8) why = image_jpeg_check(file, size, &turn);
-    if (!why && stbi_is_16_bit_from_memory(file, (int)size)) words = stbi_load_16_from_memory(file, (int)size, &width, &height, &channels, 3);
+    if (!why && stbi_is_16_bit_from_memory(file, (int)size))
+        words = stbi_load_16_from_memory(file, (int)size, &width, &height, &channels, 3);
     else if (!why) bytes = stbi_load_from_memory(file, (int)size, &width, &height, &channels, 3);
     free(file);
     if (!why && !words && !bytes) why = stbi_failure_reason();
     if (why) image_fail(out, path, why);
     else if (image_create(out, width, height, 3)) {
         n = (size_t)width * (size_t)height * 3;
-        for (i = 0; i < n; ++i) out->pixels[i] = sat__srgb_decode(words ? (float)words[i] / 65535.0f : (float)bytes[i] / 255.0f);
+        for (i = 0; i < n; ++i)
+            out->pixels[i] = sat__srgb_decode(words ? (float)words[i] / 65535.0f : (float)bytes[i] / 255.0f);
         image_turn(out, turn);
     }
     stbi_image_free(words);
@@ -357,7 +377,8 @@ static inline int image_write_png(file_writer *file, const unsigned char *bytes,
 #endif
 
 /* A PNG of 8-bit pixels as they are (sRGB), 1 to 4 channels: 1, or 0 with a sentence (FILE_MESSAGE bytes, or NULL). */
-static inline int image_save_u8(char *why, const char *path, const unsigned char *bytes, int width, int height, int channels)
+static inline int image_save_u8(char *why, const char *path, const unsigned char *bytes, int width, int height,
+                                int channels)
 {
     file_writer file;
     int ok;
@@ -405,16 +426,18 @@ static inline int image_save_exr(image *picture, const char *path, int half)
 static inline int image_load(image *out, const char *path)
 {
     memset(out, 0, sizeof *out);
-    if (access(path, R_OK)) return image_fail(out, path, errno == ENOENT ? "cannot be opened: there is no such file" : strerror(errno));
+    if (access(path, R_OK))
+        return image_fail(out, path, errno == ENOENT ? "cannot be opened: there is no such file" : strerror(errno));
     if (image_ends_with(path, ".exr")) return image_load_exr(out, path);
     if (image_ends_with(path, ".pfm")) return image_load_pfm(out, path);
     if (image_ends_with(path, ".hdr")) return image_load_hdr(out, path);
-    if (image_ends_with(path, ".png") || image_ends_with(path, ".jpg") || image_ends_with(path, ".jpeg")) return image_load_stb(out, path);
+    if (image_ends_with(path, ".png") || image_ends_with(path, ".jpg") || image_ends_with(path, ".jpeg"))
+        return image_load_stb(out, path);
     return image_fail(out, path, "is none of .exr .hdr .pfm .png .jpg");
 }
 
-/* .exr and .pfm keep every float (image_save_exr can halve them), .hdr keeps 8 bits of what is not negative, .png clamps to
-   [0, 1]. */
+/* .exr and .pfm keep every float (image_save_exr can halve them), .hdr keeps 8 bits of what is not negative, .png
+   clamps to [0, 1]. */
 static inline int image_save(image *picture, const char *path)
 {
     if (image_ends_with(path, ".exr")) return image_save_exr(picture, path, 0);

@@ -17,8 +17,12 @@ typedef struct image_exr {
     char text[130];                                  /* a sentence of its own */
 } image_exr;
 
-/* The library calls this with its lock held, so that nothing can be asked of it here: the codes of the calls tell enough. */
-static inline void image_exr_error(exr_const_context_t file, exr_result_t code, const char *text) { (void)file, (void)code, (void)text; }
+/* The library calls this with its lock held, so that nothing can be asked of it here: the codes of the calls tell
+   enough. */
+static inline void image_exr_error(exr_const_context_t file, exr_result_t code, const char *text)
+{
+    (void)file, (void)code, (void)text;
+}
 
 static inline void image_exr_initializer(exr_context_initializer_t *options)
 {
@@ -32,7 +36,8 @@ static inline void image_exr_initializer(exr_context_initializer_t *options)
 /* ---- which channels make the picture ---- */
 
 /* The name of the channel that is prefix and name, or NULL. */
-static inline const char *image_exr_find(const exr_attr_chlist_t *list, const char *prefix, int prefix_length, const char *name)
+static inline const char *image_exr_find(const exr_attr_chlist_t *list, const char *prefix, int prefix_length,
+                                         const char *name)
 {
     int i;
     for (i = 0; i < list->num_channels; ++i) {
@@ -60,8 +65,8 @@ static inline int image_exr_three(image_exr *exr, const exr_attr_chlist_t *list,
     return 0;
 }
 
-/* The picture without a layer; else a layer whose name says that it is the picture; else the first layer with colours; else
-   the one channel beside alpha as grey. 0: nothing of that. */
+/* The picture without a layer; else a layer whose name says that it is the picture; else the first layer with colours;
+   else the one channel beside alpha as grey. 0: nothing of that. */
 static inline int image_exr_names(image_exr *exr, const exr_attr_chlist_t *list)
 {
     int i, pass, others = 0;
@@ -88,7 +93,8 @@ static inline const char *image_exr_list(char *text, size_t size, const exr_attr
 {
     size_t used = (size_t)snprintf(text, size, "has neither R, G and B nor a single channel, but");
     int i;
-    for (i = 0; i < list->num_channels && used < size; ++i) used += (size_t)snprintf(text + used, size - used, " %s", list->entries[i].name.str);
+    for (i = 0; i < list->num_channels && used < size; ++i)
+        used += (size_t)snprintf(text + used, size - used, " %s", list->entries[i].name.str);
     return text;
 }
 
@@ -108,7 +114,8 @@ static inline const char *image_exr_choose(image_exr *exr)
     if (exr_get_data_window(exr->file, exr->part, &exr->window) != EXR_ERR_SUCCESS) return "has no data window";
     exr->width = exr->window.max.x - exr->window.min.x + 1;
     exr->height = exr->window.max.y - exr->window.min.y + 1;
-    if (exr->width < 1 || exr->height < 1 || exr->width > IMAGE_MAX_SIDE || exr->height > IMAGE_MAX_SIDE) return "is too large or empty";
+    if (exr->width < 1 || exr->height < 1 || exr->width > IMAGE_MAX_SIDE || exr->height > IMAGE_MAX_SIDE)
+        return "is too large or empty";
     for (i = 0; i < 3 && exr->names[i]; ++i) {
         const exr_attr_chlist_entry_t *entry = list->entries;
         size_t bytes;
@@ -151,7 +158,8 @@ static inline exr_result_t image_exr_chunk(image_exr *exr, const exr_chunk_info_
             channel->user_data_type = channel->data_type;
             channel->user_pixel_stride = channel->bytes_per_element;
             channel->user_line_stride = channel->bytes_per_element * exr->plane_width[i];
-            channel->decode_to_ptr = exr->planes[i] + (py * (size_t)exr->plane_width[i] + px) * (size_t)channel->bytes_per_element;
+            channel->decode_to_ptr =
+                exr->planes[i] + (py * (size_t)exr->plane_width[i] + px) * (size_t)channel->bytes_per_element;
         }
     }
     rc = exr_decoding_choose_default_routines(exr->file, exr->part, &decode);
@@ -239,11 +247,13 @@ static inline image_matrix image_rgb_to_xyz(double xy[4][2])
 /* XYZ under one white to XYZ under another: scaling in the Bradford cone space (Lam 1985). */
 static inline image_matrix image_adapt(const double from[2], const double to[2])
 {
-    static const image_matrix cones = {{{0.8951, 0.2664, -0.1614}, {-0.7502, 1.7135, 0.0367}, {0.0389, -0.0685, 1.0296}}};
+    static const image_matrix cones = {
+        {{0.8951, 0.2664, -0.1614}, {-0.7502, 1.7135, 0.0367}, {0.0389, -0.0685, 1.0296}}};
     image_matrix scaled = cones, inverse = image_invert(&cones);
     int i, j;
     for (i = 0; i < 3; ++i) {
-        double a = cones.m[i][0] * from[0] / from[1] + cones.m[i][1] + cones.m[i][2] * (1 - from[0] - from[1]) / from[1];
+        double a =
+            cones.m[i][0] * from[0] / from[1] + cones.m[i][1] + cones.m[i][2] * (1 - from[0] - from[1]) / from[1];
         double b = cones.m[i][0] * to[0] / to[1] + cones.m[i][1] + cones.m[i][2] * (1 - to[0] - to[1]) / to[1];
         for (j = 0; j < 3; ++j) scaled.m[i][j] *= b / a;
     }
@@ -256,8 +266,9 @@ static inline int image_exr_primaries(const image_exr *exr, double xy[4][2], dou
     const exr_attribute_t *attribute = NULL;
     int i, differs = 0;
     memcpy(xy, rec709, 8 * sizeof(double));
-    if (exr_get_attribute_by_name(exr->file, exr->part, "chromaticities", &attribute) != EXR_ERR_SUCCESS || !attribute ||
-        attribute->type != EXR_ATTR_CHROMATICITIES) return 0;
+    if (exr_get_attribute_by_name(exr->file, exr->part, "chromaticities", &attribute) != EXR_ERR_SUCCESS ||
+        !attribute || attribute->type != EXR_ATTR_CHROMATICITIES)
+        return 0;
     xy[0][0] = (double)attribute->chromaticities->red_x;
     xy[0][1] = (double)attribute->chromaticities->red_y;
     xy[1][0] = (double)attribute->chromaticities->green_x;
@@ -305,7 +316,8 @@ static inline void image_exr_pixels(const image_exr *exr, image *out)
 {
     double rec709[4][2] = {{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}, {0.3127, 0.3290}}, xy[4][2];
     int x, y, c, convert = image_exr_primaries(exr, xy, rec709);
-    image_matrix to_xyz = image_rgb_to_xyz(xy), from_xyz = image_rgb_to_xyz(rec709), adapt = image_adapt(xy[3], rec709[3]), m;
+    image_matrix to_xyz = image_rgb_to_xyz(xy), from_xyz = image_rgb_to_xyz(rec709),
+                 adapt = image_adapt(xy[3], rec709[3]), m;
     from_xyz = image_invert(&from_xyz);
     m = image_multiply(&adapt, &to_xyz);
     m = image_multiply(&from_xyz, &m);
@@ -320,7 +332,9 @@ static inline void image_exr_pixels(const image_exr *exr, image *out)
                 v[2] = blue;
             }
             for (c = 0; c < 3; ++c)
-                pixel[c] = convert && exr->names[1] ? (float)(m.m[c][0] * (double)v[0] + m.m[c][1] * (double)v[1] + m.m[c][2] * (double)v[2]) : v[c];
+                pixel[c] = convert && exr->names[1]
+                               ? (float)(m.m[c][0] * (double)v[0] + m.m[c][1] * (double)v[1] + m.m[c][2] * (double)v[2])
+                               : v[c];
         }
 }
 
@@ -336,7 +350,8 @@ static inline const char *image_exr_read(image_exr *exr, image *out)
     if (why) return why;
     exr_get_storage(exr->file, exr->part, &storage);
     exr_get_compression(exr->file, exr->part, &compression);
-    if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED) return "holds deep pixels, which are not supported";
+    if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED)
+        return "holds deep pixels, which are not supported";
     if (compression == EXR_COMPRESSION_DWAA || compression == EXR_COMPRESSION_DWAB)
         return compression == EXR_COMPRESSION_DWAA ? "is DWAA-compressed, which OpenEXR's C library cannot decode; try exrmaketiled -z piz (Debian's openexr)"
                                                    : "is DWAB-compressed, which OpenEXR's C library cannot decode; try exrmaketiled -z piz (Debian's openexr)";
@@ -367,7 +382,8 @@ static inline int image_load_exr(image *out, const char *path)
 
 typedef struct image_exr_sink { file_writer *file; uint64_t at; } image_exr_sink;
 
-static inline exr_result_t image_exr_write_chunk(exr_context_t file, const image *picture, const unsigned char *samples, int bytes, int y)
+static inline exr_result_t image_exr_write_chunk(exr_context_t file, const image *picture, const unsigned char *samples,
+                                                 int bytes, int y)
 {
     static const char names[] = "RGBA";
     exr_chunk_info_t chunk;
@@ -386,7 +402,8 @@ static inline exr_result_t image_exr_write_chunk(exr_context_t file, const image
         channel->user_data_type = channel->data_type;
         channel->user_pixel_stride = bytes * picture->channels;
         channel->user_line_stride = bytes * picture->channels * picture->width;
-        channel->encode_from_ptr = samples + ((size_t)y * (size_t)picture->width * (size_t)picture->channels + (size_t)i) * (size_t)bytes;
+        channel->encode_from_ptr =
+            samples + ((size_t)y * (size_t)picture->width * (size_t)picture->channels + (size_t)i) * (size_t)bytes;
     }
     rc = exr_encoding_choose_default_routines(file, 0, &encode);
     if (rc == EXR_ERR_SUCCESS) rc = exr_encoding_run(file, 0, &encode);
@@ -394,7 +411,8 @@ static inline exr_result_t image_exr_write_chunk(exr_context_t file, const image
     return rc;
 }
 
-static inline exr_result_t image_exr_write(exr_context_t file, const image *picture, const unsigned char *samples, int half)
+static inline exr_result_t image_exr_write(exr_context_t file, const image *picture, const unsigned char *samples,
+                                           int half)
 {
     static const char *const names[] = {"R", "G", "B", "A"};
     int part = 0, c, y, step = 0;
@@ -402,8 +420,8 @@ static inline exr_result_t image_exr_write(exr_context_t file, const image *pict
     if (rc == EXR_ERR_SUCCESS)
         rc = exr_initialize_required_attr_simple(file, part, picture->width, picture->height, EXR_COMPRESSION_ZIP);
     for (c = 0; c < picture->channels && rc == EXR_ERR_SUCCESS; ++c)
-        rc = exr_add_channel(file, part, picture->channels < 3 ? (c ? "A" : "Y") : names[c], half ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
-                             EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
+        rc = exr_add_channel(file, part, picture->channels < 3 ? (c ? "A" : "Y") : names[c],
+                             half ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
     if (rc == EXR_ERR_SUCCESS) rc = exr_write_header(file);
     if (rc == EXR_ERR_SUCCESS) rc = exr_get_scanlines_per_chunk(file, part, &step);
     for (y = 0; y < picture->height && rc == EXR_ERR_SUCCESS; y += step)
@@ -412,7 +430,8 @@ static inline exr_result_t image_exr_write(exr_context_t file, const image *pict
 }
 
 /* The library's bytes into the file, where it wants them. */
-static inline int64_t image_exr_put(exr_const_context_t context, void *user, const void *bytes, uint64_t size, uint64_t at, exr_stream_error_func_ptr_t error)
+static inline int64_t image_exr_put(exr_const_context_t context, void *user, const void *bytes, uint64_t size,
+                                    uint64_t at, exr_stream_error_func_ptr_t error)
 {
     image_exr_sink *sink = (image_exr_sink *)user;
     (void)context, (void)error;
@@ -441,7 +460,8 @@ static inline int image_save_exr(image *picture, const char *path, int half)
     options.write_fn = image_exr_put;
     rc = exr_start_write(&file, path, EXR_WRITE_FILE_DIRECTLY, &options);
     if (rc == EXR_ERR_SUCCESS)
-        rc = image_exr_write(file, picture, half ? (const unsigned char *)halves : (const unsigned char *)picture->pixels, half);
+        rc = image_exr_write(file, picture,
+                             half ? (const unsigned char *)halves : (const unsigned char *)picture->pixels, half);
     if (file) {
         exr_result_t end = exr_finish(&file);
         if (rc == EXR_ERR_SUCCESS) rc = end;

@@ -76,7 +76,11 @@ static inline int mesh_add_triangle(mesh *m, int a, int b, int c)
 
 enum { MESH_MAX_PROPERTIES = 32 };
 
-typedef struct mesh_property { char name[32]; char type; char count_type; } mesh_property;   /* types as in mesh_type; count_type 0: no list */
+typedef struct mesh_property {
+    char name[32];
+    char type;
+    char count_type;
+} mesh_property; /* types as in mesh_type; count_type 0: no list */
 
 typedef struct mesh_ply {
     FILE *file;
@@ -133,7 +137,8 @@ static inline int mesh_ply_list(mesh *m, mesh_ply *ply, const mesh_property *pro
     return 1;
 }
 
-static inline int mesh_ply_element(mesh *m, mesh_ply *ply, const char *element, long count, const mesh_property *properties, int n)
+static inline int mesh_ply_element(mesh *m, mesh_ply *ply, const char *element, long count,
+                                   const mesh_property *properties, int n)
 {
     long i;
     int k;
@@ -158,7 +163,12 @@ enum { MESH_MAX_ELEMENTS = 8 };
 
 typedef struct mesh_ply_header {
     int elements;
-    struct { char name[32]; long count; int n; mesh_property properties[MESH_MAX_PROPERTIES]; } element[MESH_MAX_ELEMENTS];
+    struct {
+        char name[32];
+        long count;
+        int n;
+        mesh_property properties[MESH_MAX_PROPERTIES];
+    } element[MESH_MAX_ELEMENTS];
 } mesh_ply_header;
 
 static inline const char *mesh_ply_read_header(mesh_ply *ply, mesh_ply_header *h)
@@ -214,7 +224,8 @@ static inline const char *mesh_load_obj(mesh *m, FILE *file)
     while (fgets(line, sizeof line, file)) {
         if (line[0] == 'v' && (line[1] == ' ' || line[1] == '\t')) {
             double xyz[3];
-            if (sscanf(line + 1, "%lf %lf %lf", &xyz[0], &xyz[1], &xyz[2]) != 3) return "has a vertex without three numbers";
+            if (sscanf(line + 1, "%lf %lf %lf", &xyz[0], &xyz[1], &xyz[2]) != 3)
+                return "has a vertex without three numbers";
             if (!mesh_add_vertex(m, xyz)) return "is too large for the memory";
         } else if (line[0] == 'f' && (line[1] == ' ' || line[1] == '\t')) {
             char *at = line + 1, *end;
@@ -248,7 +259,8 @@ static inline int mesh_load(mesh *out, const char *path)
     else why = "is neither .ply nor .obj";
     fclose(file);
     for (i = 0; !why && i < 3 * out->triangle_count; ++i)
-        if (out->indices[i] < 0 || out->indices[i] >= out->vertex_count) why = "has a face with a vertex that does not exist";
+        if (out->indices[i] < 0 || out->indices[i] >= out->vertex_count)
+            why = "has a face with a vertex that does not exist";
     if (!why && out->triangle_count == 0) why = "has no triangles";
     return why ? mesh_fail(out, path, why) : 1;
 }

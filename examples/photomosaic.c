@@ -4,7 +4,8 @@
        photomosaic target.jpg --tiles folder --gap 0.001 --method fast --compare --out both.png
        photomosaic target.jpg --tiles folder --method ants --video frames      frames/0000.png, ...: order out of chaos
        photomosaic target.jpg --tiles folder --pan 24 --switching 0.05 --video frames      a film, frame by frame warm
-       photomosaic                                                              target and tiles drawn here: out/photomosaic.png
+       photomosaic                                                              target and tiles drawn here:
+       out/photomosaic.png
 
    Several target pictures in a row need several calls. The proof stands in the last line: no other choice of tiles is
    nearer to the target by more than the gap. */
@@ -65,8 +66,8 @@ static unsigned char *new_tile(tile_set *set)
     return set->pixels + strip * (size_t)(at / set->across) + (size_t)(at % set->across * set->size) * 3;
 }
 
-/* Adds every tile of a picture: cut into a grid where it is a sheet, shrunk as a whole where it is a photograph. Means of
-   rectangles shrink it, so a tile of any shape fills the square. */
+/* Adds every tile of a picture: cut into a grid where it is a sheet, shrunk as a whole where it is a photograph. Means
+   of rectangles shrink it, so a tile of any shape fills the square. */
 static int add_picture(tile_set *set, const char *path, int sheet)
 {
     image picture;
@@ -87,7 +88,9 @@ static int add_picture(tile_set *set, const char *path, int sheet)
             for (y = 0; tile && y < n; y++)
                 for (x = 0; x < 3 * n; x++)
                     tile[y * set->across * n * 3 + x] =
-                        (unsigned char)(shrunk[(size_t)(j * n + y) * (size_t)(across * n * 3) + (size_t)(i * n * 3 + x)] + 0.5f);
+                        (unsigned char)(shrunk[(size_t)(j * n + y) * (size_t)(across * n * 3) +
+                                               (size_t)(i * n * 3 + x)] +
+                                        0.5f);
             if (!tile) return 0;
         }
     free(shrunk);
@@ -158,7 +161,9 @@ static int draw_tiles(tile_set *set)
         for (y = 0; y < n; y++)
             for (x = 0; x < n; x++) {
                 float u = 2 * ((float)x + 0.5f) / (float)n - 1, v = 2 * ((float)y + 0.5f) / (float)n - 1;
-                float line = cosf(turn) * u + sinf(turn) * v, inside = t % 3 == 0 ? line - offset : t % 3 == 1 ? 0.6f - hypotf(u, v) : sinf(line * 6);
+                float line = cosf(turn) * u + sinf(turn) * v, inside = t % 3 == 0   ? line - offset
+                                                                       : t % 3 == 1 ? 0.6f - hypotf(u, v)
+                                                                                    : sinf(line * 6);
                 for (c = 0; c < 3; c++) {
                     unsigned colour = (inside > 0 ? h : g) >> (8 * c) & 255u;
                     tile[(y * set->across * n + x) * 3 + c] = (unsigned char)colour;
@@ -175,8 +180,10 @@ static int draw_target(image *picture)
     if (!image_create(picture, n, n, 3)) return 0;
     for (y = 0; y < n; y++)
         for (x = 0; x < n; x++) {
-            float u = (float)x / (float)n - 0.5f, v = (float)y / (float)n, *p = picture->pixels + ((size_t)y * (size_t)n + (size_t)x) * 3;
-            float sun = hypotf(u, v - 0.45f), sea = v > 0.62f ? 1.0f : 0.0f, wave = 12 * sinf(60 * v + 6 * sinf(9 * u)) * sea;
+            float u = (float)x / (float)n - 0.5f, v = (float)y / (float)n,
+                  *p = picture->pixels + ((size_t)y * (size_t)n + (size_t)x) * 3;
+            float sun = hypotf(u, v - 0.45f), sea = v > 0.62f ? 1.0f : 0.0f,
+                  wave = 12 * sinf(60 * v + 6 * sinf(9 * u)) * sea;
             p[0] = sun < 0.17f && sea < 0.5f ? 250 : 240 - 190 * sea - 90 * v + wave;
             p[1] = sun < 0.17f && sea < 0.5f ? 220 : 120 + 40 * v - 30 * sea + wave;
             p[2] = sun < 0.17f && sea < 0.5f ? 90 : 90 + 110 * v + wave;
@@ -205,8 +212,8 @@ typedef struct studio {
 
 static int draw(studio *s, unsigned char *out, const int *columns)
 {
-    return softassign_mosaic(out, (ptrdiff_t)s->grid[0] * s->tiles.size * 3, &s->sheet, s->tiles.size, s->tiles.size, columns, s->grid[0],
-                             s->grid[1], s->blend > 0 ? &s->target : NULL, s->blend) == SAT_OK;
+    return softassign_mosaic(out, (ptrdiff_t)s->grid[0] * s->tiles.size * 3, &s->sheet, s->tiles.size, s->tiles.size,
+                             columns, s->grid[0], s->grid[1], s->blend > 0 ? &s->target : NULL, s->blend) == SAT_OK;
 }
 
 static int write_frame(studio *s, const int *columns)
@@ -224,7 +231,9 @@ static int watch(const softassign_report *report, const int *columns, void *user
     studio *s = (studio *)user;
     char text[96] = "no mosaic yet";
     if (columns) snprintf(text, sizeof text, "at most %.3g %% from the best", 100 * report->gap);
-    common_show_progress(&s->progress, text, s->folder && s->frames ? (double)s->frame / s->frames : 1 - (report->gap < 1 ? report->gap : 1), 1.0001);
+    common_show_progress(
+        &s->progress, text,
+        s->folder && s->frames ? (double)s->frame / s->frames : 1 - (report->gap < 1 ? report->gap : 1), 1.0001);
     if (s->folder && columns && !write_frame(s, columns)) s->failed = 1;
     return s->failed;
 }
@@ -280,7 +289,8 @@ static int compare(studio *s, const char *out)
     s->options.min_distance = 0;
     s->options.method = SOFTASSIGN_AUTO;
     s->options.progress = NULL;
-    ok = other && seen && softassign_solve(s->columns, &s->problem, &s->options, &report) == SAT_OK && draw(s, other, s->columns);
+    ok = other && seen && softassign_solve(s->columns, &s->problem, &s->options, &report) == SAT_OK &&
+         draw(s, other, s->columns);
     for (i = 0; ok && i < s->problem.rows; i++) used += !seen[s->columns[i]]++;
     snprintf(label, sizeof label, "best match with repeats: %d tiles", used);
     for (i = 0; i < 2; i++) {
@@ -301,10 +311,13 @@ static sat_result open_studio(studio *s)
 {
     int n = s->tiles.size, width = s->picture.width, height = s->picture.height, down;
     sat_result result;
-    if ((double)width * s->grid[1] > (double)height * s->grid[0]) width = (int)((double)height * s->grid[0] / s->grid[1]);
+    if ((double)width * s->grid[1] > (double)height * s->grid[0])
+        width = (int)((double)height * s->grid[0] / s->grid[1]);
     else height = (int)((double)width * s->grid[1] / s->grid[0]);
     s->target = image_view(&s->picture);
-    s->target.pixels = s->picture.pixels + ((size_t)((s->picture.height - height) / 2) * (size_t)s->picture.width + (size_t)((s->picture.width - width) / 2)) * 3;
+    s->target.pixels = s->picture.pixels + ((size_t)((s->picture.height - height) / 2) * (size_t)s->picture.width +
+                                            (size_t)((s->picture.width - width) / 2)) *
+                                               3;
     s->target.width = width > 0 ? width : 1;
     s->target.height = height > 0 ? height : 1;
     down = (s->tiles.count + s->tiles.across - 1) / s->tiles.across;
@@ -313,7 +326,8 @@ static sat_result open_studio(studio *s)
     s->problem.columns = s->tiles.count;
     s->problem.feature_count = FEATURES;
     s->problem.row_features = s->cells = (float *)malloc((size_t)s->problem.rows * FEATURES * sizeof(float));
-    s->problem.column_features = s->features = (float *)malloc((size_t)(s->tiles.across * down) * FEATURES * sizeof(float));
+    s->problem.column_features = s->features =
+        (float *)malloc((size_t)(s->tiles.across * down) * FEATURES * sizeof(float));
     s->columns = (int *)malloc((size_t)s->problem.rows * sizeof(int));
     s->mosaic = (unsigned char *)malloc((size_t)s->problem.rows * (size_t)(n * n) * 3);
     if (!s->cells || !s->features || !s->columns || !s->mosaic) return SAT_ERR_MEMORY;
@@ -346,12 +360,15 @@ static int work(studio *s, int pan, int both, const char *out)
     }
     if (s->failed) return 0;
     if (result != SAT_OK) {
-        if (report.row_error >= 0) fprintf(stderr, "photomosaic: cell %d finds no tile: %d cells, %d tiles\n", report.row_error, s->problem.rows, s->problem.columns);
+        if (report.row_error >= 0)
+            fprintf(stderr, "photomosaic: cell %d finds no tile: %d cells, %d tiles\n", report.row_error,
+                    s->problem.rows, s->problem.columns);
         else common_say(s->common, sat_result_text(result));
         return 0;
     }
     if (!draw(s, s->mosaic, s->columns)) return common_say(s->common, "the mosaic cannot be drawn");
-    return both ? compare(s, out) : common_save_u8(s->common, out, s->mosaic, s->grid[0] * s->tiles.size, s->grid[1] * s->tiles.size, 3);
+    return both ? compare(s, out)
+                : common_save_u8(s->common, out, s->mosaic, s->grid[0] * s->tiles.size, s->grid[1] * s->tiles.size, 3);
 }
 
 int main(int argc, char **argv)
@@ -396,7 +413,8 @@ int main(int argc, char **argv)
     s.options.progress = watch;
     s.options.progress_user = &s;
     s.frames = s.options.iterations[0];
-    if (!(target ? load_display(&s.picture, target) : draw_target(&s.picture))) return common_say(&common, s.picture.message), 1;
+    if (!(target ? load_display(&s.picture, target) : draw_target(&s.picture)))
+        return common_say(&common, s.picture.message), 1;
     if (!(tiles ? load_tiles(&s.tiles, tiles) : draw_tiles(&s.tiles) || common_say(&common, "no memory"))) return 1;
     if (s.folder && !file_make_folder(s.folder)) common_leave(&common, 1, s.folder, strerror(errno));
     ok = work(&s, pan, both, common.out);

@@ -7,7 +7,8 @@
        pipeline_frame(&p, 1 / 30.0);              every stage; p.pixels is the picture, p.stages what each one cost
        pipeline_destroy(&p);
 
-   The program defines the IMPLEMENTATION macros, and for OpenGL PIPELINE_GL and the GL macros; pipeline_change takes other options between frames. */
+   The program defines the IMPLEMENTATION macros, and for OpenGL PIPELINE_GL and the GL macros; pipeline_change takes
+   other options between frames. */
 
 #ifndef PIPELINE_H
 #define PIPELINE_H
@@ -118,7 +119,8 @@ static inline int pipeline_gl_done(pipeline *p, int ok)
 static inline int pipeline_gl_ready(pipeline *p)
 {
     if (!p->options.get_proc || p->gl) return 1;
-    if (pipeline_gl_done(p, pipeline_gl_create(&p->gl, p->options.get_proc, p->options.width, p->options.height))) return 1;
+    if (pipeline_gl_done(p, pipeline_gl_create(&p->gl, p->options.get_proc, p->options.width, p->options.height)))
+        return 1;
     pipeline_gl_destroy(p->gl);
     p->gl = NULL, p->options.get_proc = NULL;
     return 0;
@@ -223,11 +225,14 @@ static inline int pipeline_shadows_on(pipeline *p, int what, const fiv_irradianc
         if (n == 0) continue;
         result = what == SCENE_GROUND || count == 0
                      ? fiv_irradiance(p->found, p->points, p->normals, n, p->light, casters, (size_t)count, fo, &stats)
-                     : fiv_self_irradiance(p->found, p->points, p->normals, n, p->light, casters + 1, casters, 1, fo, &stats);
+                     : fiv_self_irradiance(p->found, p->points, p->normals, n, p->light, casters + 1, casters, 1, fo,
+                                           &stats);
         if (!pipeline_check(p, "fiv_irradiance", result)) return 0;
-        for (i = 0; i < n; ++i) memcpy(p->irradiance[layer] + 3 * (size_t)p->where[i], p->found + 3 * i, 3 * sizeof(float));
+        for (i = 0; i < n; ++i)
+            memcpy(p->irradiance[layer] + 3 * (size_t)p->where[i], p->found + 3 * i, 3 * sizeof(float));
         p->shadow_stats.below_horizon += stats.below_horizon, p->shadow_stats.below_cutoff += stats.below_cutoff;
-        p->shadow_stats.whole += stats.whole, p->shadow_stats.clipped += stats.clipped, p->shadow_stats.overlaps += stats.overlaps;
+        p->shadow_stats.whole += stats.whole, p->shadow_stats.clipped += stats.clipped,
+            p->shadow_stats.overlaps += stats.overlaps;
     }
     return 1;
 }
@@ -250,7 +255,8 @@ static inline int pipeline_shadows_gl(pipeline *p)
             }
             rgba[4 * i + 3] = (float)(l->what[i] < SCENE_FIRST ? 1 : 2 + l->what[i] - SCENE_FIRST);
         }
-        ok = pipeline_gl_shadows(p->gl, rgba, p->normals, p->scene.width, p->scene.height, p->light, casters, p->options.shadows ? SCENE_OBJECTS : 0);
+        ok = pipeline_gl_shadows(p->gl, rgba, p->normals, p->scene.width, p->scene.height, p->light, casters,
+                                 p->options.shadows ? SCENE_OBJECTS : 0);
         for (i = 0; ok && i < pixels; ++i) memcpy(p->irradiance[layer] + 3 * i, rgba + 4 * i, 3 * sizeof(float));
     }
     free(rgba);
@@ -273,7 +279,8 @@ static inline int pipeline_shadows(pipeline *p)
 
 static inline int pipeline_occlusion(pipeline *p)
 {
-    ssao_sat_input input = ssao_sat_input_linear(p->scene.layers[0].depth, p->scene.width, p->scene.height, (double)p->scene.camera.fov_y);
+    ssao_sat_input input =
+        ssao_sat_input_linear(p->scene.layers[0].depth, p->scene.width, p->scene.height, (double)p->scene.camera.fov_y);
     ssao_sat_options so = ssao_sat_defaults();
     size_t i, pixels = (size_t)p->scene.width * (size_t)p->scene.height;
     if (!p->options.occlusion) {
@@ -304,7 +311,8 @@ static inline float pipeline_fresnel(float head_on, float cosine, float grazing)
     return head_on + (1 - head_on) * grazing * powf(1 - fminf(fmaxf(cosine, 0), 1), 5);
 }
 
-static inline void pipeline_object(float rgb[3], const pipeline *p, int object, const float irradiance[3], const float n[3], const float view[3], float open)
+static inline void pipeline_object(float rgb[3], const pipeline *p, int object, const float irradiance[3],
+                                   const float n[3], const float view[3], float open)
 {
     const scene_object *o = &p->scene.objects[object];
     float r[3], coat[3], f;
@@ -312,7 +320,9 @@ static inline void pipeline_object(float rgb[3], const pipeline *p, int object, 
     pipeline_reflect(r, view, n);
     f = pipeline_fresnel(o->shine, -scene_dot(view, n), 0.25f);
     raindrop_environment_sample(coat, p->mirror, r, 0.25f);
-    for (k = 0; k < 3; ++k) rgb[k] = (1 - f) * o->colour[k] / 3.14159265f * irradiance[k] * open + f * coat[k] * open * scene_step(-0.25f, 0.1f, r[1]);
+    for (k = 0; k < 3; ++k)
+        rgb[k] = (1 - f) * o->colour[k] / 3.14159265f * irradiance[k] * open +
+                 f * coat[k] * open * scene_step(-0.25f, 0.1f, r[1]);
 }
 
 static inline void pipeline_pixel(float rgb[3], const pipeline *p, size_t i, const float ray[3])
@@ -324,7 +334,8 @@ static inline void pipeline_pixel(float rgb[3], const pipeline *p, size_t i, con
     memcpy(view, ray, sizeof view);
     scene_normalise(view);
     if (l->what[i] != SCENE_GROUND) {
-        pipeline_object(rgb, p, l->what[i] - SCENE_FIRST, p->irradiance[0] + 3 * i, l->normals + 3 * i, view, p->open[i]);
+        pipeline_object(rgb, p, l->what[i] - SCENE_FIRST, p->irradiance[0] + 3 * i, l->normals + 3 * i, view,
+                        p->open[i]);
         return;
     }
     scene_ground(colour, n, point[0], point[2], l->depth[i] * l->depth[i] / (float)p->scene.height);
@@ -336,10 +347,13 @@ static inline void pipeline_pixel(float rgb[3], const pipeline *p, size_t i, con
     if (l[1].what[i] != SCENE_SKY) {
         float bounce[3];
         memcpy(bounce, r, sizeof bounce);
-        pipeline_object(mirrored, p, l[1].what[i] - SCENE_FIRST, p->irradiance[1] + 3 * i, l[1].normals + 3 * i, bounce, 1);
+        pipeline_object(mirrored, p, l[1].what[i] - SCENE_FIRST, p->irradiance[1] + 3 * i, l[1].normals + 3 * i, bounce,
+                        1);
     } else raindrop_environment_sample(mirrored, p->mirror, r, scene_mix(0.5f, 0.02f, wet));
     f = pipeline_fresnel(0.02f, -scene_dot(view, n), scene_mix(0.35f, 1, wet));
-    for (k = 0; k < 3; ++k) rgb[k] = (1 - f) * colour[k] / 3.14159265f * p->irradiance[0][3 * i + (size_t)k] * p->open[i] + f * mirrored[k] * scene_mix(p->open[i], 1, wet);
+    for (k = 0; k < 3; ++k)
+        rgb[k] = (1 - f) * colour[k] / 3.14159265f * p->irradiance[0][3 * i + (size_t)k] * p->open[i] +
+                 f * mirrored[k] * scene_mix(p->open[i], 1, wet);
     view[1] = 0.035f; /* the distance fades into the horizon */
     raindrop_environment_sample(mirrored, p->mirror, view, 0.04f);
     haze = 1 - expf(-l->depth[i] / 30);
@@ -383,11 +397,13 @@ static inline void pipeline_sky_rows(int begin, int end, int worker, void *conte
         for (x = 0; x < p->options.width; ++x) {
             float ray[3], t = tanf(0.5f * p->scene.camera.fov_y), h = (float)p->options.height;
             float u = (2 * (float)x + 1 - (float)p->options.width) / h * t, v = (1 - (2 * (float)y + 1) / h) * t;
-            for (k = 0; k < 3; ++k) ray[k] = u * p->scene.camera.right[k] + v * p->scene.camera.up[k] - p->scene.camera.back[k];
+            for (k = 0; k < 3; ++k)
+                ray[k] = u * p->scene.camera.right[k] + v * p->scene.camera.up[k] - p->scene.camera.back[k];
             scene_normalise(ray);
             if (ray[1] < -0.01f) continue; /* ground */
             ray[1] = fmaxf(ray[1], 0);
-            scene_sky_radiance(p->dry.pixels + 3 * ((size_t)y * (size_t)p->options.width + (size_t)x), &sky, p->options.hour, p->options.turn, ray);
+            scene_sky_radiance(p->dry.pixels + 3 * ((size_t)y * (size_t)p->options.width + (size_t)x), &sky,
+                               p->options.hour, p->options.turn, ray);
         }
 }
 
@@ -431,8 +447,10 @@ static inline int pipeline_rain(pipeline *p, double dt)
     }
     PIPELINE_ON_GL(p, pipeline_gl_rain(p->gl, p->hdr.pixels, p->depth, &camera, p->mirror, p->rain, dt));
     return pipeline_check(p, "raindrop_rain_advance", raindrop_rain_advance(p->rain, dt)) &&
-           pipeline_check(p, "raindrop_render", raindrop_render(p->hdr.pixels, (ptrdiff_t)p->hdr.width * 3 * (ptrdiff_t)sizeof(float), p->hdr.width, p->hdr.height,
-                                                                p->depth, &camera, p->rain, p->mirror, NULL, &p->rain_stats));
+           pipeline_check(p, "raindrop_render",
+                          raindrop_render(p->hdr.pixels, (ptrdiff_t)p->hdr.width * 3 * (ptrdiff_t)sizeof(float),
+                                          p->hdr.width, p->hdr.height, p->depth, &camera, p->rain, p->mirror, NULL,
+                                          &p->rain_stats));
 }
 
 /* ---- tone ---- */
@@ -443,7 +461,10 @@ static inline int pipeline_tone(pipeline *p, double dt)
     tonemap_options to = tonemap_defaults();
     sat_image hdr = image_view(&p->hdr);
     to.operation = p->options.tone ? p->options.operation : TONEMAP_LINEAR;
-    to.key = (double)((p->options.key > 0 ? p->options.key : p->options.environment ? 0.18f : keys[p->options.hour]) * exp2f(p->options.exposure));
+    to.key = (double)((p->options.key > 0       ? p->options.key
+                       : p->options.environment ? 0.18f
+                                                : keys[p->options.hour]) *
+                      exp2f(p->options.exposure));
     to.mesopic = p->options.tone ? p->options.mesopic : TONEMAP_MESOPIC_OFF;
     to.cd_per_unit = 1;
     to.white = 0;
@@ -477,27 +498,36 @@ static inline void pipeline_cut_tile(unsigned char *sheet, int i, const pipeline
     top = (int)(scene_hash(i, 3) * (float)(height - n * PIPELINE_TILE));
     for (y = 0; y < PIPELINE_TILE; ++y)
         for (x = 0; x < PIPELINE_TILE; ++x) {
-            size_t row = (size_t)(i / PIPELINE_TILE_COLUMNS * PIPELINE_TILE + y), column = (size_t)(i % PIPELINE_TILE_COLUMNS * PIPELINE_TILE + x);
+            size_t row = (size_t)(i / PIPELINE_TILE_COLUMNS * PIPELINE_TILE + y),
+                   column = (size_t)(i % PIPELINE_TILE_COLUMNS * PIPELINE_TILE + x);
             int sum[3] = {0, 0, 0}, from = i & 1 ? PIPELINE_TILE - 1 - x : x;
             for (v = 0; v < n; ++v)
                 for (u = 0; u < n; ++u)
                     for (k = 0; k < 3; ++k)
-                        sum[k] += p->pixels[3 * ((size_t)(top + y * n + v) * (size_t)width + (size_t)(left + from * n + u)) + (size_t)k];
-            for (k = 0; k < 3; ++k) sheet[3 * (row * PIPELINE_TILE * PIPELINE_TILE_COLUMNS + column) + (size_t)k] = (unsigned char)(sum[k] / (n * n));
+                        sum[k] +=
+                            p->pixels[3 * ((size_t)(top + y * n + v) * (size_t)width + (size_t)(left + from * n + u)) +
+                                      (size_t)k];
+            for (k = 0; k < 3; ++k)
+                sheet[3 * (row * PIPELINE_TILE * PIPELINE_TILE_COLUMNS + column) + (size_t)k] =
+                    (unsigned char)(sum[k] / (n * n));
         }
 }
 
 /* The last frame again, into p->mosaic. */
 static inline int pipeline_mosaic(pipeline *p)
 {
-    int columns = p->options.width / PIPELINE_TILE, rows = p->options.height / PIPELINE_TILE, patches = columns * rows, i, ok;
-    int tile_rows = patches * 3 / 2 / PIPELINE_TILE_COLUMNS + 1, tiles = tile_rows * PIPELINE_TILE_COLUMNS, row = columns * PIPELINE_TILE;
+    int columns = p->options.width / PIPELINE_TILE, rows = p->options.height / PIPELINE_TILE, patches = columns * rows,
+        i, ok;
+    int tile_rows = patches * 3 / 2 / PIPELINE_TILE_COLUMNS + 1, tiles = tile_rows * PIPELINE_TILE_COLUMNS,
+        row = columns * PIPELINE_TILE;
     size_t tile_bytes = 3 * PIPELINE_TILE * PIPELINE_TILE;
     unsigned char *sheet = (unsigned char *)malloc((size_t)tiles * tile_bytes);
-    float *wanted = (float *)malloc((size_t)patches * PIPELINE_FEATURES * sizeof(float)), *offered = (float *)malloc((size_t)tiles * PIPELINE_FEATURES * sizeof(float));
+    float *wanted = (float *)malloc((size_t)patches * PIPELINE_FEATURES * sizeof(float)),
+          *offered = (float *)malloc((size_t)tiles * PIPELINE_FEATURES * sizeof(float));
     int *tile_of = (int *)malloc((size_t)patches * sizeof(int));
     sat_image picture = pipeline_view_u8(p->pixels, row, rows * PIPELINE_TILE, p->options.width);
-    sat_image tile_view = pipeline_view_u8(sheet, PIPELINE_TILE * PIPELINE_TILE_COLUMNS, PIPELINE_TILE * tile_rows, PIPELINE_TILE * PIPELINE_TILE_COLUMNS);
+    sat_image tile_view = pipeline_view_u8(sheet, PIPELINE_TILE * PIPELINE_TILE_COLUMNS, PIPELINE_TILE * tile_rows,
+                                           PIPELINE_TILE * PIPELINE_TILE_COLUMNS);
     softassign_options so = softassign_defaults();
     softassign_problem problem;
     double start = common_clock();
@@ -531,8 +561,10 @@ static inline int pipeline_create(pipeline *p, const pipeline_options *options)
     size_t pixels;
     memset(p, 0, sizeof *p);
     p->options = *options;
-    if (options->width < 16 || options->height < 16 || options->samples < 1 || options->samples > 4 || options->width > 8192 || options->height > 8192) {
-        snprintf(p->message, sizeof p->message, "%d x %d pixels: from 16 x 16 to 8192 x 8192 are drawn", options->width, options->height);
+    if (options->width < 16 || options->height < 16 || options->samples < 1 || options->samples > 4 ||
+        options->width > 8192 || options->height > 8192) {
+        snprintf(p->message, sizeof p->message, "%d x %d pixels: from 16 x 16 to 8192 x 8192 are drawn", options->width,
+                 options->height);
         return 0;
     }
     pixels = (size_t)w * (size_t)h;
@@ -547,8 +579,10 @@ static inline int pipeline_create(pipeline *p, const pipeline_options *options)
     p->normals = (float *)malloc(3 * pixels * sizeof(float));
     p->found = (float *)malloc(3 * pixels * sizeof(float));
     p->where = (unsigned *)malloc(pixels * sizeof(unsigned));
-    ok = ok && p->depth && p->pixels && p->irradiance[0] && p->irradiance[1] && p->open && p->points && p->normals && p->found && p->where;
-    ok = ok && (options->shape ? scene_use_mesh(&p->scene.objects[0], options->shape) : scene_make_knot(&p->scene.objects[0], 120, 20));
+    ok = ok && p->depth && p->pixels && p->irradiance[0] && p->irradiance[1] && p->open && p->points && p->normals &&
+         p->found && p->where;
+    ok = ok && (options->shape ? scene_use_mesh(&p->scene.objects[0], options->shape)
+                               : scene_make_knot(&p->scene.objects[0], 120, 20));
     ok = ok && scene_make_pawn(&p->scene.objects[1], 40, 3);
     if (!ok) {
         snprintf(p->message, sizeof p->message, "not enough memory for %d x %d pixels", w, h);
@@ -570,8 +604,11 @@ static inline int pipeline_change(pipeline *p, const pipeline_options *options)
     if (old.get_proc != options->get_proc || old.rate != options->rate) PIPELINE_GL_FORGET(p);
     if (old.rate != options->rate) raindrop_rain_destroy(p->rain), p->rain = NULL;
     if (old.ao_radius != options->ao_radius) ssao_sat_destroy(p->ao), p->ao = NULL;
-    if (old.ao_radius != options->ao_radius || old.shadows != options->shadows || old.occlusion != options->occlusion) p->settled = 0;
-    if (options->environment == old.environment && (options->environment || (old.hour == options->hour && old.turn == options->turn))) return 1;
+    if (old.ao_radius != options->ao_radius || old.shadows != options->shadows || old.occlusion != options->occlusion)
+        p->settled = 0;
+    if (options->environment == old.environment &&
+        (options->environment || (old.hour == options->hour && old.turn == options->turn)))
+        return 1;
     p->settled = 0;
     return pipeline_light(p);
 }

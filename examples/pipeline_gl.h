@@ -2,8 +2,8 @@
    SPDX-License-Identifier: MIT-0 OR Unlicense
 
    A renderer that keeps its pictures on the GPU does without both copies. Row 0 is the top of the picture, but for the
-   texture that the rain is drawn into, which is as OpenGL has it. Unlike the headers these functions leave a framebuffer of
-   their own bound. */
+   texture that the rain is drawn into, which is as OpenGL has it. Unlike the headers these functions leave a
+   framebuffer of their own bound. */
 
 #ifndef PIPELINE_GL_H
 #define PIPELINE_GL_H
@@ -97,7 +97,8 @@ static inline void pipeline_gl_copy(pipeline_gl *g, float *rgb, int to_rgba, int
 
 /* ---- shadows, of the scene's size ---- */
 
-/* rgba: points whose alpha says what they lie on, as fiv_gl_irradiance has it; then the result. Pixels whose normal is 0 are black. */
+/* rgba: points whose alpha says what they lie on, as fiv_gl_irradiance has it; then the result. Pixels whose normal is
+   0 are black. */
 static inline int pipeline_gl_shadows(pipeline_gl *g, float *rgba, const float *normals, int width, int height,
                                       const fiv_environment *light, const fiv_instance *casters, size_t count)
 {
@@ -108,31 +109,40 @@ static inline int pipeline_gl_shadows(pipeline_gl *g, float *rgba, const float *
     if (result == SAT_OK) result = fiv_gl_set_scene(g->shadows, light, casters, count);
     if (!pipeline_gl_check(g, result, g->shadows ? fiv_gl_message(g->shadows) : "")) return 0;
     if (!g->scene_points) result = sat__gl_texture(&g->gl, &g->scene_points, SAT__GL_RGBA32F, width, height, NULL);
-    if (result == SAT_OK && !g->scene_normals) result = sat__gl_texture(&g->gl, &g->scene_normals, SAT__GL_RGB32F, width, height, NULL);
+    if (result == SAT_OK && !g->scene_normals)
+        result = sat__gl_texture(&g->gl, &g->scene_normals, SAT__GL_RGB32F, width, height, NULL);
     if (!pipeline_gl_check(g, result, g->gl.message)) return 0;
     sat__gl_upload(&g->gl, g->scene_points, SAT__GL_RGBA32F, width, height, rgba);
     sat__gl_upload(&g->gl, g->scene_normals, SAT__GL_RGB32F, width, height, normals);
-    if (!pipeline_gl_check(g, fiv_gl_irradiance(g->shadows, g->scene_points, g->scene_normals), fiv_gl_message(g->shadows))) return 0;
-    return pipeline_gl_check(g, sat__gl_read(&g->gl, rgba, fiv_gl_texture(g->shadows), SAT__GL_RGBA32F, width, height), g->gl.message);
+    if (!pipeline_gl_check(g, fiv_gl_irradiance(g->shadows, g->scene_points, g->scene_normals),
+                           fiv_gl_message(g->shadows)))
+        return 0;
+    return pipeline_gl_check(g, sat__gl_read(&g->gl, rgba, fiv_gl_texture(g->shadows), SAT__GL_RGBA32F, width, height),
+                             g->gl.message);
 }
 
 /* ---- ambient occlusion, of the scene's size ---- */
 
-static inline int pipeline_gl_occlusion(pipeline_gl *g, float *open, const ssao_sat_input *input, const ssao_sat_options *options)
+static inline int pipeline_gl_occlusion(pipeline_gl *g, float *open, const ssao_sat_input *input,
+                                        const ssao_sat_options *options)
 {
     sat_result result = SAT_OK;
     if (g->ao && g->ao_radius != options->radius) ssao_sat_gl_destroy(g->ao), g->ao = NULL;
     if (!g->ao) result = ssao_sat_gl_create(&g->ao, g->get_proc, input->width, input->height, options);
     g->ao_radius = options->radius;
     if (!pipeline_gl_check(g, result, g->ao ? ssao_sat_gl_message(g->ao) : "")) return 0;
-    if (!g->scene_depth) result = sat__gl_texture(&g->gl, &g->scene_depth, SAT__GL_R32F, input->width, input->height, NULL);
-    if (result == SAT_OK && !g->scene_normals) result = sat__gl_texture(&g->gl, &g->scene_normals, SAT__GL_RGB32F, input->width, input->height, NULL);
+    if (!g->scene_depth)
+        result = sat__gl_texture(&g->gl, &g->scene_depth, SAT__GL_R32F, input->width, input->height, NULL);
+    if (result == SAT_OK && !g->scene_normals)
+        result = sat__gl_texture(&g->gl, &g->scene_normals, SAT__GL_RGB32F, input->width, input->height, NULL);
     if (!pipeline_gl_check(g, result, g->gl.message)) return 0;
     sat__gl_upload(&g->gl, g->scene_depth, SAT__GL_R32F, input->width, input->height, input->depth);
     sat__gl_upload(&g->gl, g->scene_normals, SAT__GL_RGB32F, input->width, input->height, input->normals);
     result = ssao_sat_gl_apply(g->ao, 0, g->scene_depth, g->scene_normals, input);
     if (!pipeline_gl_check(g, result, ssao_sat_gl_message(g->ao))) return 0;
-    return pipeline_gl_check(g, sat__gl_read(&g->gl, open, ssao_sat_gl_texture(g->ao), SAT__GL_R32F, input->width, input->height), g->gl.message);
+    return pipeline_gl_check(
+        g, sat__gl_read(&g->gl, open, ssao_sat_gl_texture(g->ao), SAT__GL_R32F, input->width, input->height),
+        g->gl.message);
 }
 
 /* ---- rain: falls and is drawn on the GPU, but for the order as on the CPU ---- */
@@ -144,7 +154,8 @@ static inline void pipeline_gl_depth(pipeline_gl *g, const float *depth, float n
     for (y = 0; y < g->height; ++y)
         for (x = 0; x < g->width; ++x) {
             float z = depth[(size_t)(g->height - 1 - y) * (size_t)g->width + (size_t)x];
-            g->rows[(size_t)y * (size_t)g->width + (size_t)x] = z > near && z < far ? (1 / near - 1 / z) / (1 / near - 1 / far) : 1;
+            g->rows[(size_t)y * (size_t)g->width + (size_t)x] =
+                z > near && z < far ? (1 / near - 1 / z) / (1 / near - 1 / far) : 1;
         }
     sat__gl_upload(&g->gl, g->depth, SAT__GL_DEPTH_COMPONENT32F, g->width, g->height, g->rows);
 }
@@ -157,7 +168,8 @@ static inline int pipeline_gl_rain(pipeline_gl *g, float *rgb, const float *dept
     const float near = 0.08f, far = 1000;
     options.quads = 1;
     if (!g->rain) result = raindrop_gl_create(&g->rain, g->get_proc, &options);
-    if (result == SAT_OK && g->environment != environment) result = raindrop_gl_set_environment(g->rain, g->environment = environment);
+    if (result == SAT_OK && g->environment != environment)
+        result = raindrop_gl_set_environment(g->rain, g->environment = environment);
     if (result == SAT_OK && g->drops != rain) result = raindrop_gl_set_rain(g->rain, g->drops = rain);
     if (result == SAT_OK) result = raindrop_gl_advance(g->rain, dt);
     pipeline_gl_depth(g, depth, near, far);
@@ -174,7 +186,8 @@ static inline int pipeline_gl_rain(pipeline_gl *g, float *rgb, const float *dept
 
 /* ---- tone ---- */
 
-static inline int pipeline_gl_tone(pipeline_gl *g, unsigned char *out, float *rgb, const tonemap_options *options, double dt)
+static inline int pipeline_gl_tone(pipeline_gl *g, unsigned char *out, float *rgb, const tonemap_options *options,
+                                   double dt)
 {
     unsigned char *bytes = (unsigned char *)g->rows;
     size_t i, pixels = (size_t)g->width * (size_t)g->height;

@@ -31,13 +31,14 @@ static inline unsigned char *png_chunk(unsigned char *at, const char *name, size
     return png_u32(at + 8 + size, ~crc);
 }
 
-/* The whole file, to be freed; NULL without memory. 1 to 4 channels. PNG 1.2 with its deflate stream in stored blocks, one or
-   more a row (RFC 1950 and 1951). */
+/* The whole file, to be freed; NULL without memory. 1 to 4 channels. PNG 1.2 with its deflate stream in stored blocks,
+   one or more a row (RFC 1950 and 1951). */
 static inline unsigned char *png_encode(size_t *size, const unsigned char *bytes, int width, int height, int channels)
 {
     static const unsigned char start[8] = {137, 'P', 'N', 'G', 13, 10, 26, 10}, colour[5] = {0, 0, 4, 2, 6};
     size_t row = (size_t)width * (size_t)channels, blocks = (row + 65535) / 65535, at, part, i, y;
-    unsigned char *png = (unsigned char *)malloc(8 + 25 + 12 + 2 + (size_t)height * (row + 1 + 5 * blocks) + 4 + 12), *p = png, *data;
+    unsigned char *png = (unsigned char *)malloc(8 + 25 + 12 + 2 + (size_t)height * (row + 1 + 5 * blocks) + 4 + 12),
+                  *p = png, *data;
     uint32_t a = 1, b = 0;
     if (!png) return NULL;
     memcpy(p, start, 8);

@@ -47,11 +47,14 @@ static int made_up_sky(image *sky)
     if (!image_create(sky, 1024, 512, 3)) return 0;
     for (y = 0; y < sky->height; y++) {
         for (x = 0; x < sky->width; x++) {
-            double a = 6.283185 * (x + 0.5) / sky->width, up = cos(3.141593 * (y + 0.5) / sky->height), hills = 0.1 + 0.04 * sin(5 * a) + 0.02 * sin(13 * a + 1);
-            double glow = exp(-6 * fabs(up - hills)) * (0.6 - 0.4 * cos(a)), lamp = pow(fmax(0, cos(40 * a) * cos(31 * up)), 60);
+            double a = 6.283185 * (x + 0.5) / sky->width, up = cos(3.141593 * (y + 0.5) / sky->height),
+                   hills = 0.1 + 0.04 * sin(5 * a) + 0.02 * sin(13 * a + 1);
+            double glow = exp(-6 * fabs(up - hills)) * (0.6 - 0.4 * cos(a)),
+                   lamp = pow(fmax(0, cos(40 * a) * cos(31 * up)), 60);
             double sky_rgb[3] = {0.12 + 2.2 * glow, 0.2 + 0.9 * glow, 0.5 + 0.35 * glow}, land[3] = {0.03, 0.035, 0.02};
             float *p = sky->pixels + 3 * ((size_t)y * (size_t)sky->width + (size_t)x);
-            for (c = 0; c < 3; c++) p[c] = (float)(up > hills ? sky_rgb[c] : land[c] + (up > -0.3 ? lamp * (c == 2 ? 8 : 20) : 0));
+            for (c = 0; c < 3; c++)
+                p[c] = (float)(up > hills ? sky_rgb[c] : land[c] + (up > -0.3 ? lamp * (c == 2 ? 8 : 20) : 0));
         }
     }
     return 1;
@@ -64,7 +67,8 @@ static int open_environment(scene *s)
     sat_image view;
     image sky;
     int ok;
-    if (s->set->env ? !image_load(&sky, s->set->env) : !made_up_sky(&sky)) return common_say(&s->set->common, sky.message);
+    if (s->set->env ? !image_load(&sky, s->set->env) : !made_up_sky(&sky))
+        return common_say(&s->set->common, sky.message);
     view = image_view(&sky);
     o.threads = s->set->common.threads;
     o.bow_optical_depth = s->set->bow;
@@ -100,8 +104,10 @@ static int open_rain(scene *s)
 
 static void print_stats(const raindrop_render_stats *r, double seconds)
 {
-    printf("drops: %zu; drawn by rays %zu, by one lookup %zu; left out: behind %zu, outside %zu, near plane %zu, inside %zu, hidden %zu, too small %zu, invalid %zu\n",
-           r->drops, r->drawn_near, r->drawn_far, r->behind, r->outside, r->near_plane, r->inside, r->hidden, r->below_threshold, r->invalid);
+    printf(
+        "drops: %zu; drawn by rays %zu, by one lookup %zu; left out: behind %zu, outside %zu, near plane %zu, inside %zu, hidden %zu, too small %zu, invalid %zu\n",
+        r->drops, r->drawn_near, r->drawn_far, r->behind, r->outside, r->near_plane, r->inside, r->hidden,
+        r->below_threshold, r->invalid);
     printf("fragments: %zu, with internal reflections %zu; %.1f ms\n", r->fragments, r->order_fragments, 1e3 * seconds);
 }
 
@@ -154,8 +160,10 @@ static int save_frames(scene *s, const char *path)
 /* Four moments each of a paused scene around which the camera turns, of slow motion (1/100) and of real time. */
 static int save_sheet(scene *s, const char *path)
 {
-    static const struct { const char *label; double dt, exposure, turn; } rows[3] = {
-        {"paused, the camera turns", 0, 0, 0.12}, {"slow motion 1/100", 1 / 6000.0, 1 / 12000.0, 0}, {"real time, 1/120 s exposure", 1 / 60.0, 1 / 120.0, 0}};
+    static const struct { const char *label; double dt, exposure, turn;
+    } rows[3] = {{"paused, the camera turns", 0, 0, 0.12},
+                 {"slow motion 1/100", 1 / 6000.0, 1 / 12000.0, 0},
+                 {"real time, 1/120 s exposure", 1 / 60.0, 1 / 120.0, 0}};
     const ptrdiff_t stride = (ptrdiff_t)s->picture.width * 3 * (ptrdiff_t)sizeof(float);
     size_t bytes = (size_t)s->picture.width * (size_t)s->picture.height * 3;
     unsigned char *rgb = (unsigned char *)malloc(12 * bytes);
@@ -176,7 +184,8 @@ static int save_sheet(scene *s, const char *path)
             cells[4 * row + i].width = s->picture.width;
             cells[4 * row + i].height = s->picture.height;
             cells[4 * row + i].label = rows[row].label;
-            ok = ok && draw(s) && tone(rgb + (size_t)(4 * row + i) * bytes, s) && check("advance", raindrop_rain_advance(s->rain, rows[row].dt));
+            ok = ok && draw(s) && tone(rgb + (size_t)(4 * row + i) * bytes, s) &&
+                 check("advance", raindrop_rain_advance(s->rain, rows[row].dt));
         }
     }
     ok = ok && common_contact_sheet(&s->set->common, path, cells, 12, 4);
@@ -232,8 +241,11 @@ static void trace_picture(scene *s, const double centre[3])
             float *out = s->picture.pixels + 3 * ((size_t)y * (size_t)w + (size_t)x), rgb[3], f[3];
             double sum[3] = {0, 0, 0};
             for (k = 0; k < 64; k++) { /* 8 x 8 rays */
-                double px = (x + (k % 8 + 0.5) / 8 - 0.5 * w) / focal, py = (0.5 * h - y - (k / 8 + 0.5) / 8) / focal, d[3], length = sqrt(px * px + py * py + 1);
-                for (i = 0; i < 3; i++) d[i] = (px * (double)camera->right[i] + py * (double)camera->up[i] - (double)camera->back[i]) / length;
+                double px = (x + (k % 8 + 0.5) / 8 - 0.5 * w) / focal, py = (0.5 * h - y - (k / 8 + 0.5) / 8) / focal,
+                       d[3], length = sqrt(px * px + py * py + 1);
+                for (i = 0; i < 3; i++)
+                    d[i] =
+                        (px * (double)camera->right[i] + py * (double)camera->up[i] - (double)camera->back[i]) / length;
                 for (i = 0; i < 3; i++) f[i] = (float)d[i];
                 if (!trace(rgb, s, d, centre)) raindrop_environment_sample(rgb, s->environment, f, 0);
                 for (c = 0; c < 3; c++) sum[c] += (double)rgb[c] / 64;
@@ -245,8 +257,10 @@ static void trace_picture(scene *s, const double centre[3])
 
 static int save_closeup(scene *s, const char *path)
 {
-    static const char *const labels[4] = {"ray traced, 8 x 8 rays", "ray (closed form)", "closed form on a sprite", "published map"};
-    static const raindrop_look looks[4] = {RAINDROP_LOOK_RAY, RAINDROP_LOOK_RAY, RAINDROP_LOOK_SPRITE, RAINDROP_LOOK_MAP};
+    static const char *const labels[4] = {"ray traced, 8 x 8 rays", "ray (closed form)", "closed form on a sprite",
+                                          "published map"};
+    static const raindrop_look looks[4] = {RAINDROP_LOOK_RAY, RAINDROP_LOOK_RAY, RAINDROP_LOOK_SPRITE,
+                                           RAINDROP_LOOK_MAP};
     size_t bytes = (size_t)s->picture.width * (size_t)s->picture.height * 3;
     unsigned char *rgb = (unsigned char *)malloc(8 * bytes);
     common_cell cells[8];
@@ -258,7 +272,8 @@ static int save_closeup(scene *s, const char *path)
         memset(&drop, 0, sizeof drop);
         drop.radius = drop.axis_ratio = 1;
         for (k = 0; k < 3; k++) {
-            drop.position[k] = (place ? 1.15f * s->camera.right[k] + 0.7f * s->camera.up[k] : 0) - 2.3f * s->camera.back[k];
+            drop.position[k] =
+                (place ? 1.15f * s->camera.right[k] + 0.7f * s->camera.up[k] : 0) - 2.3f * s->camera.back[k];
             centre[k] = (double)drop.position[k];
         }
         ok = check("drop", raindrop_rain_set_drops(s->rain, &drop, 1));
@@ -302,7 +317,8 @@ static int set_camera(scene *s)
     s->camera.exposure = set->exposure;
     s->camera.aperture = set->aperture;
     s->camera.focus_distance = set->focus;
-    if (!image_create(&s->picture, set->size[0], set->size[1], 3) || !image_create(&s->background, set->size[0], set->size[1], 3))
+    if (!image_create(&s->picture, set->size[0], set->size[1], 3) ||
+        !image_create(&s->background, set->size[0], set->size[1], 3))
         return common_say(&set->common, s->picture.pixels ? s->background.message : s->picture.message);
     return check("background", raindrop_environment_render(s->background.pixels, (ptrdiff_t)set->size[0] * 3 * (ptrdiff_t)sizeof(float), set->size[0], set->size[1],
                                                            &s->camera, s->environment, &set->common.threads));
@@ -359,7 +375,8 @@ int main(int argc, char **argv)
     set.fov = 60;
     set.key = 0.18f;
     set.near_distance = 0.05f;
-    common_parse(&set.common, argc, argv, "raindrops", ".png .exr .hdr .pfm", options, (int)(sizeof options / sizeof *options));
+    common_parse(&set.common, argc, argv, "raindrops", ".png .exr .hdr .pfm", options,
+                 (int)(sizeof options / sizeof *options));
     if (set.sheet || set.closeup) set.common.writes = ".png";
     if (!common_may_write(&set.common, set.common.out)) return 2;
     s.set = &set;

@@ -1,8 +1,8 @@
 /* scene.h - a square in the rain: sky, ground, two sculptures, and the rasteriser that draws them.
    SPDX-License-Identifier: MIT-0 OR Unlicense
 
-   What a renderer has before any of the headers is asked: a picture of the light, triangles, and for each pixel the point
-   that it shows, its normal, colour and depth. Lengths are metres, y is up, radiance is about cd/m2. */
+   What a renderer has before any of the headers is asked: a picture of the light, triangles, and for each pixel the
+   point that it shows, its normal, colour and depth. Lengths are metres, y is up, radiance is about cd/m2. */
 
 #ifndef SCENE_H
 #define SCENE_H
@@ -73,7 +73,8 @@ static inline float scene_noise(float x, float y)
 {
     float fx = floorf(x), fy = floorf(y), u = scene_step(0, 1, x - fx), v = scene_step(0, 1, y - fy);
     int i = (int)fx, j = (int)fy;
-    return scene_mix(scene_mix(scene_hash(i, j), scene_hash(i + 1, j), u), scene_mix(scene_hash(i, j + 1), scene_hash(i + 1, j + 1), u), v);
+    return scene_mix(scene_mix(scene_hash(i, j), scene_hash(i + 1, j), u),
+                     scene_mix(scene_hash(i, j + 1), scene_hash(i + 1, j + 1), u), v);
 }
 
 static inline float scene_fbm(float x, float y, int octaves)
@@ -98,8 +99,24 @@ static inline scene_sky scene_sky_of(scene_hour hour)
 {
     static const scene_sky skies[] = {
         {{10, 15, 34}, {42, 33, 36}, {13000, 6300, 2100}, {0.7f, 0.48f, 0.52f}, {6, 5, 5}, 24, -68, 70, 60000},
-        {{0.012f, 0.022f, 0.06f}, {0.06f, 0.07f, 0.11f}, {0.9f, 1.1f, 1.5f}, {0.5f, 0.55f, 0.7f}, {0.012f, 0.013f, 0.016f}, 33, -38, 60, 900},
-        {{1100, 1900, 3900}, {3300, 3700, 4300}, {50000, 46000, 38000}, {1.35f, 1.25f, 1.12f}, {600, 620, 560}, 47, -58, 40, 3e6f},
+        {{0.012f, 0.022f, 0.06f},
+         {0.06f, 0.07f, 0.11f},
+         {0.9f, 1.1f, 1.5f},
+         {0.5f, 0.55f, 0.7f},
+         {0.012f, 0.013f, 0.016f},
+         33,
+         -38,
+         60,
+         900},
+        {{1100, 1900, 3900},
+         {3300, 3700, 4300},
+         {50000, 46000, 38000},
+         {1.35f, 1.25f, 1.12f},
+         {600, 620, 560},
+         47,
+         -58,
+         40,
+         3e6f},
     };
     return skies[hour];
 }
@@ -112,15 +129,18 @@ static inline void scene_sun_direction(float d[3], const scene_sky *sky, float t
     d[2] = -cosf(h) * cosf(a);
 }
 
-/* Warm lamps around the square at night, for mesopic eyes to tell from the moon: azimuth, height and half width in degrees, red,
-   green and blue. */
+/* Warm lamps around the square at night, for mesopic eyes to tell from the moon: azimuth, height and half width in
+   degrees, red, green and blue. */
 static inline void scene_lamps(float rgb[3], const float d[3])
 {
-    static const float lamps[][6] = {
-        {-78, 15, 1.1f, 110, 54, 17}, {82, 17, 1.1f, 90, 42, 12}, {164, 20, 1.6f, 90, 54, 21}, /* beside and behind the camera */
-        {-27, 1.6f, 0.16f, 90, 40, 12}, {-23.5f, 2.1f, 0.2f, 120, 70, 26}, {-21, 1.4f, 0.13f, 100, 36, 9}, {-14.6f, 1.7f, 0.18f, 90, 44, 13},
-        {-8, 1.2f, 0.13f, 120, 76, 38}, {-5.8f, 1.5f, 0.15f, 90, 37, 10}, {3.4f, 1.3f, 0.16f, 110, 48, 13}, {7.5f, 1.5f, 0.18f, 130, 85, 40},
-        {13, 1.5f, 0.13f, 110, 20, 9}, {19.6f, 2.2f, 0.2f, 110, 48, 14}, {22.8f, 1.6f, 0.15f, 100, 58, 24}, {28, 1.9f, 0.18f, 110, 45, 12}};
+    static const float lamps[][6] = {{-78, 15, 1.1f, 110, 54, 17},      {82, 17, 1.1f, 90, 42, 12},
+                                     {164, 20, 1.6f, 90, 54, 21}, /* beside and behind the camera */
+                                     {-27, 1.6f, 0.16f, 90, 40, 12},    {-23.5f, 2.1f, 0.2f, 120, 70, 26},
+                                     {-21, 1.4f, 0.13f, 100, 36, 9},    {-14.6f, 1.7f, 0.18f, 90, 44, 13},
+                                     {-8, 1.2f, 0.13f, 120, 76, 38},    {-5.8f, 1.5f, 0.15f, 90, 37, 10},
+                                     {3.4f, 1.3f, 0.16f, 110, 48, 13},  {7.5f, 1.5f, 0.18f, 130, 85, 40},
+                                     {13, 1.5f, 0.13f, 110, 20, 9},     {19.6f, 2.2f, 0.2f, 110, 48, 14},
+                                     {22.8f, 1.6f, 0.15f, 100, 58, 24}, {28, 1.9f, 0.18f, 110, 45, 12}};
     size_t i;
     int k;
     for (i = 0; i < sizeof lamps / sizeof lamps[0]; ++i) {
@@ -135,7 +155,8 @@ static inline void scene_lamps(float rgb[3], const float d[3])
 static inline void scene_sky_radiance(float rgb[3], const scene_sky *sky, scene_hour hour, float turn, const float d[3])
 {
     float sun[3], cosine, up = d[1] > 0 ? d[1] : 0, azimuth = atan2f(d[0], -d[2]);
-    float hill = 0.015f + 0.06f * scene_fbm(azimuth * 3 + 40, 1.3f, 4) + 0.008f * scene_fbm(azimuth * 50 + 40, 5.5f, 3), angle, cloud, land;
+    float hill = 0.015f + 0.06f * scene_fbm(azimuth * 3 + 40, 1.3f, 4) + 0.008f * scene_fbm(azimuth * 50 + 40, 5.5f, 3),
+          angle, cloud, land;
     int k;
     scene_sun_direction(sun, sky, turn);
     cosine = fminf(scene_dot(sun, d), 1);
@@ -144,7 +165,8 @@ static inline void scene_sky_radiance(float rgb[3], const scene_sky *sky, scene_
     cloud = scene_step(0.34f, 0.74f, cloud) * scene_step(0, 0.12f, up);
     for (k = 0; k < 3; ++k) {
         float clear = scene_mix(sky->horizon[k], sky->zenith[k], powf(up, 0.5f));
-        float glow = sky->glow[k] * expf(-(1 - cosine) * sky->sharpness) + 0.006f * sky->glow[k] * expf((cosine - 1) * 1.5f - up * 5);
+        float glow = sky->glow[k] * expf(-(1 - cosine) * sky->sharpness) +
+                     0.006f * sky->glow[k] * expf((cosine - 1) * 1.5f - up * 5);
         rgb[k] = (clear + glow) * scene_mix(1, sky->cloud[k], cloud);
         rgb[k] += sky->sun * sky->glow[k] / sky->glow[0] * scene_step(0.62f, 0.4f, angle) * (1 - 0.7f * cloud);
         land = scene_mix(sky->land[k], rgb[k], 0.3f);
@@ -163,9 +185,11 @@ static inline void scene_sky_rows(int begin, int end, int worker, void *context)
     (void)worker;
     for (y = begin; y < end; ++y)
         for (x = 0; x < width; ++x) {
-            float a = ((float)x + 0.5f) / (float)width * 6.2831853f - 3.1415927f, b = ((float)y + 0.5f) / (float)height * 3.1415927f, d[3];
+            float a = ((float)x + 0.5f) / (float)width * 6.2831853f - 3.1415927f,
+                  b = ((float)y + 0.5f) / (float)height * 3.1415927f, d[3];
             d[0] = sinf(b) * sinf(a), d[1] = cosf(b), d[2] = -sinf(b) * cosf(a);
-            scene_sky_radiance(job->out->pixels + ((size_t)y * (size_t)width + (size_t)x) * 3, &sky, job->hour, job->turn, d);
+            scene_sky_radiance(job->out->pixels + ((size_t)y * (size_t)width + (size_t)x) * 3, &sky, job->hour,
+                               job->turn, d);
         }
 }
 
@@ -190,9 +214,11 @@ static inline double scene_volume(const scene_object *o)
     double sum = 0;
     size_t i;
     for (i = 0; i < o->triangles; ++i) {
-        const float *a = o->positions + 3 * (size_t)o->indices[3 * i], *b = o->positions + 3 * (size_t)o->indices[3 * i + 1];
+        const float *a = o->positions + 3 * (size_t)o->indices[3 * i],
+                    *b = o->positions + 3 * (size_t)o->indices[3 * i + 1];
         const float *c = o->positions + 3 * (size_t)o->indices[3 * i + 2];
-        sum += (double)(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]));
+        sum += (double)(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+                        a[2] * (b[0] * c[1] - b[1] * c[0]));
     }
     return sum;
 }
@@ -275,7 +301,8 @@ static inline int scene_make_knot(scene_object *o, unsigned along, unsigned arou
     }
     for (i = 0; i < along; ++i)
         for (j = 0; j < around; ++j)
-            scene_quad(o, &n, i * around + j, i * around + (j + 1) % around, (i + 1) % along * around + (j + 1) % around, (i + 1) % along * around + j);
+            scene_quad(o, &n, i * around + j, i * around + (j + 1) % around,
+                       (i + 1) % along * around + (j + 1) % around, (i + 1) % along * around + j);
     scene_finish_object(o);
     return 1;
 }
@@ -283,8 +310,10 @@ static inline int scene_make_knot(scene_object *o, unsigned along, unsigned arou
 /* A chess pawn: a profile of radii and heights, smoothed, turned about the axis. */
 static inline int scene_make_pawn(scene_object *o, unsigned around, unsigned steps)
 {
-    static const float profile[][2] = {{0, 0}, {0.62f, 0}, {0.66f, 0.06f}, {0.66f, 0.16f}, {0.56f, 0.26f}, {0.5f, 0.3f}, {0.36f, 0.46f}, {0.25f, 0.75f},
-        {0.22f, 1.05f}, {0.3f, 1.14f}, {0.42f, 1.18f}, {0.42f, 1.24f}, {0.26f, 1.29f}, {0.32f, 1.4f}, {0.41f, 1.56f}, {0.41f, 1.72f}, {0.3f, 1.9f}, {0.16f, 1.985f}, {0, 2}};
+    static const float profile[][2] = {{0, 0},         {0.62f, 0},     {0.66f, 0.06f},  {0.66f, 0.16f}, {0.56f, 0.26f},
+                                       {0.5f, 0.3f},   {0.36f, 0.46f}, {0.25f, 0.75f},  {0.22f, 1.05f}, {0.3f, 1.14f},
+                                       {0.42f, 1.18f}, {0.42f, 1.24f}, {0.26f, 1.29f},  {0.32f, 1.4f},  {0.41f, 1.56f},
+                                       {0.41f, 1.72f}, {0.3f, 1.9f},   {0.16f, 1.985f}, {0, 2}};
     unsigned spans = sizeof profile / sizeof profile[0] - 1, rings = spans * steps - 1, i, j;
     size_t n = 0, top, bottom;
     if (!scene_reserve(o, (size_t)rings * around + 2, 2 * (size_t)rings * around)) return 0;
@@ -293,7 +322,8 @@ static inline int scene_make_pawn(scene_object *o, unsigned around, unsigned ste
         float t = (float)((i + 1) % steps) / (float)steps, p[2];
         int k;
         for (k = 0; k < 2; ++k) { /* Catmull-Rom */
-            float a = profile[span > 0 ? span - 1 : 0][k], b = profile[span][k], c = profile[span < spans ? span + 1 : spans][k];
+            float a = profile[span > 0 ? span - 1 : 0][k], b = profile[span][k],
+                  c = profile[span < spans ? span + 1 : spans][k];
             float d = profile[span + 2 < spans ? span + 2 : spans][k];
             p[k] = b + 0.5f * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)));
         }
@@ -306,7 +336,9 @@ static inline int scene_make_pawn(scene_object *o, unsigned around, unsigned ste
     memset(o->positions + 3 * bottom, 0, 6 * sizeof(float));
     o->positions[3 * top + 1] = 2;
     for (i = 0; i + 1 < rings; ++i)
-        for (j = 0; j < around; ++j) scene_quad(o, &n, i * around + j, (i + 1) * around + j, (i + 1) * around + (j + 1) % around, i * around + (j + 1) % around);
+        for (j = 0; j < around; ++j)
+            scene_quad(o, &n, i * around + j, (i + 1) * around + j, (i + 1) * around + (j + 1) % around,
+                       i * around + (j + 1) % around);
     for (j = 0; j < around; ++j) {
         unsigned *t = o->indices + 3 * n, next = (j + 1) % around;
         t[0] = (unsigned)bottom, t[1] = j, t[2] = next;
@@ -354,19 +386,26 @@ static inline float scene_joint(float x, float z, int stone[2])
 }
 
 /* Wetness 0..1: puddles lie where the stones lie low. */
-static inline float scene_wetness(float x, float z) { return scene_step(0.40f, 0.56f, scene_fbm(x * 1.7f + 7.3f, z * 1.7f + 2.9f, 4)); }
+static inline float scene_wetness(float x, float z)
+{
+    return scene_step(0.40f, 0.56f, scene_fbm(x * 1.7f + 7.3f, z * 1.7f + 2.9f, 4));
+}
 
 /* Colour and normal of the ground; `size` is that of a pixel there, beyond which detail is left to the mean. */
 static inline void scene_ground(float colour[3], float normal[3], float x, float z, float size)
 {
     int stone[2], other[2];
-    float fade = 1 - scene_step(0.02f, 0.12f, size), joint = scene_joint(x, z, stone), wet = scene_wetness(x, z), e = 0.004f;
+    float fade = 1 - scene_step(0.02f, 0.12f, size), joint = scene_joint(x, z, stone), wet = scene_wetness(x, z),
+          e = 0.004f;
     float tint = 0.72f + 0.5f * scene_hash(stone[0], stone[1]), grain = 0.82f + 0.36f * scene_fbm(x * 60, z * 60, 3);
     float shade = scene_mix(0.24f, 0.26f * tint * grain * (1 - 0.6f * joint), fade) * scene_mix(1, 0.55f, wet);
     float bump = fade * (1 - wet) * 0.5f;
-    colour[0] = shade * (1 + 0.10f * (scene_hash(stone[1], stone[0]) - 0.4f) * fade), colour[1] = shade * 0.96f, colour[2] = shade * 0.9f;
-    normal[0] = bump * (scene_joint(x + e, z, other) - joint + 0.3f * (scene_fbm(x * 60 + 0.3f, z * 60, 3) - scene_fbm(x * 60, z * 60, 3)));
-    normal[2] = bump * (scene_joint(x, z + e, other) - joint + 0.3f * (scene_fbm(x * 60, z * 60 + 0.3f, 3) - scene_fbm(x * 60, z * 60, 3)));
+    colour[0] = shade * (1 + 0.10f * (scene_hash(stone[1], stone[0]) - 0.4f) * fade), colour[1] = shade * 0.96f,
+    colour[2] = shade * 0.9f;
+    normal[0] = bump * (scene_joint(x + e, z, other) - joint +
+                        0.3f * (scene_fbm(x * 60 + 0.3f, z * 60, 3) - scene_fbm(x * 60, z * 60, 3)));
+    normal[2] = bump * (scene_joint(x, z + e, other) - joint +
+                        0.3f * (scene_fbm(x * 60, z * 60 + 0.3f, 3) - scene_fbm(x * 60, z * 60, 3)));
     normal[1] = 1;
     scene_normalise(normal);
 }
@@ -406,7 +445,8 @@ static inline void scene_free(scene *s)
 static inline void scene_ray(const scene *s, int x, int y, float ray[3])
 {
     const raindrop_camera *c = &s->camera;
-    float t = tanf(0.5f * c->fov_y), u = (2 * ((float)x + 0.5f) - (float)s->width) / (float)s->height * t, v = (1 - 2 * ((float)y + 0.5f) / (float)s->height) * t;
+    float t = tanf(0.5f * c->fov_y), u = (2 * ((float)x + 0.5f) - (float)s->width) / (float)s->height * t,
+          v = (1 - 2 * ((float)y + 0.5f) / (float)s->height) * t;
     int k;
     for (k = 0; k < 3; ++k) ray[k] = u * c->right[k] + v * c->up[k] - c->back[k];
 }
@@ -427,10 +467,12 @@ static inline void scene_draw_ground(scene *s, int top, int bottom)
             s->layers[1].depth[i] = INFINITY;
             l->depth[i] = t;
             l->what[i] = t < INFINITY ? SCENE_GROUND : SCENE_SKY;
-            for (k = 0; k < 3; ++k) l->points[3 * i + (size_t)k] = t < INFINITY ? s->camera.position[k] + t * ray[k] : 0;
+            for (k = 0; k < 3; ++k)
+                l->points[3 * i + (size_t)k] = t < INFINITY ? s->camera.position[k] + t * ray[k] : 0;
             if (t < INFINITY) {
                 l->points[3 * i + 1] = 0;
-                scene_ground(colour, l->normals + 3 * i, l->points[3 * i], l->points[3 * i + 2], t * t / (float)s->height);
+                scene_ground(colour, l->normals + 3 * i, l->points[3 * i], l->points[3 * i + 2],
+                             t * t / (float)s->height);
             }
         }
 }
@@ -463,8 +505,10 @@ static inline void scene_draw_triangle(scene *s, int layer, int object, const un
     }
     area = (v[1][0] - v[0][0]) * (v[2][1] - v[0][1]) - (v[2][0] - v[0][0]) * (v[1][1] - v[0][1]);
     if (!(fabsf(area) > 1e-12f)) return;
-    x0 = (int)fmaxf(floorf(fminf(v[0][0], fminf(v[1][0], v[2][0]))), 0), x1 = (int)fminf(fmaxf(v[0][0], fmaxf(v[1][0], v[2][0])) + 1, (float)s->width);
-    y0 = (int)fmaxf(floorf(fminf(v[0][1], fminf(v[1][1], v[2][1]))), (float)top), y1 = (int)fminf(fmaxf(v[0][1], fmaxf(v[1][1], v[2][1])) + 1, (float)bottom);
+    x0 = (int)fmaxf(floorf(fminf(v[0][0], fminf(v[1][0], v[2][0]))), 0),
+    x1 = (int)fminf(fmaxf(v[0][0], fmaxf(v[1][0], v[2][0])) + 1, (float)s->width);
+    y0 = (int)fmaxf(floorf(fminf(v[0][1], fminf(v[1][1], v[2][1]))), (float)top),
+    y1 = (int)fminf(fmaxf(v[0][1], fmaxf(v[1][1], v[2][1])) + 1, (float)bottom);
     for (y = y0; y < y1; ++y)
         for (x = x0; x < x1; ++x) {
             size_t i = (size_t)y * (size_t)s->width + (size_t)x;
@@ -481,7 +525,9 @@ static inline void scene_draw_triangle(scene *s, int layer, int object, const un
             for (c = 0; c < 3; ++c) w[c] *= v[c][2] * depth;
             for (k = 0; k < 3; ++k) {
                 l->points[3 * i + (size_t)k] = w[0] * world[0][k] + w[1] * world[1][k] + w[2] * world[2][k];
-                l->normals[3 * i + (size_t)k] = w[0] * o->normals[3 * corner[0] + (unsigned)k] + w[1] * o->normals[3 * corner[1] + (unsigned)k] + w[2] * o->normals[3 * corner[2] + (unsigned)k];
+                l->normals[3 * i + (size_t)k] = w[0] * o->normals[3 * corner[0] + (unsigned)k] +
+                                                w[1] * o->normals[3 * corner[1] + (unsigned)k] +
+                                                w[2] * o->normals[3 * corner[2] + (unsigned)k];
             }
             l->points[3 * i + 1] *= flip; /* the true point above the ground */
         }
@@ -497,7 +543,8 @@ static inline void scene_rows(int begin, int end, int worker, void *context)
     scene_draw_ground(s, top, bottom);
     for (layer = 0; layer < 2; ++layer)
         for (object = 0; object < SCENE_OBJECTS; ++object)
-            for (t = 0; t < s->objects[object].triangles; ++t) scene_draw_triangle(s, layer, object, s->objects[object].indices + 3 * t, top, bottom);
+            for (t = 0; t < s->objects[object].triangles; ++t)
+                scene_draw_triangle(s, layer, object, s->objects[object].indices + 3 * t, top, bottom);
     for (i = (size_t)top * (size_t)s->width; i < (size_t)bottom * (size_t)s->width; ++i) {
         const raindrop_camera *c = &s->camera;
         float *n = s->layers[0].normals + 3 * i, *out = s->layers[0].view_normals + 3 * i;
@@ -511,6 +558,9 @@ static inline void scene_rows(int begin, int end, int worker, void *context)
 }
 
 /* Fills both layers: what is seen, and what the ground mirrors. Bands of 16 rows share nothing. */
-static inline void scene_draw(scene *s, const sat_threads *threads) { scene_for(threads, (s->height + 15) / 16, scene_rows, s); }
+static inline void scene_draw(scene *s, const sat_threads *threads)
+{
+    scene_for(threads, (s->height + 15) / 16, scene_rows, s);
+}
 
 #endif /* SCENE_H */

@@ -31,7 +31,8 @@ static unsigned char *grey(const float *v)
 /* A lamp and the sky's light: S = rho (L_lamp + L_sky A) (Slomp 2012, eq 5.3, where A belongs to the ambient light). */
 static int light(image *out, const ref_picture *p, const float *open)
 {
-    static const float sky[3] = {0.265f, 0.42f, 0.69f}, surface[3] = {0.78f, 0.74f, 0.68f}, lamp[3] = {0.45f, 0.75f, 0.48f};
+    static const float sky[3] = {0.265f, 0.42f, 0.69f}, surface[3] = {0.78f, 0.74f, 0.68f},
+                       lamp[3] = {0.45f, 0.75f, 0.48f};
     size_t i;
     int c;
     if (!image_create(out, p->width, p->height, 3)) return 0;
@@ -81,7 +82,8 @@ static double accessibility(const common_settings *common, float *out, const ref
 static int compare(const common_settings *common, ref_picture *p, ssao_sat_options options)
 {
     static const char *const names[] = {"minimalist", "normal-guided", "refined", "plane", "slabs"};
-    static const ssao_sat_method order[] = {SSAO_SAT_MINIMALIST, SSAO_SAT_NORMAL_GUIDED, SSAO_SAT_REFINED, SSAO_SAT_PLANE, SSAO_SAT_SLABS};
+    static const ssao_sat_method order[] = {SSAO_SAT_MINIMALIST, SSAO_SAT_NORMAL_GUIDED, SSAO_SAT_REFINED,
+                                            SSAO_SAT_PLANE, SSAO_SAT_SLABS};
     common_cell cells[8];
     char labels[8][80];
     float *out = (float *)malloc(count * sizeof(float));
@@ -96,7 +98,8 @@ static int compare(const common_settings *common, ref_picture *p, ssao_sat_optio
         double seconds;
         options.method = order[i];
         seconds = accessibility(common, out, p, options);
-        snprintf(labels[i], sizeof labels[i], "%s: RMSE %.3f, %.1f ms", names[i], ref_rmse(p, out, p->ao[1]), 1e3 * seconds);
+        snprintf(labels[i], sizeof labels[i], "%s: RMSE %.3f, %.1f ms", names[i], ref_rmse(p, out, p->ao[1]),
+                 1e3 * seconds);
         puts(labels[i]);
         cells[i].rgb = grey(out);
     }
@@ -179,7 +182,8 @@ int main(int argc, char **argv)
         {"compare", 'b', &sheet, 0, 0, "contact sheet of all methods"},
     };
     o.radius = 0.25;
-    common_parse(&common, argc, argv, "ssao", ".png .exr .hdr .pfm", options, (int)(sizeof options / sizeof options[0]));
+    common_parse(&common, argc, argv, "ssao", ".png .exr .hdr .pfm", options,
+                 (int)(sizeof options / sizeof options[0]));
     if (sheet) common.writes = ".png";
     if (!common_may_write(&common, common.out)) return 2;
     if (shape ? !open_mesh(&s, shape) : (ref_open(&s, scene), 0)) return 1;

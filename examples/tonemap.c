@@ -36,9 +36,12 @@ static void scene_pixel(float *rgb, float u, float v, int x, int y)
         if (sun < 0.018f) light = 1e7f, r = 1, g = 0.95f, b = 0.85f;
     } else if (lx * lx + ly * ly < 1) {                       /* the lamp */
         light = 60, r = 4, g = 0.15f, b = 0.1f;
-    } else {                                                  /* walls: light falls off from the window, and from the lamp */
+    } else {                                                  /* walls: light falls off from the window, and from the
+                                                                 lamp */
         float distance = hypotf(u - 0.62f, v - 0.36f), brick = (int)(v * 24) % 2 ? 0.5f : 0.0f;
-        float joint = fabsf(fmodf(u * 16 + brick, 1.0f) - 0.5f) > 0.46f || fabsf(fmodf(v * 24, 1.0f) - 0.5f) > 0.44f ? 0.6f : 1.0f;
+        float joint = fabsf(fmodf(u * 16 + brick, 1.0f) - 0.5f) > 0.46f || fabsf(fmodf(v * 24, 1.0f) - 0.5f) > 0.44f
+                          ? 0.6f
+                          : 1.0f;
         light = 30 * expf(-distance * 12) * joint * grain;
         light += v > 0.85f ? 0.3f * expf(-fabsf(u - 0.5f) * 8) * grain : 0;
         if (u < 0.09f && v > 0.75f) light = 1e-3f * (((int)(u * 160) + (int)(v * 90)) % 2 ? 1.0f : 3.0f) * grain;
@@ -83,7 +86,8 @@ static void print_stats(const tonemap_stats *s, const image *picture, double sec
 }
 
 /* Display values of 8 bits (sRGB) or floats (linear): the one of them that is not NULL. */
-static int map_picture(const common_settings *common, unsigned char *bytes, float *floats, const image *picture, const tonemap_options *options, tonemap_stats *stats, double *seconds)
+static int map_picture(const common_settings *common, unsigned char *bytes, float *floats, const image *picture,
+                       const tonemap_options *options, tonemap_stats *stats, double *seconds)
 {
     sat_image view = image_view(picture);
     tonemap *map;
@@ -93,14 +97,22 @@ static int map_picture(const common_settings *common, unsigned char *bytes, floa
     if (result == SAT_OK) {
         start = common_clock();
         if (bytes) result = tonemap_apply_u8(map, bytes, (ptrdiff_t)picture->width * 3, &view, 0, stats);
-        else result = tonemap_apply_f32(map, floats, (ptrdiff_t)picture->width * 3 * (ptrdiff_t)sizeof(float), &view, 0, stats);
+        else
+            result = tonemap_apply_f32(map, floats, (ptrdiff_t)picture->width * 3 * (ptrdiff_t)sizeof(float), &view, 0,
+                                       stats);
         *seconds = common_clock() - start;
         tonemap_destroy(map);
     }
     return result == SAT_OK || common_say_result(common, "tone mapping", result, tonemap_explain(why, sizeof why, picture->width, picture->height, options));
 }
 
-typedef struct variant { const char *label; tonemap_operator operation; tonemap_mesopic mesopic; int automatic; double soft; } variant;
+typedef struct variant {
+    const char *label;
+    tonemap_operator operation;
+    tonemap_mesopic mesopic;
+    int automatic;
+    double soft;
+} variant;
 
 static int write_sheet(const common_settings *common, const image *picture, const tonemap_options *options)
 {
@@ -144,11 +156,13 @@ static int write_sheet(const common_settings *common, const image *picture, cons
 static int write_picture(const common_settings *common, image *picture, const tonemap_options *options)
 {
     int as_bytes = image_ends_with(common->out, ".png"), ok;
-    unsigned char *pixels = as_bytes ? (unsigned char *)malloc((size_t)picture->width * (size_t)picture->height * 3) : NULL;
+    unsigned char *pixels =
+        as_bytes ? (unsigned char *)malloc((size_t)picture->width * (size_t)picture->height * 3) : NULL;
     tonemap_stats stats;
     double seconds = 0;
     ok = (!as_bytes || pixels || common_say(common, "no memory")) && map_picture(common, pixels, picture->pixels, picture, options, &stats, &seconds);
-    ok = ok && (as_bytes ? common_save_u8(common, common->out, pixels, picture->width, picture->height, 3) : common_save(common, common->out, picture));
+    ok = ok && (as_bytes ? common_save_u8(common, common->out, pixels, picture->width, picture->height, 3)
+                         : common_save(common, common->out, picture));
     if (ok && common->stats) print_stats(&stats, picture, seconds);
     free(pixels);
     return ok;
@@ -179,13 +193,15 @@ int main(int argc, char **argv)
     };
     common_settings common;
     image picture;
-    common_parse(&common, argc, argv, "tonemap", ".png .exr .hdr .pfm", options, (int)(sizeof options / sizeof options[0]));
+    common_parse(&common, argc, argv, "tonemap", ".png .exr .hdr .pfm", options,
+                 (int)(sizeof options / sizeof options[0]));
     if (compare) common.writes = ".png";
     if (!common_may_write(&common, common.out)) return 2;
     o.operation = (tonemap_operator)operation;
     o.mesopic = (tonemap_mesopic)mesopic;
     o.threads = common.threads;
-    if (!(in ? image_load(&picture, in) : make_scene(&picture, size[0], size[1]))) return common_say(&common, picture.message), 1;
+    if (!(in ? image_load(&picture, in) : make_scene(&picture, size[0], size[1])))
+        return common_say(&common, picture.message), 1;
     ok = compare ? write_sheet(&common, &picture, &o) : write_picture(&common, &picture, &o);
     image_free(&picture);
     common_close(&common);

@@ -86,10 +86,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         for (i = 0; i < 4; i++) {
             fiv_environment_irradiance(e, rgb, normals + 3 * i);
         }
-        if (fiv_occluder_create(&o, positions, 12, indices, 14, &oo, NULL) == SAT_OK && fiv_occluder_light(o, e, rotated ? turn : NULL) == SAT_OK) {
+        if (fiv_occluder_create(&o, positions, 12, indices, 14, &oo, NULL) == SAT_OK &&
+            fiv_occluder_light(o, e, rotated ? turn : NULL) == SAT_OK) {
             for (i = 0; i < 2; i++) {
                 instances[i].occluder = o;
-                instances[i].position[0] = take_float(&in), instances[i].position[1] = take_float(&in), instances[i].position[2] = take_float(&in);
+                instances[i].position[0] = take_float(&in), instances[i].position[1] = take_float(&in),
+                instances[i].position[2] = take_float(&in);
                 instances[i].scale = take_float(&in);
             }
             fiv_occluder_prepare(o, instances, 2, points, 4, NULL);

@@ -72,9 +72,13 @@ static void fuzz_render(const raindrop_environment *environment, raindrop_rain *
     o.exit_fresnel = fuzz_int(in, 0, 1);
     o.orders_radius = 8 * fuzz_float(in);
     for (i = 0; i < 3 * FUZZ_W * FUZZ_H; i++) rgb[i] = 1;
-    if (raindrop_render(rgb, FUZZ_W * 12, FUZZ_W, FUZZ_H, fuzz_int(in, 0, 1) ? depth : NULL, &camera, rain, environment, &o, &stats) != SAT_OK) return;
+    if (raindrop_render(rgb, FUZZ_W * 12, FUZZ_W, FUZZ_H, fuzz_int(in, 0, 1) ? depth : NULL, &camera, rain, environment,
+                        &o, &stats) != SAT_OK)
+        return;
     for (i = 0; i < 3 * FUZZ_W * FUZZ_H; i++) SAT_ASSERT(sat__is_finite(rgb[i]));
-    SAT_ASSERT(stats.drawn_near + stats.drawn_far + stats.invalid + stats.inside + stats.behind + stats.near_plane + stats.outside + stats.hidden + stats.below_threshold == stats.drops);
+    SAT_ASSERT(stats.drawn_near + stats.drawn_far + stats.invalid + stats.inside + stats.behind + stats.near_plane +
+                   stats.outside + stats.hidden + stats.below_threshold ==
+               stats.drops);
 }
 
 int LLVMFuzzerTestOneInput(const unsigned char *bytes, size_t size);

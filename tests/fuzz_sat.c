@@ -36,7 +36,8 @@ static void query(const sat_table *t, input *in)
         double fx = (double)take_float(in), fy = (double)take_float(in);
         sink += sat_sum(t, i % 5 - 1, x0, y0, x1, y1) + sat_mean(t, 0, x0 % 64, y0 % 64, x1 % 64, y1 % 64);
         sink += sat_sum_fractional(t, 0, fx, fy, (double)take_float(in), (double)take_float(in));
-        sink += sat_mean_border(t, 0, fx, fy, (double)take_float(in), fy + 3, (sat_border)take(in, 5), (sat_border)take(in, 5));
+        sink += sat_mean_border(t, 0, fx, fy, (double)take_float(in), fy + 3, (sat_border)take(in, 5),
+                                (sat_border)take(in, 5));
         sink += sat_error_bound(t, 0, x0, y0) + sat_error_rms(t, 0, x1, y1) + (double)sat_restore(t, 0, x0, y0);
     }
 }
@@ -64,7 +65,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
     image.height = (int)take(&in, 64) + 1;
     image.channels = (int)take(&in, 4) + 1;
     image.format = (sat_format)take(&in, 4);
-    image.stride = (ptrdiff_t)((size_t)(image.width * image.channels) * (image.format == SAT_F32 ? 4 : image.format == SAT_U8 ? 1 : 2));
+    image.stride = (ptrdiff_t)((size_t)(image.width * image.channels) * (image.format == SAT_F32  ? 4
+                                                                         : image.format == SAT_U8 ? 1
+                                                                                                  : 2));
     image.pixels = memory;
     memcpy(memory, in.bytes, in.size < sizeof memory ? in.size : sizeof memory);
     memcpy(radii, memory, sizeof radii);
@@ -76,8 +79,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
         sat_build(t, &image);
         query(t, &in);
         sat_update(t, &image, (int)take(&in, 64), (int)take(&in, 64), (int)take(&in, 80), (int)take(&in, 80));
-        sat_box_filter(out, (ptrdiff_t)((size_t)(image.width * image.channels) * sizeof(float)), t, (int)(take(&in, 0) & 0x7fffffff));
-        sat_box_filter_variable(out, (ptrdiff_t)((size_t)(image.width * image.channels) * sizeof(float)), t, radii, 64 * 4);
+        sat_box_filter(out, (ptrdiff_t)((size_t)(image.width * image.channels) * sizeof(float)), t,
+                       (int)(take(&in, 0) & 0x7fffffff));
+        sat_box_filter_variable(out, (ptrdiff_t)((size_t)(image.width * image.channels) * sizeof(float)), t, radii,
+                                64 * 4);
         query(t, &in);
         sat_destroy(t);
     }

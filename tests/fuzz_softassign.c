@@ -1,4 +1,5 @@
-/* Fuzzing softassign.h: any sizes, costs, capacities, options, and budgets. Build: clang -fsanitize=fuzzer,address,undefined. */
+/* Fuzzing softassign.h: any sizes, costs, capacities, options, and budgets. Build: clang
+   -fsanitize=fuzzer,address,undefined. */
 #define SAT_IMPLEMENTATION
 #include "sat.h"
 #define SOFTASSIGN_IMPLEMENTATION
@@ -52,7 +53,8 @@ static void check(const int *x, const softassign_problem *p, const softassign_op
     for (i = 0; p->minimum_use && o->min_distance <= 0 && i < p->columns; i++)
         if (used[i] < p->minimum_use[i] && o->method <= SOFTASSIGN_FAST) abort();
     if (!(r->lower_bound <= r->cost) || r->gap < 0) {
-        fprintf(stderr, "method %d: cost %.17g, bound %.17g, gap %g\n", (int)r->method, r->cost, r->lower_bound, r->gap);
+        fprintf(stderr, "method %d: cost %.17g, bound %.17g, gap %g\n", (int)r->method, r->cost, r->lower_bound,
+                r->gap);
         abort();
     }
 }

@@ -1,4 +1,5 @@
-/* Fuzzing ssao_sat.h: any options, matrices, sizes, strides and depths. Build: clang -fsanitize=fuzzer,address,undefined. */
+/* Fuzzing ssao_sat.h: any options, matrices, sizes, strides and depths. Build: clang
+   -fsanitize=fuzzer,address,undefined. */
 #define SAT_IMPLEMENTATION
 #define SSAO_SAT_IMPLEMENTATION
 #include "ssao_sat.h"
@@ -94,7 +95,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
     if (ssao_sat_create(&ao, w, h, &o) != SAT_OK) return 0;
     if (ssao_sat_apply(ao, out, 0, &picture, &stats) == SAT_OK) {
         check(out, w * h, 0);
-        if (stats.sky + stats.tiny + stats.flat + stats.estimated != stats.pixels && stats.farthest > 0 && stats.estimated) abort();
+        if (stats.sky + stats.tiny + stats.flat + stats.estimated != stats.pixels && stats.farthest > 0 &&
+            stats.estimated)
+            abort();
         ssao_sat_apply_bent(ao, out, 0, bent, 0, &picture, NULL);
         if (ssao_sat_apply_signed(ao, out, 0, &picture, NULL) == SAT_OK) check(out, w * h, -1);
     }

@@ -1,5 +1,5 @@
-/* gl_es.h - a driver that calls itself OpenGL ES 3.0: the headers then write GLSL ES 3.00, which desktop drivers take too.
-   Include it after the header that brings the function table. */
+/* gl_es.h - a driver that calls itself OpenGL ES 3.0: the headers then write GLSL ES 3.00, which desktop drivers take
+   too. Include it after the header that brings the function table. */
 
 #ifndef GL_ES_H
 #define GL_ES_H

@@ -1,5 +1,5 @@
-/* What other headers define: the headers of this project must compile after it (tests/check_house.sh). The standard headers go
-   first, for they would not survive it. SPDX-License-Identifier: MIT-0 OR Unlicense */
+/* What other headers define: the headers of this project must compile after it (tests/check_house.sh). The standard
+   headers go first, for they would not survive it. SPDX-License-Identifier: MIT-0 OR Unlicense */
 
 #include <assert.h>
 #include <float.h>

@@ -45,7 +45,8 @@ static inline metrics_codes metrics_compare_codes(const double *a, const double 
 
 /* ---- separable convolution; the kernel is renormalised where it leaves the picture */
 
-static inline void metrics_convolve(double *out, const double *in, int width, int height, const double *kernel, int radius)
+static inline void metrics_convolve(double *out, const double *in, int width, int height, const double *kernel,
+                                    int radius)
 {
     double *middle = metrics_alloc((size_t)width * (size_t)height);
     int x, y, i;
@@ -95,7 +96,8 @@ static inline double metrics_ssim(const double *a, const double *b, int width, i
     for (k = 0; k < 11; ++k) kernel[k] = exp(-0.5 * (k - 5) * (k - 5) / 2.25);
     for (k = 0; k < 5; ++k) {
         plane[k] = metrics_alloc(n);
-        for (i = 0; i < n; ++i) tmp[i] = k == 0 ? a[i] : k == 1 ? b[i] : k == 2 ? a[i] * a[i] : k == 3 ? b[i] * b[i] : a[i] * b[i];
+        for (i = 0; i < n; ++i)
+            tmp[i] = k == 0 ? a[i] : k == 1 ? b[i] : k == 2 ? a[i] * a[i] : k == 3 ? b[i] * b[i] : a[i] * b[i];
         metrics_convolve(plane[k], tmp, width, height, kernel, 5);
     }
     for (y = 5; y < height - 5; ++y)
@@ -144,7 +146,10 @@ static inline void metrics_rgb(double *rgb, const double *xyz)
 }
 
 static inline double metrics_lab_f(double t) { return t > 216.0 / 24389 ? cbrt(t) : t * (24389.0 / 3132) + 16.0 / 116; }
-static inline double metrics_lab_inverse(double f) { return f > 6.0 / 29 ? f * f * f : (f - 16.0 / 116) * (3132.0 / 24389); }
+static inline double metrics_lab_inverse(double f)
+{
+    return f > 6.0 / 29 ? f * f * f : (f - 16.0 / 116) * (3132.0 / 24389);
+}
 
 /* D65, Y of white 1 */
 static inline void metrics_lab(double *lab, const double *xyz)
@@ -157,7 +162,8 @@ static inline void metrics_lab(double *lab, const double *xyz)
 
 /* ---- S-CIELAB (Zhang and Wandell 1997): mean of Delta E 1976 after blurring the opponent planes as the eye does */
 
-static inline void metrics_scielab_planes(double *plane[3], const double *codes, int width, int height, double pixels_per_degree)
+static inline void metrics_scielab_planes(double *plane[3], const double *codes, int width, int height,
+                                          double pixels_per_degree)
 {
     static const double weight[3][3] = {{0.921, 0.105, -0.108}, {0.531, 0.330, 0}, {0.488, 0.371, 0}};
     static const double spread[3][3] = {{0.0283, 0.133, 4.336}, {0.0392, 0.494, 0}, {0.0536, 0.386, 0}};
@@ -179,7 +185,8 @@ static inline void metrics_scielab_planes(double *plane[3], const double *codes,
         for (k = 0; k < 3; ++k) {
             double sigma = spread[c][k] * pixels_per_degree / sqrt(2.0);
             if (weight[c][k] == 0) continue;
-            if (sigma > 40) sigma = 40;      /* the widest is a mean of the surroundings; wider than this changes nothing */
+            if (sigma > 40) sigma = 40;      /* the widest is a mean of the surroundings; wider than this changes
+                                                nothing */
             metrics_gauss(blurred, source, width, height, sigma);
             for (i = 0; i < n; ++i) plane[c][i] += weight[c][k] / total * blurred[i];
         }
@@ -246,9 +253,11 @@ static inline double metrics_hyab(const double *p, const double *q)
 }
 
 /* The filtered picture as Hunt-adjusted Lab, and its achromatic plane (0..1) for the features. */
-static inline void metrics_flip_planes(double *lab, double *grey, const double *codes, int width, int height, double ppd)
+static inline void metrics_flip_planes(double *lab, double *grey, const double *codes, int width, int height,
+                                       double ppd)
 {
-    static const double far_share = 13.5 * 11.2099824 * 0.025, near_share = 34.1 * 8.86226925 * 0.04; /* a sqrt(pi / b) times the area ~ b */
+    static const double far_share = 13.5 * 11.2099824 * 0.025,
+                        near_share = 34.1 * 8.86226925 * 0.04; /* a sqrt(pi / b) times the area ~ b */
     size_t n = (size_t)width * (size_t)height, i;
     double *plane[3], *one = metrics_alloc(n), *two = metrics_alloc(n);
     int c;
@@ -268,7 +277,8 @@ static inline void metrics_flip_planes(double *lab, double *grey, const double *
     metrics_flip_blur(one, plane[2], width, height, 0.04, ppd);
     metrics_flip_blur(two, plane[2], width, height, 0.025, ppd);
     for (i = 0; i < n; ++i) {
-        double xyz[3], rgb[3], y = (plane[0][i] + 16) / 116, blue = (near_share * one[i] + far_share * two[i]) / (near_share + far_share);
+        double xyz[3], rgb[3], y = (plane[0][i] + 16) / 116,
+                               blue = (near_share * one[i] + far_share * two[i]) / (near_share + far_share);
         xyz[1] = y;
         xyz[0] = 0.950428545 * (y + plane[1][i] / 500);
         xyz[2] = 1.088900371 * (y - blue / 200);
@@ -281,8 +291,10 @@ static inline void metrics_flip_planes(double *lab, double *grey, const double *
     free(two);
 }
 
-/* Strength of edges and of points: first and second derivatives of a Gaussian, positive and negative lobes normalised. */
-static inline void metrics_flip_features(double *edge, double *point, const double *grey, int width, int height, double ppd)
+/* Strength of edges and of points: first and second derivatives of a Gaussian, positive and negative lobes
+   normalised. */
+static inline void metrics_flip_features(double *edge, double *point, const double *grey, int width, int height,
+                                         double ppd)
 {
     double sigma = 0.5 * 0.082 * ppd, sums[4] = {0, 0, 0, 0}, kernel[3][64];
     int radius = (int)ceil(3 * sigma), i, x, y;
@@ -347,7 +359,8 @@ static inline double metrics_flip(const double *a, const double *b, int width, i
     }
     for (i = 0; i < n; ++i) {
         double colour = pow(metrics_hyab(lab[0] + 3 * i, lab[1] + 3 * i), 0.7), limit = 0.4 * most;
-        double e = fabs(edge[0][i] - edge[1][i]), f = fabs(point[0][i] - point[1][i]), feature = sqrt((e > f ? e : f) / sqrt(2.0));
+        double e = fabs(edge[0][i] - edge[1][i]), f = fabs(point[0][i] - point[1][i]),
+               feature = sqrt((e > f ? e : f) / sqrt(2.0));
         colour = colour < limit ? 0.95 / limit * colour : 0.95 + (colour - limit) / (most - limit) * 0.05;
         total += pow(colour, 1 - (feature < 1 ? feature : 1));
     }

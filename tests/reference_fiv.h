@@ -1,8 +1,9 @@
 /* reference_fiv.h - ground truth for fiv.h: rays through every light of the environment against every triangle.
    SPDX-License-Identifier: MIT-0 OR Unlicense
 
-   A scene is a soup of triangles in world coordinates. Visibility is point-sampled in doubles (Moeller and Trumbore 1997),
-   through a tree of boxes that only saves time; with HAVE_EMBREE the benchmark traces the same rays eight at a time. */
+   A scene is a soup of triangles in world coordinates. Visibility is point-sampled in doubles (Moeller and Trumbore
+   1997), through a tree of boxes that only saves time; with HAVE_EMBREE the benchmark traces the same rays eight at a
+   time. */
 
 #ifndef REFERENCE_FIV_H
 #define REFERENCE_FIV_H
@@ -44,8 +45,10 @@ static inline void reference_add(reference_scene *s, const float *positions, con
         for (j = 0; j < 3; j++) {
             const float *v = positions + 3 * (size_t)indices[3 * t + (size_t)j];
             for (k = 0; k < 3; k++)
-                s->corner[s->count][j][k] = (double)position[k] + (double)scale * ((double)rotation[3 * k] * (double)v[0] +
-                    (double)rotation[3 * k + 1] * (double)v[1] + (double)rotation[3 * k + 2] * (double)v[2]);
+                s->corner[s->count][j][k] =
+                    (double)position[k] + (double)scale * ((double)rotation[3 * k] * (double)v[0] +
+                                                           (double)rotation[3 * k + 1] * (double)v[1] +
+                                                           (double)rotation[3 * k + 2] * (double)v[2]);
         }
 }
 
@@ -146,8 +149,8 @@ static inline int reference_occluded(const reference_scene *s, const double orig
 }
 
 /* Eq 6 over the M lights of an environment that the point sees. */
-static inline void reference_irradiance(double rgb[3], const reference_scene *s, const float *directions, const float *powers,
-                                        size_t lights, const float point[3], const float normal[3])
+static inline void reference_irradiance(double rgb[3], const reference_scene *s, const float *directions,
+                                        const float *powers, size_t lights, const float point[3], const float normal[3])
 {
     double o[3] = {(double)point[0], (double)point[1], (double)point[2]};
     size_t i;
@@ -192,7 +195,8 @@ static inline void reference_build_embree(reference_scene *s)
     s->embree = rtcNewScene(s->device);
     rtcSetSceneFlags(s->embree, RTC_SCENE_FLAG_ROBUST);
     g = rtcNewGeometry(s->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    vertex = (float *)rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, (size_t)s->count * 3);
+    vertex =
+        (float *)rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, (size_t)s->count * 3);
     index = (unsigned *)rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, (size_t)s->count);
     for (i = 0; i < s->count; i++)
         for (j = 0; j < 3; j++) {
@@ -205,9 +209,10 @@ static inline void reference_build_embree(reference_scene *s)
     rtcCommitScene(s->embree);
 }
 
-/* covered[i] = 1 where ray i meets the scene; only rays with wanted[i] are traced. Lights come in order, eight at a time. */
-static inline void reference_trace(unsigned char *covered, const reference_scene *s, const float *directions, size_t lights,
-                                   const float point[3], const unsigned char *wanted)
+/* covered[i] = 1 where ray i meets the scene; only rays with wanted[i] are traced. Lights come in order, eight at a
+   time. */
+static inline void reference_trace(unsigned char *covered, const reference_scene *s, const float *directions,
+                                   size_t lights, const float point[3], const unsigned char *wanted)
 {
     struct RTCIntersectContext context;
     size_t i;
@@ -224,7 +229,8 @@ static inline void reference_trace(unsigned char *covered, const reference_scene
             any |= valid[j];
             covered[n] = 0;
             ray.org_x[j] = point[0], ray.org_y[j] = point[1], ray.org_z[j] = point[2];
-            ray.dir_x[j] = directions[3 * n], ray.dir_y[j] = directions[3 * n + 1], ray.dir_z[j] = directions[3 * n + 2];
+            ray.dir_x[j] = directions[3 * n], ray.dir_y[j] = directions[3 * n + 1],
+            ray.dir_z[j] = directions[3 * n + 2];
             ray.tnear[j] = 0, ray.tfar[j] = 1e30f, ray.time[j] = 0;
             ray.mask[j] = 0xffffffffu, ray.flags[j] = 0, ray.id[j] = 0;
         }
@@ -267,7 +273,8 @@ static inline reference_mesh reference_knot(int p, int q, int along, int around,
         side[0] = -tangent[2], side[1] = 0, side[2] = tangent[0];
         length = sqrt(side[0] * side[0] + side[2] * side[2]);
         side[0] /= length, side[2] /= length;
-        for (k = 0; k < 3; k++) up[k] = tangent[(k + 1) % 3] * side[(k + 2) % 3] - tangent[(k + 2) % 3] * side[(k + 1) % 3];
+        for (k = 0; k < 3; k++)
+            up[k] = tangent[(k + 1) % 3] * side[(k + 2) % 3] - tangent[(k + 2) % 3] * side[(k + 1) % 3];
         for (j = 0; j < around; j++) {
             double a = 6.283185307179586 * j / around;
             for (k = 0; k < 3; k++)
@@ -277,7 +284,8 @@ static inline reference_mesh reference_knot(int p, int q, int along, int around,
     for (i = 0; i < along; i++)
         for (j = 0; j < around; j++) {
             unsigned a = (unsigned)(i * around + j), b = (unsigned)(i * around + (j + 1) % around);
-            unsigned c = (unsigned)((i + 1) % along * around + j), d = (unsigned)((i + 1) % along * around + (j + 1) % around);
+            unsigned c = (unsigned)((i + 1) % along * around + j),
+                     d = (unsigned)((i + 1) % along * around + (j + 1) % around);
             unsigned *t = m.indices + 6 * a;
             t[0] = a, t[1] = b, t[2] = c, t[3] = b, t[4] = d, t[5] = c;
         }

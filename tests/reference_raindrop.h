@@ -26,7 +26,8 @@ static inline reference_real reference_dot(const reference_real *a, const refere
 }
 
 /* Snell's law in vector form; normal against d. 0: total reflection. */
-static inline int reference_snell(reference_real *out, const reference_real *d, const reference_real *normal, reference_real n)
+static inline int reference_snell(reference_real *out, const reference_real *d, const reference_real *normal,
+                                  reference_real n)
 {
     reference_real c = -reference_dot(d, normal), k = 1 - (1 - c * c) / (n * n);
     int i;
@@ -37,7 +38,8 @@ static inline int reference_snell(reference_real *out, const reference_real *d, 
 }
 
 /* Eye at `origin`, unit direction d, ellipsoid of half axes 1, ratio, 1 at the origin of coordinates. */
-static inline reference_drop reference_trace(const reference_real *origin, const reference_real *d, reference_real ratio, reference_real n)
+static inline reference_drop reference_trace(const reference_real *origin, const reference_real *d,
+                                             reference_real ratio, reference_real n)
 {
     reference_drop out;
     reference_real q[3], u[3], a, b, c, t, hit[3], normal[3], inner[3], length, ci, cr, fs, fp, ps = 1, pp = 1;
@@ -97,7 +99,8 @@ static inline reference_drop reference_trace(const reference_real *origin, const
 static inline void reference_environment(double *rgb, const sat_image *picture, const double *d)
 {
     double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), pi = acos(-1.0);
-    double x = (atan2(d[0], -d[2]) / (2 * pi) + 0.5) * picture->width - 0.5, y = acos(d[1] / length) / pi * picture->height - 0.5;
+    double x = (atan2(d[0], -d[2]) / (2 * pi) + 0.5) * picture->width - 0.5,
+           y = acos(d[1] / length) / pi * picture->height - 0.5;
     double fx = x - floor(x), fy = y - floor(y);
     int i, j, c, w = picture->width, h = picture->height;
     for (c = 0; c < 3; c++) rgb[c] = 0;
@@ -107,7 +110,8 @@ static inline void reference_environment(double *rgb, const sat_image *picture, 
             double weight = (i ? fx : 1 - fx) * (j ? fy : 1 - fy);
             const float *p;
             yi = yi < 0 ? 0 : yi >= h ? h - 1 : yi;
-            p = (const float *)(const void *)((const char *)picture->pixels + (ptrdiff_t)yi * picture->stride) + (size_t)xi * (size_t)picture->channels;
+            p = (const float *)(const void *)((const char *)picture->pixels + (ptrdiff_t)yi * picture->stride) +
+                (size_t)xi * (size_t)picture->channels;
             for (c = 0; c < 3; c++) rgb[c] += weight * (double)p[c];
         }
     }
@@ -125,7 +129,8 @@ static inline int reference_far_first(const void *a, const void *b)
     return x < y ? 1 : x > y ? -1 : ((const reference_order *)a)->at - ((const reference_order *)b)->at;
 }
 
-static inline void reference_colour(float *rgb, const raindrop_environment *environment, const reference_drop *drop, int orders)
+static inline void reference_colour(float *rgb, const raindrop_environment *environment, const reference_drop *drop,
+                                    int orders)
 {
     float d[3], v[3];
     int i, c, k;
@@ -144,12 +149,14 @@ static inline void reference_ray(double *d, const raindrop_camera *camera, doubl
 {
     double length = sqrt(x * x + y * y + 1);
     int i;
-    for (i = 0; i < 3; i++) d[i] = (x * (double)camera->right[i] + y * (double)camera->up[i] - (double)camera->back[i]) / length;
+    for (i = 0; i < 3; i++)
+        d[i] = (x * (double)camera->right[i] + y * (double)camera->up[i] - (double)camera->back[i]) / length;
 }
 
 /* One drop over the fine picture (width * side wide); `mask` (may be NULL) gets 1 where a pixel is touched. */
-static inline void reference_draw(float *fine, unsigned char *mask, int width, int height, int side, const raindrop_camera *camera,
-                                  const raindrop_drop *drop, const raindrop_environment *environment, int orders)
+static inline void reference_draw(float *fine, unsigned char *mask, int width, int height, int side,
+                                  const raindrop_camera *camera, const raindrop_drop *drop,
+                                  const raindrop_environment *environment, int orders)
 {
     double focal = 0.5 * height * side / tan(0.5 * (double)camera->fov_y), ratio = (double)drop->axis_ratio;
     double radius = (double)drop->radius / cbrt(ratio), rel[3], z = 0, x = 0, y = 0, reach, zz, rr;
@@ -191,8 +198,9 @@ static inline void reference_draw(float *fine, unsigned char *mask, int width, i
 }
 
 /* The whole picture, background included; returns 0 when memory is short. */
-static inline int reference_render(float *rgb, unsigned char *mask, int width, int height, int side, const raindrop_camera *camera,
-                                   const raindrop_drop *drops, int count, const raindrop_environment *environment, int orders)
+static inline int reference_render(float *rgb, unsigned char *mask, int width, int height, int side,
+                                   const raindrop_camera *camera, const raindrop_drop *drops, int count,
+                                   const raindrop_environment *environment, int orders)
 {
     size_t w = (size_t)(width * side), h = (size_t)(height * side), k;
     double focal = 0.5 * (double)h / tan(0.5 * (double)camera->fov_y);
@@ -212,11 +220,13 @@ static inline int reference_render(float *rgb, unsigned char *mask, int width, i
     for (i = 0; i < count; i++) {
         order[i].at = i;
         order[i].depth = 0;
-        for (c = 0; c < 3; c++) order[i].depth -= ((double)drops[i].position[c] - (double)camera->position[c]) * (double)camera->back[c];
+        for (c = 0; c < 3; c++)
+            order[i].depth -= ((double)drops[i].position[c] - (double)camera->position[c]) * (double)camera->back[c];
     }
     qsort(order, (size_t)count, sizeof *order, reference_far_first);
     if (mask) memset(mask, 0, (size_t)width * (size_t)height);
-    for (i = 0; i < count; i++) reference_draw(fine, mask, width, height, side, camera, &drops[order[i].at], environment, orders);
+    for (i = 0; i < count; i++)
+        reference_draw(fine, mask, width, height, side, camera, &drops[order[i].at], environment, orders);
     for (y = 0; y < height; y++) {
         for (x = 0; x < width; x++) {
             for (c = 0; c < 3; c++) {
@@ -242,7 +252,8 @@ static inline double reference_key(const float *rgb, size_t pixels)
     double sum = 0;
     size_t i;
     for (i = 0; i < pixels; i++)
-        sum += log(1e-4 + 0.2126 * (double)rgb[3 * i] + 0.7152 * (double)rgb[3 * i + 1] + 0.0722 * (double)rgb[3 * i + 2]);
+        sum +=
+            log(1e-4 + 0.2126 * (double)rgb[3 * i] + 0.7152 * (double)rgb[3 * i + 1] + 0.0722 * (double)rgb[3 * i + 2]);
     return 0.18 / exp(sum / (double)pixels);
 }
 
@@ -253,7 +264,8 @@ static inline double reference_tone(const float *rgb, double key)
 }
 
 /* Root-mean-square difference of the tone-mapped luminance, over the masked pixels if there is a mask. */
-static inline double reference_rmse(const float *a, const float *b, const unsigned char *mask, size_t pixels, double key)
+static inline double reference_rmse(const float *a, const float *b, const unsigned char *mask, size_t pixels,
+                                    double key)
 {
     double sum = 0, n = 0;
     size_t i;
@@ -268,7 +280,8 @@ static inline double reference_rmse(const float *a, const float *b, const unsign
 }
 
 /* Structural similarity on 8 x 8 windows four pixels apart, tone-mapped luminance (Wang et al. 2004, flat windows). */
-static inline double reference_ssim(const float *a, const float *b, const unsigned char *mask, int width, int height, double key)
+static inline double reference_ssim(const float *a, const float *b, const unsigned char *mask, int width, int height,
+                                    double key)
 {
     double total = 0, n = 0;
     int x, y, i, j;
@@ -303,10 +316,13 @@ static inline void reference_sky(float *rgb, int width, int height)
         for (x = 0; x < width; x++) {
             double v = pi * (y + 0.5) / height, u = 2 * pi * ((x + 0.5) / width - 0.5), up = cos(v);
             double d[3] = {sin(v) * sin(u), up, -sin(v) * cos(u)}, sun = d[0] * 0.3 + d[1] * 0.6 + d[2] * -0.7416;
-            double ground = 0.15 + 0.05 * sin(20 * u) * sin(31 * v), tree = up < 0.12 + 0.08 * sin(7 * u) + 0.04 * sin(23 * u + 1) ? 1 : 0;
+            double ground = 0.15 + 0.05 * sin(20 * u) * sin(31 * v),
+                   tree = up < 0.12 + 0.08 * sin(7 * u) + 0.04 * sin(23 * u + 1) ? 1 : 0;
             double blue[3] = {0.4, 0.7, 1.3}, green[3] = {0.12, 0.2, 0.05};
             for (c = 0; c < 3; c++) {
-                double value = up < 0 ? ground * (c == 2 ? 0.6 : 1) : tree > 0 ? green[c] * (1 + 0.8 * sin(41 * u) * sin(53 * v)) : blue[c] * (1 + up);
+                double value = up < 0     ? ground * (c == 2 ? 0.6 : 1)
+                               : tree > 0 ? green[c] * (1 + 0.8 * sin(41 * u) * sin(53 * v))
+                                          : blue[c] * (1 + up);
                 if (sun > 0.9995) value += 300;
                 else if (sun > 0) value += 2 * pow(sun, 200);
                 rgb[3 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c] = (float)value;

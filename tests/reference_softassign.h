@@ -148,7 +148,8 @@ static inline void reference_greedy(const float *cost, int rows, int columns, in
 /* Section 3.6 in double, statement by statement, from the given M; returns the lowest cost, S in soft.
    gold: the update of Gold et al. instead, exp(-(D - alpha) / t). */
 static inline double reference_published(const float *cost, int rows, int columns, double *m, double *soft, double t,
-                                         double cooling, double alpha, double outlier, const int *iterations, double clamp, int gold)
+                                         double cooling, double alpha, double outlier, const int *iterations,
+                                         double clamp, int gold)
 {
     size_t n = (size_t)columns, k;
     double lowest = HUGE_VAL, largest = 0, *q = (double *)malloc((size_t)rows * n * sizeof *q);
@@ -188,9 +189,10 @@ static inline double reference_published(const float *cost, int rows, int column
 }
 
 /* Jonker and Volgenant's dense solver, plain: two rounds of augmenting row reduction, then shortest augmenting paths,
-   for the benchmark. Doubles; rows <= columns. Scratch: price, distance (columns doubles), the ints: 2 x columns + rows + columns. */
-static inline void reference_lapjv(const float *cost, int rows, int columns, int *x, int *y, double *v, double *d, int *pred,
-                                   int *list, int *unassigned)
+   for the benchmark. Doubles; rows <= columns. Scratch: price, distance (columns doubles), the ints: 2 x columns + rows
+   + columns. */
+static inline void reference_lapjv(const float *cost, int rows, int columns, int *x, int *y, double *v, double *d,
+                                   int *pred, int *list, int *unassigned)
 {
     int i, j, k, round, count = rows;
     for (j = 0; j < columns; j++) {

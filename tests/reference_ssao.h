@@ -1,8 +1,10 @@
-/* reference_ssao.h - what ssao_sat.h is measured against: G-buffers of triangle scenes with ray-traced ambient occlusion, and the
-   usual screen-space methods (16 samples, HBAO, GTAO).                               SPDX-License-Identifier: MIT-0 OR Unlicense
+/* reference_ssao.h - what ssao_sat.h is measured against: G-buffers of triangle scenes with ray-traced ambient
+   occlusion, and the usual screen-space methods (16 samples, HBAO, GTAO).
+   SPDX-License-Identifier: MIT-0 OR Unlicense
 
-   The pictures are linear depths (infinity: sky), view-space normals (OpenGL's axes) and, for each radius, the share of cosine-
-   weighted rays that meet nothing within it, and the mean free direction. Include support.h and mesh.h first. */
+   The pictures are linear depths (infinity: sky), view-space normals (OpenGL's axes) and, for each radius, the share of
+   cosine- weighted rays that meet nothing within it, and the mean free direction. Include support.h and mesh.h
+   first. */
 
 #ifndef REFERENCE_SSAO_H
 #define REFERENCE_SSAO_H
@@ -174,7 +176,8 @@ static inline void ref_field(ref_scene *s)
     s->at = ref_make(0, 0.35f, 0);
 }
 
-/* 3: other objects than those of 0 to 2, for parameters that were not fitted to them: two bunnies and a knot on a table before a wall. */
+/* 3: other objects than those of 0 to 2, for parameters that were not fitted to them: two bunnies and a knot on a table
+   before a wall. */
 static inline void ref_table(ref_scene *s)
 {
     ref_object(s, "mesh/bunny_small.ply", 0.09f, ref_make(-0.45f, 0.05f, 0), 0.3f);
@@ -204,8 +207,10 @@ static inline void ref_grass(ref_scene *s)
     int i;
     ref_quad(s, ref_make(-12, 0, -20), ref_make(12, 0, -20), ref_make(12, 0, 5), ref_make(-12, 0, 5));
     for (i = 0; i < 1500; i++) {
-        float x = -2.2f + 4.4f * ref_random(&state), z = -4.5f + 5.4f * ref_random(&state), tall = 0.12f + 0.28f * ref_random(&state);
-        float w = 0.006f + 0.008f * ref_random(&state), turn = 6.28f * ref_random(&state), lean = 0.12f * (ref_random(&state) - 0.5f);
+        float x = -2.2f + 4.4f * ref_random(&state), z = -4.5f + 5.4f * ref_random(&state),
+              tall = 0.12f + 0.28f * ref_random(&state);
+        float w = 0.006f + 0.008f * ref_random(&state), turn = 6.28f * ref_random(&state),
+              lean = 0.12f * (ref_random(&state) - 0.5f);
         int a = ref_add_vertex(s, ref_make(x - w * cosf(turn), 0, z - w * sinf(turn)));
         int b = ref_add_vertex(s, ref_make(x + w * cosf(turn), 0, z + w * sinf(turn)));
         mesh_add_triangle(&s->m, a, b, ref_add_vertex(s, ref_make(x + lean, tall, z - 0.7f * lean)));
@@ -309,7 +314,8 @@ static inline void ref_finish(ref_scene *s)
     s->normals = (ref_vec *)calloc((size_t)s->m.vertex_count, sizeof *s->normals);
     for (i = 0; i < s->smooth; i++) {
         const int *v = s->m.indices + 3 * (size_t)i;
-        ref_vec a = ref_vertex(s, v[0]), g = ref_cross(ref_sub(ref_vertex(s, v[1]), a), ref_sub(ref_vertex(s, v[2]), a));
+        ref_vec a = ref_vertex(s, v[0]),
+                g = ref_cross(ref_sub(ref_vertex(s, v[1]), a), ref_sub(ref_vertex(s, v[2]), a));
         for (k = 0; k < 3; k++) s->normals[v[k]] = ref_add(s->normals[v[k]], g);
     }
     s->order = (int *)malloc((size_t)n * sizeof *s->order);
@@ -354,7 +360,9 @@ static inline int ref_trace(const ref_scene *s, ref_vec o, ref_vec d, float *dis
     float origin[3], inverse[3];
     int stack[128], top = 0, hit = -1, i;
     origin[0] = o.x; origin[1] = o.y; origin[2] = o.z;
-    inverse[0] = 1 / (d.x == 0 ? 1e-20f : d.x); inverse[1] = 1 / (d.y == 0 ? 1e-20f : d.y); inverse[2] = 1 / (d.z == 0 ? 1e-20f : d.z);
+    inverse[0] = 1 / (d.x == 0 ? 1e-20f : d.x);
+    inverse[1] = 1 / (d.y == 0 ? 1e-20f : d.y);
+    inverse[2] = 1 / (d.z == 0 ? 1e-20f : d.z);
     stack[top++] = 0;
     while (top) {
         const ref_node *n = &s->nodes[stack[--top]];
@@ -395,7 +403,12 @@ typedef struct ref_picture {
     float *z, *normals, *ao[REF_RADII], *bent[REF_RADII];
 } ref_picture;
 
-typedef struct ref_render { const ref_scene *scene; ref_picture *p; ref_vec eye, right, up, forward; int rays; } ref_render;
+typedef struct ref_render {
+    const ref_scene *scene;
+    ref_picture *p;
+    ref_vec eye, right, up, forward;
+    int rays;
+} ref_render;
 
 static inline void ref_free(ref_picture *p)
 {
@@ -417,7 +430,8 @@ static inline void ref_shade(const ref_render *c, size_t at, ref_vec p, ref_vec 
     for (i = 0; i < side * side; i++) {
         float u = ((float)(i % side) + (float)support_uniform(&state)) / (float)side;
         float phi = 6.2831853f * ((float)(i / side) + (float)support_uniform(&state)) / (float)side, w = sqrtf(u);
-        ref_vec d = ref_add(ref_add(ref_scale(a, w * cosf(phi)), ref_scale(b, w * sinf(phi))), ref_scale(n, sqrtf(1 - u)));
+        ref_vec d =
+            ref_add(ref_add(ref_scale(a, w * cosf(phi)), ref_scale(b, w * sinf(phi))), ref_scale(n, sqrtf(1 - u)));
         float t = c->p->radius[REF_RADII - 1], x, y;
         int hit = ref_trace(c->scene, p, d, &t, &x, &y) >= 0;
         for (r = 0; r < REF_RADII; r++) {
@@ -441,7 +455,8 @@ static inline ref_vec ref_surface_normal(const ref_scene *s, int triangle, float
     *flat = ref_unit(ref_cross(ref_sub(ref_vertex(s, k[1]), a), ref_sub(ref_vertex(s, k[2]), a)));
     if (ref_dot(*flat, d) > 0) *flat = ref_scale(*flat, -1);
     if (triangle >= s->smooth) return *flat;
-    n = ref_unit(ref_add(ref_scale(s->normals[k[0]], 1 - u - v), ref_add(ref_scale(s->normals[k[1]], u), ref_scale(s->normals[k[2]], v))));
+    n = ref_unit(ref_add(ref_scale(s->normals[k[0]], 1 - u - v),
+                         ref_add(ref_scale(s->normals[k[1]], u), ref_scale(s->normals[k[2]], v))));
     if (ref_dot(n, d) > 0) n = ref_scale(n, -1);
     return ref_dot(n, *flat) < 0.2f ? *flat : n;
 }
@@ -456,9 +471,11 @@ static inline void ref_render_rows(int begin, int end, int worker, void *context
         for (x = 0; x < p->width; x++) {
             size_t at = (size_t)y * (size_t)p->width + (size_t)x;
             float k = (float)(p->orthographic ? p->half_height : tan(0.5 * p->fov)), t = 1e6f, u = 0, v = 0;
-            float sx = (2 * ((float)x + 0.5f) - (float)p->width) / (float)p->height * k, sy = (1 - 2 * ((float)y + 0.5f) / (float)p->height) * k;
+            float sx = (2 * ((float)x + 0.5f) - (float)p->width) / (float)p->height * k,
+                  sy = (1 - 2 * ((float)y + 0.5f) / (float)p->height) * k;
             ref_vec offset = ref_add(ref_scale(c->right, sx), ref_scale(c->up, sy)), n, flat;
-            ref_vec o = p->orthographic ? ref_add(c->eye, offset) : c->eye, d = p->orthographic ? c->forward : ref_add(c->forward, offset);
+            ref_vec o = p->orthographic ? ref_add(c->eye, offset) : c->eye,
+                    d = p->orthographic ? c->forward : ref_add(c->forward, offset);
             int hit = ref_trace(c->scene, o, d, &t, &u, &v);
             p->z[at] = INFINITY;
             for (r = 0; r < REF_RADII; r++) p->ao[r][at] = 1;
@@ -473,8 +490,10 @@ static inline void ref_render_rows(int begin, int end, int worker, void *context
         }
 }
 
-/* rays = 0: depth and normals only. `moved` shifts eye and target, for a camera in motion. The radii are 0.4, 1 and 2.4 `radius`. */
-static inline ref_picture ref_draw_radii(const ref_scene *scene, int width, int height, int orthographic, int rays, ref_vec moved, int workers, float radius)
+/* rays = 0: depth and normals only. `moved` shifts eye and target, for a camera in motion. The radii are 0.4, 1 and 2.4
+   `radius`. */
+static inline ref_picture ref_draw_radii(const ref_scene *scene, int width, int height, int orthographic, int rays,
+                                         ref_vec moved, int workers, float radius)
 {
     ref_picture p;
     ref_render c;
@@ -500,18 +519,21 @@ static inline ref_picture ref_draw_radii(const ref_scene *scene, int width, int 
     c.forward = ref_unit(ref_sub(scene->at, scene->eye));
     c.right = ref_unit(ref_cross(c.forward, ref_make(0, 1, 0)));
     c.up = ref_cross(c.right, c.forward);
-    p.half_height = tan(0.5 * p.fov) * sqrt((double)ref_dot(ref_sub(scene->at, scene->eye), ref_sub(scene->at, scene->eye)));
+    p.half_height =
+        tan(0.5 * p.fov) * sqrt((double)ref_dot(ref_sub(scene->at, scene->eye), ref_sub(scene->at, scene->eye)));
     threads.parallel_for(height, ref_render_rows, &c, threads.user);
     return p;
 }
 
 /* Radii 0.1, 0.25 and 0.6 for objects about 0.7 high. */
-static inline ref_picture ref_draw(const ref_scene *scene, int width, int height, int orthographic, int rays, ref_vec moved, int workers)
+static inline ref_picture ref_draw(const ref_scene *scene, int width, int height, int orthographic, int rays,
+                                   ref_vec moved, int workers)
 {
     return ref_draw_radii(scene, width, height, orthographic, rays, moved, workers, 0.25f);
 }
 
-/* A picture of a scene that a file in build/ keeps from one run to the next: `reading` or writing it; 0 when that fails. */
+/* A picture of a scene that a file in build/ keeps from one run to the next: `reading` or writing it; 0 when that
+   fails. */
 static inline int ref_keep(ref_picture *p, const char *path, int reading)
 {
     FILE *f = fopen(path, reading ? "rb" : "wb");
@@ -619,7 +641,10 @@ static inline ref_view ref_make_view(const ref_picture *p, float radius, int hal
 }
 
 /* 4 x 4 tile of rotations. */
-static inline float ref_noise(int x, int y, int shift) { return (float)((((y & 3) * 4 + (x & 3) + shift) * 7) % 16) / 16; }
+static inline float ref_noise(int x, int y, int shift)
+{
+    return (float)((((y & 3) * 4 + (x & 3) + shift) * 7) % 16) / 16;
+}
 
 /* Separable blur whose weights fall to 0 at a relative depth difference of `sharp`. */
 static inline void ref_blur(const ref_view *v, int radius, float sharp)
@@ -683,7 +708,8 @@ static inline void ref_ssao(const ref_view *v, const float *parameters)
     int x, y, k;
     for (k = 0; k < 16; k++) {
         float t = (float)(k + 1) / 16;
-        kernel[k] = ref_unit(ref_make((float)support_gaussian(&state), (float)support_gaussian(&state), (float)support_gaussian(&state)));
+        kernel[k] = ref_unit(ref_make((float)support_gaussian(&state), (float)support_gaussian(&state),
+                                      (float)support_gaussian(&state)));
         kernel[k] = ref_scale(kernel[k], 0.1f + 0.9f * t * t);
     }
     for (y = 0; y < v->p->height; y += v->step)
@@ -695,7 +721,8 @@ static inline void ref_ssao(const ref_view *v, const float *parameters)
             c = cosf(a);
             d = sinf(a);
             for (k = 0; k < 16; k++) {
-                ref_vec o = ref_make(kernel[k].x * c - kernel[k].y * d, kernel[k].x * d + kernel[k].y * c, kernel[k].z), q;
+                ref_vec o = ref_make(kernel[k].x * c - kernel[k].y * d, kernel[k].x * d + kernel[k].y * c, kernel[k].z),
+                        q;
                 float z, depth;
                 int i, j;
                 if (ref_dot(o, s.n) < 0) o = ref_scale(o, -1);
@@ -729,7 +756,8 @@ static inline void ref_hbao(const ref_view *v, const float *parameters)
             for (k = 0; k < 16; k++) {
                 float a = ((float)k + turn) * (6.2831853f / 16), dx = cosf(a), dy = sinf(a), top = parameters[1];
                 for (m = 0; m < 8; m++) {
-                    float at = ((float)m + 0.2f + 0.8f * jitter) * stride + 0.7f, fx = (float)x + 0.5f + dx * at, fy = (float)y + 0.5f + dy * at, square, sine;
+                    float at = ((float)m + 0.2f + 0.8f * jitter) * stride + 0.7f, fx = (float)x + 0.5f + dx * at,
+                          fy = (float)y + 0.5f + dy * at, square, sine;
                     ref_vec d;
                     if (fx < 0 || fy < 0 || fx >= (float)v->p->width || fy >= (float)v->p->height) break;
                     if (!ref_load(v, (int)fx, (int)fy, &t)) continue;
@@ -759,7 +787,8 @@ static inline float ref_acos(float x)
 static inline ref_slice ref_make_slice(ref_vec view, ref_vec n, float dx, float dy)
 {
     ref_slice s;
-    ref_vec d = ref_make(dx, dy, 0), o = ref_sub(d, ref_scale(view, ref_dot(d, view))), axis = ref_unit(ref_cross(o, view));
+    ref_vec d = ref_make(dx, dy, 0), o = ref_sub(d, ref_scale(view, ref_dot(d, view))),
+            axis = ref_unit(ref_cross(o, view));
     ref_vec projected = ref_sub(n, ref_scale(axis, ref_dot(n, axis)));
     s.length = sqrtf(ref_dot(projected, projected)) + 1e-9f;
     s.cosine = ref_clamp(ref_dot(projected, view) / s.length, -1, 1);
@@ -774,7 +803,8 @@ static inline ref_slice ref_make_slice(ref_vec view, ref_vec n, float dx, float 
 static inline float ref_slice_visibility(const ref_slice *s, const float *horizon)
 {
     float h0 = -ref_acos(ref_clamp(horizon[1], -1, 1)), h1 = ref_acos(ref_clamp(horizon[0], -1, 1));
-    return s->length * 0.25f * (2 * s->cosine + 2 * (h0 + h1) * s->sine - cosf(2 * h0 - s->angle) - cosf(2 * h1 - s->angle));
+    return s->length * 0.25f *
+           (2 * s->cosine + 2 * (h0 + h1) * s->sine - cosf(2 * h0 - s->angle) - cosf(2 * h1 - s->angle));
 }
 
 /* Ground-truth AO, 3 slices x (3 + 3) samples, squared spacing. parameters: radius, falloff start */
@@ -818,7 +848,15 @@ static inline void ref_gtao(const ref_view *v, const float *parameters)
         }
 }
 
-typedef enum ref_method { REF_SSAO, REF_HBAO, REF_GTAO, REF_SSAO_HALF, REF_HBAO_HALF, REF_GTAO_HALF, REF_METHODS } ref_method;
+typedef enum ref_method {
+    REF_SSAO,
+    REF_HBAO,
+    REF_GTAO,
+    REF_SSAO_HALF,
+    REF_HBAO_HALF,
+    REF_GTAO_HALF,
+    REF_METHODS
+} ref_method;
 static const char *const ref_method_names[REF_METHODS] = {
     "SSAO 16 + 15x15 blur", "HBAO 16x8 + 15x15 blur", "GTAO 3x(3+3) + 5x5 blur",
     "SSAO 16 half res + 7x7", "HBAO 16x8 half res + 7x7", "GTAO 3x(3+3) half res + 5x5"};
@@ -830,7 +868,8 @@ static const ref_fit ref_fits[REF_METHODS] = {
     {{1.4f, 0.01f}, 0.04f, 0.818f, 2.0f}, {{1.4f, 0.25f}, 0.04f, 1.646f, 1.5f}, {{2.0f, 0.3f}, 0.02f, 0.468f, 4.0f}};
 
 /* The whole method: occlusion in out, `other` is scratch of the same size. */
-static inline void ref_run(ref_method method, const ref_fit *fit, const ref_picture *p, float radius, float *out, float *other)
+static inline void ref_run(ref_method method, const ref_fit *fit, const ref_picture *p, float radius, float *out,
+                           float *other)
 {
     int half = method >= REF_SSAO_HALF, kind = (int)method % 3;
     ref_view v = ref_make_view(p, radius, half, out, other);
@@ -862,11 +901,13 @@ static inline ssao_sat_input ref_input(const ref_picture *p, ref_convention conv
 {
     const double near = 0.05, far = 100;
     const int reversed = convention == REF_REVERSED || convention == REF_REVERSED_INFINITE;
-    double first = reversed, last = 1 - reversed, low = 0, a, b, unit = p->orthographic ? 1 / p->half_height : 1 / tan(0.5 * p->fov);
+    double first = reversed, last = 1 - reversed, low = 0, a, b,
+           unit = p->orthographic ? 1 / p->half_height : 1 / tan(0.5 * p->fov);
     ssao_sat_input in = ssao_sat_input_linear(p->z, p->width, p->height, p->fov);
     size_t i, n = (size_t)p->width * (size_t)p->height;
     in.normals = p->normals;
-    in.clip_zero_to_one = convention == REF_STANDARD_01 || convention == REF_REVERSED || convention == REF_REVERSED_INFINITE;
+    in.clip_zero_to_one =
+        convention == REF_STANDARD_01 || convention == REF_REVERSED || convention == REF_REVERSED_INFINITE;
     if (!in.clip_zero_to_one) low = -1;
     first = first * (1 - low) + low; /* clip z at near and far */
     last = last * (1 - low) + low;

@@ -16,7 +16,8 @@ static inline void reference_luminance(double *out, const float *rgb, size_t n)
 {
     size_t i;
     for (i = 0; i < n; ++i) {
-        double y = 0.2126729 * (double)rgb[3 * i] + 0.7151522 * (double)rgb[3 * i + 1] + 0.0721750 * (double)rgb[3 * i + 2];
+        double y =
+            0.2126729 * (double)rgb[3 * i] + 0.7151522 * (double)rgb[3 * i + 1] + 0.0721750 * (double)rgb[3 * i + 2];
         out[i] = y > 0 ? y : 0;
     }
 }
@@ -42,7 +43,8 @@ static inline void reference_box(double *out, const double *in, int width, int h
     for (y = 0; y < height; ++y)
         for (x = 0; x < width; ++x) {
             double s = 0;
-            for (i = x - radius < 0 ? 0 : x - radius; i <= x + radius && i < width; ++i) s += in[(size_t)y * (size_t)width + (size_t)i];
+            for (i = x - radius < 0 ? 0 : x - radius; i <= x + radius && i < width; ++i)
+                s += in[(size_t)y * (size_t)width + (size_t)i];
             rows[(size_t)y * (size_t)width + (size_t)x] = s;
         }
     for (y = 0; y < height; ++y) {
@@ -80,7 +82,8 @@ static inline reference_photographic reference_photographic_defaults(int gaussia
 }
 
 /* La of every pixel from scaled luminances, eq A.5 to A.9: the centre of the first failing step, else the last. */
-static inline void reference_local(double *la, const double *scaled, int width, int height, const reference_photographic *r)
+static inline void reference_local(double *la, const double *scaled, int width, int height,
+                                   const reference_photographic *r)
 {
     size_t n = (size_t)width * (size_t)height, i;
     double *centre = metrics_alloc(n), *surround = metrics_alloc(n);
@@ -159,8 +162,8 @@ static inline double reference_capacity(double cd, int continuous)
     return c3 + log(cd / 7.2444) / 0.0556;
 }
 
-/* La: the first of 10 neighbourhoods whose mean differs by half from that of twice its size. Gaussian of sigma s / 2, or
-   the box of the same variance. */
+/* La: the first of 10 neighbourhoods whose mean differs by half from that of twice its size. Gaussian of sigma s / 2,
+   or the box of the same variance. */
 static inline void reference_ashikhmin(double *la, const double *luminance, int width, int height, int gaussian)
 {
     size_t n = (size_t)width * (size_t)height, i;

@@ -287,7 +287,8 @@ static inline const char *support_data(const char *name)
     turn = (turn + 1) % 8;
     for (i = 0; i < 3; ++i) {
         FILE *file;
-        if (!folders[i] || snprintf(paths[turn], sizeof paths[0], "%s/%s", folders[i], name) >= (int)sizeof paths[0]) continue;
+        if (!folders[i] || snprintf(paths[turn], sizeof paths[0], "%s/%s", folders[i], name) >= (int)sizeof paths[0])
+            continue;
         file = fopen(paths[turn], "rb");
         if (file) { fclose(file); return paths[turn]; }
     }

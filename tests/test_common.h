@@ -22,7 +22,8 @@ static void fill_image(image *picture, int width, int height, int channels)
 static int same_pixels(const image *a, const image *b)
 {
     return a->width == b->width && a->height == b->height && a->channels == b->channels &&
-           memcmp(a->pixels, b->pixels, (size_t)a->width * (size_t)a->height * (size_t)a->channels * sizeof(float)) == 0;
+           memcmp(a->pixels, b->pixels, (size_t)a->width * (size_t)a->height * (size_t)a->channels * sizeof(float)) ==
+               0;
 }
 
 /* ---- pictures ---- */
@@ -122,7 +123,8 @@ TEST(hdr_comes_back)
     EXPECT(b.width == 37 && b.height == 11 && b.pixels[0] == 0 && b.pixels[1] == 0 && b.pixels[2] == 256);
     for (i = 1; i < 37 * 11; ++i) {
         float *u = a.pixels + 3 * i, *v = b.pixels + 3 * i, most = fmaxf(u[0], fmaxf(u[1], u[2]));
-        worst |= !(fabsf(u[0] - v[0]) <= most / 256 && fabsf(u[1] - v[1]) <= most / 256 && fabsf(u[2] - v[2]) <= most / 256);
+        worst |=
+            !(fabsf(u[0] - v[0]) <= most / 256 && fabsf(u[1] - v[1]) <= most / 256 && fabsf(u[2] - v[2]) <= most / 256);
     }
     EXPECT(!worst);
     image_free(&a);
@@ -132,7 +134,8 @@ TEST(hdr_comes_back)
 /* Every format, cut anywhere behind its first bytes, is refused with a sentence and never shown in part. */
 TEST(half_a_file_is_refused)
 {
-    static const char *const paths[] = {OUT_FILE("cut.hdr"), OUT_FILE("cut.pfm"), OUT_FILE("cut.png"), OUT_FILE("cut.exr"), OUT_FILE("cut.jpg")};
+    static const char *const paths[] = {OUT_FILE("cut.hdr"), OUT_FILE("cut.pfm"), OUT_FILE("cut.png"),
+                                        OUT_FILE("cut.exr"), OUT_FILE("cut.jpg")};
     image a;
     size_t i, size, part;
     const char *rle = support_data("hdr/memorial.hdr"), *photo = support_data("photos/brushes.jpg");
@@ -140,12 +143,20 @@ TEST(half_a_file_is_refused)
         unsigned char *bytes;
         char why[FILE_MESSAGE];
         fill_image(&a, 40, 30, 3);
-        if (i < 4 && !image_save(&a, paths[i])) { EXPECT(strstr(a.message, "libopenexr-dev") != NULL); image_free(&a); continue; }
+        if (i < 4 && !image_save(&a, paths[i])) {
+            EXPECT(strstr(a.message, "libopenexr-dev") != NULL);
+            image_free(&a);
+            continue;
+        }
         image_free(&a);
-        if ((i == 4 && !photo) || !(bytes = file_read(i == 4 ? photo : i == 0 && rle ? rle : paths[i], &size, why))) continue;
+        if ((i == 4 && !photo) || !(bytes = file_read(i == 4 ? photo : i == 0 && rle ? rle : paths[i], &size, why)))
+            continue;
         for (part = size / 5; part < size - 1; part += size / 5) {
             EXPECT(write_bytes(paths[i], bytes, part));
-            if (!EXPECT(!image_load(&a, paths[i]) && a.message[0] && !a.pixels)) { printf("%s of %d bytes\n", paths[i], (int)part); image_free(&a); }
+            if (!EXPECT(!image_load(&a, paths[i]) && a.message[0] && !a.pixels)) {
+                printf("%s of %d bytes\n", paths[i], (int)part);
+                image_free(&a);
+            }
         }
         free(bytes);
     }
@@ -180,10 +191,12 @@ static void jpeg_add(void *to, void *bytes, int size)
     j->size += (size_t)size;
 }
 
-/* A picture 32 x 16 with one red quarter, and a note on how the camera was held: where red is when it is shown upright. */
+/* A picture 32 x 16 with one red quarter, and a note on how the camera was held: where red is when it is shown
+   upright. */
 TEST(jpeg_is_turned_as_the_camera_was_held)
 {
-    /* by the picture of EXIF 2.3, 4.6.4: the stored top left is shown top left, top right, bottom right, bottom left, and so on */
+    /* by the picture of EXIF 2.3, 4.6.4: the stored top left is shown top left, top right, bottom right, bottom left,
+       and so on */
     static const unsigned char right[9] = {0, 0, 1, 1, 0, 0, 1, 1, 0}, below[9] = {0, 0, 0, 1, 1, 0, 0, 1, 1};
     static unsigned char pixels[32 * 16 * 3];
     static jpeg plain, noted;
@@ -194,7 +207,9 @@ TEST(jpeg_is_turned_as_the_camera_was_held)
     if (!EXPECT(stbi_write_jpg_to_func(jpeg_add, &plain, 32, 16, 3, pixels, 95))) return;
     for (little = 0; little < 2; ++little)
         for (turn = 1; turn <= 8; ++turn) {
-            unsigned char exif[] = {0xff, 0xd8, 0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f', 0, 0, 'M', 'M', 0, 42, 0, 0, 0, 8, 0, 1, 1, 0x12, 0, 3, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0};
+            unsigned char exif[] = {0xff, 0xd8, 0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f', 0,    0, 'M',
+                                    'M',  0,    42,   0,    0, 0,  8,   0,   1,   1,   0x12, 0, 3,
+                                    0,    0,    0,    1,    0, 0,  0,   0,   0,   0,   0,    0};
             unsigned char other[] = {'I', 'I', 42, 0, 8, 0, 0, 0, 1, 0, 0x12, 1, 3, 0, 1, 0, 0, 0, 0, 0};
             image a;
             int wide, u, v;
@@ -218,7 +233,8 @@ TEST(jpeg_is_turned_as_the_camera_was_held)
 #endif
 
 #ifdef HAVE_OPENEXR
-/* An uncompressed picture of 2 x 1 pixels whose channel i holds i + 1 and i + 1.5. `layers`: names in the order of the alphabet. */
+/* An uncompressed picture of 2 x 1 pixels whose channel i holds i + 1 and i + 1.5. `layers`: names in the order of the
+   alphabet. */
 static int write_layers(const char *path, const char *const *names, int count)
 {
     static jpeg file;
@@ -254,11 +270,14 @@ static int write_layers(const char *path, const char *const *names, int count)
 
 TEST(exr_with_layers_shows_its_picture)
 {
-    static const char *const blender[] = {"ViewLayer.Combined.A", "ViewLayer.Combined.B", "ViewLayer.Combined.G", "ViewLayer.Combined.R", "ViewLayer.Depth.Z"};
+    static const char *const blender[] = {"ViewLayer.Combined.A", "ViewLayer.Combined.B", "ViewLayer.Combined.G",
+                                          "ViewLayer.Combined.R", "ViewLayer.Depth.Z"};
     static const char *const passes[] = {"Diffuse.B", "Diffuse.G", "Diffuse.R", "beauty.B", "beauty.G", "beauty.R"};
-    static const char *const grey[] = {"A", "Y"}, *const depth[] = {"Z"}, *const odd[] = {"A", "U", "V"}, *const plain[] = {"B", "G", "R", "a.B", "a.G", "a.R"};
-    const struct { const char *const *names; int count; float r, g, b; } cases[] = {
-        {blender, 5, 4, 3, 2}, {passes, 6, 6, 5, 4}, {grey, 2, 2, 2, 2}, {depth, 1, 1, 1, 1}, {plain, 6, 3, 2, 1}, {odd, 3, 0, 0, 0}};
+    static const char *const grey[] = {"A", "Y"}, *const depth[] = {"Z"}, *const odd[] = {"A", "U", "V"},
+                             *const plain[] = {"B", "G", "R", "a.B", "a.G", "a.R"};
+    const struct { const char *const *names; int count; float r, g, b;
+    } cases[] = {{blender, 5, 4, 3, 2}, {passes, 6, 6, 5, 4}, {grey, 2, 2, 2, 2},
+                 {depth, 1, 1, 1, 1},   {plain, 6, 3, 2, 1},  {odd, 3, 0, 0, 0}};
     size_t i;
     image a;
     for (i = 0; i < 6; ++i) {
@@ -268,7 +287,8 @@ TEST(exr_with_layers_shows_its_picture)
             continue;
         }
         if (!EXPECT(image_load(&a, OUT_FILE("layers.exr")))) { puts(a.message); continue; }
-        EXPECT(a.pixels[0] == cases[i].r && a.pixels[1] == cases[i].g && a.pixels[2] == cases[i].b && a.pixels[3] == cases[i].r + 0.5f);
+        EXPECT(a.pixels[0] == cases[i].r && a.pixels[1] == cases[i].g && a.pixels[2] == cases[i].b &&
+               a.pixels[3] == cases[i].r + 0.5f);
         image_free(&a);
     }
 }
@@ -297,16 +317,33 @@ TEST(bad_files_are_refused_with_a_sentence)
 typedef struct known_file { const char *path; int width, height; const char *refused; } known_file;
 
 static const known_file known_files[] = {
-    {"hdr/Desk.exr", 644, 874, NULL}, {"hdr/StillLife.exr", 1240, 846, NULL}, {"hdr/memorial.exr", 512, 768, NULL},
-    {"hdr/memorial.hdr", 512, 768, NULL}, {"hdr/belgium.exr", 1025, 769, NULL}, {"hdr/belgium.hdr", 1025, 769, NULL},
-    {"hdr/GoldenGate.exr", 1262, 860, NULL}, {"hdr/Fog.exr", 1000, 672, NULL}, {"hdr/Carrots.exr", 600, 400, NULL},
-    {"hdr/MtTamNorth.exr", 1198, 796, NULL}, {"hdr/AllHalfValues.exr", 256, 256, NULL},
-    {"hdr/BrightRingsNanInf.exr", 800, 800, NULL}, {"hdr/WideFloatRange.exr", 500, 500, NULL},
-    {"hdr/WideColorGamut.exr", 800, 800, NULL}, {"env/city.exr", 1024, 512, NULL}, {"env/interior.exr", 1024, 512, NULL},
-    {"env/night.exr", 1024, 512, NULL}, {"env/forest.exr", 1024, 512, NULL}, {"env/studio.exr", 1024, 512, NULL},
-    {"env/esplanade.exr", 512, 256, NULL}, {"env/workshop.exr", 512, 256, NULL}, {"env/lobby.exr", 512, 256, NULL},
-    {"env/apartment.exr", 512, 256, NULL}, {"env/StageEnvLatLong.exr", 1000, 500, NULL},
-    {"env/city_original_dwab.exr", 0, 0, "DWAB"}, {"photos/brushes.jpg", 1024, 806, NULL}, {"tiles/tiles_0.png", 2048, 2048, NULL},
+    {"hdr/Desk.exr", 644, 874, NULL},
+    {"hdr/StillLife.exr", 1240, 846, NULL},
+    {"hdr/memorial.exr", 512, 768, NULL},
+    {"hdr/memorial.hdr", 512, 768, NULL},
+    {"hdr/belgium.exr", 1025, 769, NULL},
+    {"hdr/belgium.hdr", 1025, 769, NULL},
+    {"hdr/GoldenGate.exr", 1262, 860, NULL},
+    {"hdr/Fog.exr", 1000, 672, NULL},
+    {"hdr/Carrots.exr", 600, 400, NULL},
+    {"hdr/MtTamNorth.exr", 1198, 796, NULL},
+    {"hdr/AllHalfValues.exr", 256, 256, NULL},
+    {"hdr/BrightRingsNanInf.exr", 800, 800, NULL},
+    {"hdr/WideFloatRange.exr", 500, 500, NULL},
+    {"hdr/WideColorGamut.exr", 800, 800, NULL},
+    {"env/city.exr", 1024, 512, NULL},
+    {"env/interior.exr", 1024, 512, NULL},
+    {"env/night.exr", 1024, 512, NULL},
+    {"env/forest.exr", 1024, 512, NULL},
+    {"env/studio.exr", 1024, 512, NULL},
+    {"env/esplanade.exr", 512, 256, NULL},
+    {"env/workshop.exr", 512, 256, NULL},
+    {"env/lobby.exr", 512, 256, NULL},
+    {"env/apartment.exr", 512, 256, NULL},
+    {"env/StageEnvLatLong.exr", 1000, 500, NULL},
+    {"env/city_original_dwab.exr", 0, 0, "DWAB"},
+    {"photos/brushes.jpg", 1024, 806, NULL},
+    {"tiles/tiles_0.png", 2048, 2048, NULL},
 };
 
 TEST(known_files_load_or_are_refused)
@@ -338,7 +375,8 @@ static double mean_of(const image *a, int channel, int x0, int x1)
     double sum = 0;
     int x, y;
     for (y = 0; y < a->height; ++y)
-        for (x = x0; x < x1; ++x) sum += (double)a->pixels[3 * ((size_t)y * (size_t)a->width + (size_t)x) + (size_t)channel];
+        for (x = x0; x < x1; ++x)
+            sum += (double)a->pixels[3 * ((size_t)y * (size_t)a->width + (size_t)x) + (size_t)channel];
     return sum / a->height / (x1 - x0);
 }
 
@@ -415,7 +453,8 @@ TEST(obj_with_a_quad_and_negative_numbers)
 TEST(bad_meshes_are_refused)
 {
     mesh m;
-    EXPECT(write_text(OUT_FILE("bad.obj"), "v 0 0 0\nf 1 2 3\n") && !mesh_load(&m, OUT_FILE("bad.obj")) && strstr(m.message, "does not exist"));
+    EXPECT(write_text(OUT_FILE("bad.obj"), "v 0 0 0\nf 1 2 3\n") && !mesh_load(&m, OUT_FILE("bad.obj")) &&
+           strstr(m.message, "does not exist"));
     EXPECT(write_text(OUT_FILE("bad.ply"), "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nend_header\n1 2") &&
            !mesh_load(&m, OUT_FILE("bad.ply")) && strstr(m.message, "too early"));
     EXPECT(!mesh_load(&m, "no/such.ply") && strstr(m.message, "cannot be opened"));
@@ -431,10 +470,16 @@ TEST(options_are_read)
     int local = 0, frames = 2, size[2] = {0, 0}, hour = 1, i;
     const char *in = NULL, *shape = NULL;
     common_settings common;
-    common_option options[8] = {{"key", 'f', &key, 0, 1, ""}, {"local", 'b', &local, 0, 0, ""}, {"frames", 'i', &frames, 1, 9, ""}, {"size", 'z', size, 1, 4096, ""},
-                                {"hour", 'w', &hour, 0, 0, "dusk|night|noon of the day"}, {"in", 'P', (void *)&in, 0, 0, ""}, {"mesh", 'M', (void *)&shape, 0, 0, ""},
+    common_option options[8] = {{"key", 'f', &key, 0, 1, ""},
+                                {"local", 'b', &local, 0, 0, ""},
+                                {"frames", 'i', &frames, 1, 9, ""},
+                                {"size", 'z', size, 1, 4096, ""},
+                                {"hour", 'w', &hour, 0, 0, "dusk|night|noon of the day"},
+                                {"in", 'P', (void *)&in, 0, 0, ""},
+                                {"mesh", 'M', (void *)&shape, 0, 0, ""},
                                 {"white", 'd', &white, 0, INFINITY, ""}};
-    char words[13][24] = {"prog", "--key", "0.5", "in.exr", "--local", "--size=1280x720", "--hour", "noon", "--threads", "2", "-o", OUT_FILE("o.png"), "bunny.ply"};
+    char words[13][24] = {"prog", "--key",     "0.5", "in.exr", "--local",         "--size=1280x720", "--hour",
+                          "noon", "--threads", "2",   "-o",     OUT_FILE("o.png"), "bunny.ply"};
     char *argv[14], text[128];
     for (i = 0; i < 13; ++i) argv[i] = words[i];
     argv[13] = NULL;
@@ -445,10 +490,14 @@ TEST(options_are_read)
     EXPECT(strcmp(common.out, OUT_FILE("o.png")) == 0);
     EXPECT(common.workers == 2 || !common.threads.parallel_for);
     EXPECT(in && strcmp(in, "in.exr") == 0 && shape && strcmp(shape, "bunny.ply") == 0);
-    EXPECT(!common_set(&options[0], "fast") && !common_set(&options[0], "1.1") && !common_set(&options[0], "nan") && !common_set(&options[2], "1.5"));
-    EXPECT(!common_set(&options[2], "0") && !common_set(&options[2], "10") && !common_set(&options[2], "99999999999999999999"));
-    EXPECT(!common_set(&options[3], "10") && !common_set(&options[3], "0x0") && !common_set(&options[3], "10x5000") && !common_set(&options[3], "1x1x"));
-    EXPECT(!common_set(&options[4], "du") && !common_set(&options[4], "") && !common_set(&options[4], "of") && common_set(&options[4], "dusk") && hour == 0);
+    EXPECT(!common_set(&options[0], "fast") && !common_set(&options[0], "1.1") && !common_set(&options[0], "nan") &&
+           !common_set(&options[2], "1.5"));
+    EXPECT(!common_set(&options[2], "0") && !common_set(&options[2], "10") &&
+           !common_set(&options[2], "99999999999999999999"));
+    EXPECT(!common_set(&options[3], "10") && !common_set(&options[3], "0x0") && !common_set(&options[3], "10x5000") &&
+           !common_set(&options[3], "1x1x"));
+    EXPECT(!common_set(&options[4], "du") && !common_set(&options[4], "") && !common_set(&options[4], "of") &&
+           common_set(&options[4], "dusk") && hour == 0);
     EXPECT(common_set(&options[7], "inf") && white > 1e300);
     options[0].type = 'm';
     EXPECT(common_set(&options[0], "0.25mm") && !common_set(&options[0], "0.25cm"));
@@ -500,18 +549,23 @@ TEST(links_are_followed_and_known)
     file_id a, b;
     char why[FILE_MESSAGE] = "";
     remove(OUT_FILE("soft.txt")), remove(OUT_FILE("loop.txt"));
-    if (!EXPECT(write_text(OUT_FILE("target.txt"), "old")) || symlink(strrchr(OUT_FILE("target.txt"), '/') + 1, OUT_FILE("soft.txt"))) return;
-    EXPECT(file_identify(&a, OUT_FILE("target.txt")) && file_identify(&b, OUT_FILE("soft.txt")) && a.volume == b.volume && a.number == b.number);
+    if (!EXPECT(write_text(OUT_FILE("target.txt"), "old")) ||
+        symlink(strrchr(OUT_FILE("target.txt"), '/') + 1, OUT_FILE("soft.txt")))
+        return;
+    EXPECT(file_identify(&a, OUT_FILE("target.txt")) && file_identify(&b, OUT_FILE("soft.txt")) &&
+           a.volume == b.volume && a.number == b.number);
     EXPECT(file_open(&f, OUT_FILE("soft.txt"), why));
     file_put(&f, "new", 3);
     EXPECT(file_close(&f, 1, why) && holds(OUT_FILE("target.txt"), "new") && holds(OUT_FILE("soft.txt"), "new"));
-    EXPECT(symlink(strrchr(OUT_FILE("loop.txt"), '/') + 1, OUT_FILE("loop.txt")) == 0 && !file_open(&f, OUT_FILE("loop.txt"), why));
+    EXPECT(symlink(strrchr(OUT_FILE("loop.txt"), '/') + 1, OUT_FILE("loop.txt")) == 0 &&
+           !file_open(&f, OUT_FILE("loop.txt"), why));
 }
 
 TEST(a_full_disk_is_told)
 {
     image a;
-    static const char *const paths[] = {OUT_FILE("full.png"), OUT_FILE("full.pfm"), OUT_FILE("full.hdr"), OUT_FILE("full.exr")};
+    static const char *const paths[] = {OUT_FILE("full.png"), OUT_FILE("full.pfm"), OUT_FILE("full.hdr"),
+                                        OUT_FILE("full.exr")};
     size_t i;
     if (access("/dev/full", W_OK)) SKIP("there is no /dev/full");
     fill_image(&a, 64, 64, 3);

@@ -53,7 +53,8 @@ TEST(wrong_checks_fail)
     expect_test *child;
     char out[4096];
     for (child = children; child->name; ++child)
-        if (!EXPECT(expect_child(child->name, out, sizeof out) > 0) || !EXPECT(strstr(out, "\nnot ok ") || strncmp(out, "not ok ", 7) == 0))
+        if (!EXPECT(expect_child(child->name, out, sizeof out) > 0) ||
+            !EXPECT(strstr(out, "\nnot ok ") || strncmp(out, "not ok ", 7) == 0))
             printf("    in %s: %s\n", child->name, out);
 }
 

@@ -20,7 +20,9 @@ static sat_image test_sky(float *pixels, float sun)
         for (x = 0; x < SKY_WIDTH; x++) {
             double v = (y + 0.5) / (double)SKY_HEIGHT, u = (x + 0.5) / (double)SKY_WIDTH;
             for (c = 0; c < 3; c++) {
-                double light = v < 0.5 ? 1 + 4 * exp(-30 * ((u - 0.3) * (u - 0.3) + (v - 0.25) * (v - 0.25)) * (1 + 0.5 * c)) : 0.2;
+                double light =
+                    v < 0.5 ? 1 + 4 * exp(-30 * ((u - 0.3) * (u - 0.3) + (v - 0.25) * (v - 0.25)) * (1 + 0.5 * c))
+                            : 0.2;
                 pixels[3 * (y * SKY_WIDTH + x) + c] = (float)(light * (1 + 0.3 * sin(9 * u + c)) * (0.6 + 0.2 * c));
             }
         }
@@ -43,7 +45,8 @@ static fiv_environment *test_environment(float sun, float delta_ratio)
 /* A closed knot of 640 triangles. */
 static reference_mesh test_knot(void) { return reference_knot(2, 3, 40, 8, 0.25); }
 
-static fiv_occluder *test_occluder(const reference_mesh *m, const fiv_occluder_options *options, fiv_occluder_stats *stats)
+static fiv_occluder *test_occluder(const reference_mesh *m, const fiv_occluder_options *options,
+                                   fiv_occluder_stats *stats)
 {
     fiv_occluder *o = NULL;
     EXPECT_EQ(fiv_occluder_create(&o, m->positions, m->vertices, m->indices, m->triangles, options, stats), SAT_OK);
@@ -59,8 +62,8 @@ static fiv_occluder_options test_small_set(void)
     return o;
 }
 
-/* The same bits; where the compiler contracts a product and a sum into one instruction, which it does differently in each place,
-   the same but for the last digits. */
+/* The same bits; where the compiler contracts a product and a sum into one instruction, which it does differently in
+   each place, the same but for the last digits. */
 static int test_same(const float *a, const float *b, size_t n)
 {
 #if defined(__FMA__) || defined(__aarch64__)
@@ -113,7 +116,8 @@ static void test_free_lights(test_lights *l)
     free(l->powers);
 }
 
-static void test_truth(float *rgb, const reference_scene *s, const fiv_environment *e, const float *points, const float *normals, size_t count)
+static void test_truth(float *rgb, const reference_scene *s, const fiv_environment *e, const float *points,
+                       const float *normals, size_t count)
 {
     test_lights l = test_get_lights(e);
     size_t i;
@@ -125,8 +129,8 @@ static void test_truth(float *rgb, const reference_scene *s, const fiv_environme
     test_free_lights(&l);
 }
 
-static double test_nrmse(const float *truth, const float *points, const float *normals, size_t count, const fiv_environment *e,
-                         const fiv_instance *instances, size_t n, fiv_accuracy accuracy)
+static double test_nrmse(const float *truth, const float *points, const float *normals, size_t count,
+                         const fiv_environment *e, const fiv_instance *instances, size_t n, fiv_accuracy accuracy)
 {
     fiv_irradiance_options o = fiv_irradiance_defaults();
     float *rgb = (float *)malloc(3 * count * sizeof(float));
@@ -148,9 +152,12 @@ static void test_random_unit(float n[3], uint64_t *seed)
 static void test_rotation(float m[9], const float axis[3], double angle)
 {
     double c = cos(angle), s = sin(angle), x = (double)axis[0], y = (double)axis[1], z = (double)axis[2];
-    m[0] = (float)(c + x * x * (1 - c)), m[1] = (float)(x * y * (1 - c) - z * s), m[2] = (float)(x * z * (1 - c) + y * s);
-    m[3] = (float)(y * x * (1 - c) + z * s), m[4] = (float)(c + y * y * (1 - c)), m[5] = (float)(y * z * (1 - c) - x * s);
-    m[6] = (float)(z * x * (1 - c) - y * s), m[7] = (float)(z * y * (1 - c) + x * s), m[8] = (float)(c + z * z * (1 - c));
+    m[0] = (float)(c + x * x * (1 - c)), m[1] = (float)(x * y * (1 - c) - z * s),
+    m[2] = (float)(x * z * (1 - c) + y * s);
+    m[3] = (float)(y * x * (1 - c) + z * s), m[4] = (float)(c + y * y * (1 - c)),
+    m[5] = (float)(y * z * (1 - c) - x * s);
+    m[6] = (float)(z * x * (1 - c) - y * s), m[7] = (float)(z * y * (1 - c) + x * s),
+    m[8] = (float)(c + z * z * (1 - c));
 }
 
 /* ---- environments ---- */
@@ -189,8 +196,11 @@ TEST(orientation_of_the_image)
     static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
     sat_image image = sat_image_f32(pixels, SKY_WIDTH, SKY_HEIGHT, 3);
     int x = 100, y = 20, k;
-    double u = (x + 0.5) / (double)SKY_WIDTH, v = (y + 0.5) / (double)SKY_HEIGHT, a = 6.283185307179586 * (u - 0.5), b = 3.141592653589793 * v;
-    double d[3], solid = 6.283185307179586 / (double)SKY_WIDTH * (cos(3.141592653589793 * y / (double)SKY_HEIGHT) - cos(3.141592653589793 * (y + 1) / (double)SKY_HEIGHT));
+    double u = (x + 0.5) / (double)SKY_WIDTH, v = (y + 0.5) / (double)SKY_HEIGHT, a = 6.283185307179586 * (u - 0.5),
+           b = 3.141592653589793 * v;
+    double d[3], solid = 6.283185307179586 / (double)SKY_WIDTH *
+                         (cos(3.141592653589793 * y / (double)SKY_HEIGHT) -
+                          cos(3.141592653589793 * (y + 1) / (double)SKY_HEIGHT));
     fiv_environment *e = NULL;
     fiv_environment_stats stats;
     float direction[3], power[3], normal[3], rgb[3];
@@ -243,7 +253,8 @@ TEST(irradiance_is_the_sum_over_the_lights)
         memset(vector, 0, sizeof vector);
         for (i = 0; i < l.count; i++)
             for (c = 0; c < 3; c++)
-                for (k = 0; k < 3; k++) vector[3 * c + k] += (double)l.powers[3 * i + (size_t)c] * (double)l.directions[3 * i + (size_t)k];
+                for (k = 0; k < 3; k++)
+                    vector[3 * c + k] += (double)l.powers[3 * i + (size_t)c] * (double)l.directions[3 * i + (size_t)k];
         fiv_environment_vector(e, fiv);
         for (k = 0; k < 9; k++) EXPECT_NEAR(fiv[k], vector[k], 1e-5 * scale);
     }
@@ -300,11 +311,13 @@ TEST(sun_of_1e8)
             int c;
             if (!(rows[i / 32] >> (i % 32) & 1)) continue;
             (void)p;
-            fiv__cube_direction(d, (int)(i / 1024), fiv__texel_coordinate((int)(i % 32), 32), fiv__texel_coordinate((int)(i / 32 % 32), 32));
+            fiv__cube_direction(d, (int)(i / 1024), fiv__texel_coordinate((int)(i % 32), 32),
+                                fiv__texel_coordinate((int)(i / 32 % 32), 32));
             fiv__normalise(d, d);
             for (c = 0; c < 3; c++)
                 for (k = 0; k < 3; k++)
-                    truth[3 * c + k] += (double)e->radiance[3 * i + (size_t)c] * fiv__texel_angle((int)(i % 32), (int)(i / 32 % 32), 32) * (double)d[k];
+                    truth[3 * c + k] += (double)e->radiance[3 * i + (size_t)c] *
+                                        fiv__texel_angle((int)(i % 32), (int)(i / 32 % 32), 32) * (double)d[k];
         }
         fiv__integrate(sum, o->sums, o->words + o->first[s], o->first[s + 1] - o->first[s], 32);
         for (k = 0; k < 9; k++) largest = fabs(truth[k]) > largest ? fabs(truth[k]) : largest;
@@ -321,7 +334,8 @@ TEST(sun_of_1e8)
 /* ---- masks ---- */
 
 /* Texels of a mask that differ from rays; *set counts those that rays set. */
-static int test_mask_errors(const fiv_occluder *lazy, const reference_scene *s, const float offset[3], int size, int *set)
+static int test_mask_errors(const fiv_occluder *lazy, const reference_scene *s, const float offset[3], int size,
+                            int *set)
 {
     uint64_t rows[FIV__MAX_ROWS];
     double origin[3], d[3];
@@ -332,7 +346,8 @@ static int test_mask_errors(const fiv_occluder *lazy, const reference_scene *s, 
     for (row = 0; row < 6 * size; row++)
         for (x = 0; x < size; x++) {
             int hit;
-            fiv__cube_direction(direction, row / size, fiv__texel_coordinate(x, size), fiv__texel_coordinate(row % size, size));
+            fiv__cube_direction(direction, row / size, fiv__texel_coordinate(x, size),
+                                fiv__texel_coordinate(row % size, size));
             for (k = 0; k < 3; k++) d[k] = (double)direction[k];
             hit = reference_occluded(s, origin, d);
             wrong += hit != (int)(rows[row] >> x & 1);
@@ -341,10 +356,13 @@ static int test_mask_errors(const fiv_occluder *lazy, const reference_scene *s, 
     return wrong;
 }
 
-/* Masks seen from far, near, inside and within the tube; flip: clockwise triangles; open: every seventh triangle is missing. */
+/* Masks seen from far, near, inside and within the tube; flip: clockwise triangles; open: every seventh triangle is
+   missing. */
 static void test_masks_of(const reference_mesh *m, int size, int flip, int open, int closed)
 {
-    static const float offsets[][3] = {{0, 0, 3}, {1.1f, 0.4f, -0.3f}, {0.2f, 0.1f, 0.3f}, {0.013f, 0.007f, -0.005f}, {0.5f, -0.7f, 0.1f}, {-40, 3, 20}, {0.62f, 0, 0.02f}};
+    static const float offsets[][3] = {
+        {0, 0, 3},           {1.1f, 0.4f, -0.3f}, {0.2f, 0.1f, 0.3f}, {0.013f, 0.007f, -0.005f},
+        {0.5f, -0.7f, 0.1f}, {-40, 3, 20},        {0.62f, 0, 0.02f}};
     static const float no_move[3] = {0, 0, 0};
     fiv_occluder_options o = test_small_set();
     fiv_occluder *lazy;
@@ -409,8 +427,12 @@ TEST(spans_hold_any_mask)
             size_t n;
             for (row = 0; row < 6 * size; row++) {
                 uint64_t noise = support_random(&seed);
-                rows[row] = full & (kind == 0 ? 0 : kind == 1 ? full : kind == 2 ? noise : kind == 3 ? 0x5555555555555555u
-                                    : kind == 4 ? (row % 40 == 39 ? noise : 0) : noise & noise << 1 & noise << 2);
+                rows[row] = full & (kind == 0   ? 0
+                                    : kind == 1 ? full
+                                    : kind == 2 ? noise
+                                    : kind == 3 ? 0x5555555555555555u
+                                    : kind == 4 ? (row % 40 == 39 ? noise : 0)
+                                                : noise & noise << 1 & noise << 2);
             }
             n = fiv__encode(words, rows, 6 * size);
             EXPECT(n <= FIV__MAX_WORDS);
@@ -449,7 +471,8 @@ typedef struct test_scene {
 } test_scene;
 
 /* The knot at a position, twice when `second` is given, lit and with its ground truth. */
-static void test_open_scene(test_scene *s, float sun, const fiv_occluder_options *options, const float *first, const float *second)
+static void test_open_scene(test_scene *s, float sun, const fiv_occluder_options *options, const float *first,
+                            const float *second)
 {
     memset(s, 0, sizeof *s);
     s->mesh = test_knot();
@@ -489,7 +512,11 @@ TEST(shadow_on_a_plane)
         test_truth(truth, &s.truth, s.environment, points, normals, COUNT);
         for (a = 0; a < 4; a++) {
             error[a] = test_nrmse(truth, points, normals, COUNT, s.environment, &instance, 1, (fiv_accuracy)a);
-            REPORT(a == 0 ? "plane: nearest" : a == 1 ? "plane: trilinear" : a == 2 ? "plane: scaled" : "plane: masks", error[a], "NRMSE");
+            REPORT(a == 0   ? "plane: nearest"
+                   : a == 1 ? "plane: trilinear"
+                   : a == 2 ? "plane: scaled"
+                            : "plane: masks",
+                   error[a], "NRMSE");
         }
         EXPECT(error[2] < (i ? 0.06 : 0.02));
         EXPECT(error[2] < error[1] && error[1] < error[0]);
@@ -498,8 +525,8 @@ TEST(shadow_on_a_plane)
     }
 }
 
-/* Objects that stand on a plane: receivers near contact get masks of their own, suns get rays. The box's plane also at gap 0, where
-   receivers lie in its lowest face. */
+/* Objects that stand on a plane: receivers near contact get masks of their own, suns get rays. The box's plane also at
+   gap 0, where receivers lie in its lowest face. */
 static void test_resting(const reference_mesh *m, float low, float gap, float sun, float width, double bound)
 {
     static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT];
@@ -565,7 +592,8 @@ TEST(resting_objects)
 /* A bare sun's edge is that of the rays: at every receiver but those whose ray grazes an edge. */
 TEST(suns_have_edges)
 {
-    static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT], rgb[3 * COUNT], pixels[SKY_WIDTH * SKY_HEIGHT * 3];
+    static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT], rgb[3 * COUNT],
+        pixels[SKY_WIDTH * SKY_HEIGHT * 3];
     static const float where[3] = {0.1f, 0.7f, -0.2f}, axis[3] = {0.6f, 0, 0.8f};
     sat_image image = sat_image_f32(pixels, SKY_WIDTH, SKY_HEIGHT, 3);
     fiv_occluder_options options = test_small_set();
@@ -594,7 +622,8 @@ TEST(suns_have_edges)
         test_plane(points, normals, SIDE, 4, pass ? -1 : -0.6f);
         test_truth(truth, &scene, e, points, normals, COUNT);
         EXPECT_EQ(fiv_irradiance(rgb, points, normals, COUNT, e, &instance, 1, NULL, &stats), SAT_OK);
-        for (i = 0, differ = 0; i < COUNT; i++) differ += fabsf(rgb[3 * i] - truth[3 * i]) > 1e-3f * truth[3 * i] + 1e-6f;
+        for (i = 0, differ = 0; i < COUNT; i++)
+            differ += fabsf(rgb[3 * i] - truth[3 * i]) > 1e-3f * truth[3 * i] + 1e-6f;
         REPORT("receivers of 576 on the wrong side of a sun's edge", differ, "");
         EXPECT(differ <= 1);
         EXPECT(stats.rays > COUNT / 10);
@@ -606,7 +635,8 @@ TEST(suns_have_edges)
     fiv_environment_destroy(e);
 }
 
-/* own_masks bounds the receivers of each 64 in a row, whatever the order of the instances; published accuracies take none. */
+/* own_masks bounds the receivers of each 64 in a row, whatever the order of the instances; published accuracies take
+   none. */
 TEST(own_masks_are_bounded)
 {
     static float points[3 * COUNT], normals[3 * COUNT], rgb[2][3 * COUNT];
@@ -749,7 +779,11 @@ TEST(two_occluders)
     test_truth(truth, &s.truth, s.environment, points, normals, COUNT);
     for (a = 0; a < 4; a++) {
         error[a] = test_nrmse(truth, points, normals, COUNT, s.environment, instances, 2, (fiv_accuracy)a);
-        REPORT(a == 0 ? "two: nearest" : a == 1 ? "two: trilinear, eq 14-15" : a == 2 ? "two: scaled" : "two: masks", error[a], "NRMSE");
+        REPORT(a == 0   ? "two: nearest"
+               : a == 1 ? "two: trilinear, eq 14-15"
+               : a == 2 ? "two: scaled"
+                        : "two: masks",
+               error[a], "NRMSE");
     }
     EXPECT(error[3] <= 0.5 * error[1]);
     EXPECT(error[2] < error[1]);
@@ -772,7 +806,8 @@ TEST(turning_light_and_occluder)
         double error;
         test_open_scene(&s, 0, NULL, where, NULL);
         reference_free(&s.truth);
-        reference_add(&s.truth, s.mesh.positions, s.mesh.indices, s.mesh.triangles, which & 2 ? mesh_turn : NULL, where, 1);
+        reference_add(&s.truth, s.mesh.positions, s.mesh.indices, s.mesh.triangles, which & 2 ? mesh_turn : NULL, where,
+                      1);
         reference_build(&s.truth);
         EXPECT_EQ(fiv_environment_update(s.environment, NULL, which & 1 ? light_turn : NULL), SAT_OK);
         EXPECT_EQ(fiv_occluder_light(s.occluder, s.environment, which & 2 ? mesh_turn : NULL), SAT_OK);
@@ -904,7 +939,9 @@ TEST(order_of_occluders)
             fiv_irradiance_options o = fiv_irradiance_defaults();
             fiv_irradiance_stats stats;
             o.accuracy = (fiv_accuracy)a;
-            EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, a == 3 ? 100 : COUNT, s.environment, instances, (size_t)n, &o, &stats), SAT_OK);
+            EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, a == 3 ? 100 : COUNT, s.environment, instances, (size_t)n,
+                                     &o, &stats),
+                      SAT_OK);
             EXPECT(stats.overlaps > 0);
             memcpy(shuffled, instances, sizeof shuffled);
             for (i = n - 1; i > 0; i--) {
@@ -913,7 +950,9 @@ TEST(order_of_occluders)
                 shuffled[i] = shuffled[k];
                 shuffled[k] = swap;
             }
-            EXPECT_EQ(fiv_irradiance(rgb[1], points, normals, a == 3 ? 100 : COUNT, s.environment, shuffled, (size_t)n, &o, NULL), SAT_OK);
+            EXPECT_EQ(fiv_irradiance(rgb[1], points, normals, a == 3 ? 100 : COUNT, s.environment, shuffled, (size_t)n,
+                                     &o, NULL),
+                      SAT_OK);
             EXPECT(test_same(rgb[0], rgb[1], a == 3 ? 300 : 3 * COUNT));
             for (i = 0; i < (a == 3 ? 100 : COUNT); i++) {
                 float open[3];
@@ -995,7 +1034,8 @@ TEST(self_shadows)
     self = test_instance(s.occluder, 0, 0, 0);
     for (t = 0; t < s.mesh.triangles; t++) {
         float *p = points + 3 * t, *n = normals + 3 * t, corner[3][3], e[2][3];
-        for (j = 0; j < 3; j++) memcpy(corner[j], s.mesh.positions + 3 * (size_t)s.mesh.indices[3 * t + (size_t)j], sizeof corner[j]);
+        for (j = 0; j < 3; j++)
+            memcpy(corner[j], s.mesh.positions + 3 * (size_t)s.mesh.indices[3 * t + (size_t)j], sizeof corner[j]);
         for (k = 0; k < 3; k++) e[0][k] = corner[1][k] - corner[0][k], e[1][k] = corner[2][k] - corner[0][k];
         for (k = 0; k < 3; k++) n[k] = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
         fiv__normalise(n, n);
@@ -1008,8 +1048,10 @@ TEST(self_shadows)
         double error, open = 0;
         static float unshadowed[3 * 640];
         o.accuracy = (fiv_accuracy)a;
-        EXPECT_EQ(fiv_self_irradiance(rgb, points, normals, s.mesh.triangles, s.environment, &self, NULL, 0, &o, NULL), SAT_OK);
-        for (t = 0; t < s.mesh.triangles; t++) fiv_environment_irradiance(s.environment, unshadowed + 3 * t, normals + 3 * t);
+        EXPECT_EQ(fiv_self_irradiance(rgb, points, normals, s.mesh.triangles, s.environment, &self, NULL, 0, &o, NULL),
+                  SAT_OK);
+        for (t = 0; t < s.mesh.triangles; t++)
+            fiv_environment_irradiance(s.environment, unshadowed + 3 * t, normals + 3 * t);
         error = reference_nrmse(truth, rgb, s.mesh.triangles);
         open = reference_nrmse(truth, unshadowed, s.mesh.triangles);
         REPORT("self: without shadows", open, "NRMSE");
@@ -1028,7 +1070,9 @@ static int test_same_distances(const fiv_occluder *a, const fiv_occluder *b)
 {
     size_t i;
     for (i = 0; i < a->stats.samples; i++)
-        if (memcmp(a->distance + i * (size_t)a->max_lights, b->distance + i * (size_t)b->max_lights, (size_t)a->light_count)) return 0;
+        if (memcmp(a->distance + i * (size_t)a->max_lights, b->distance + i * (size_t)b->max_lights,
+                   (size_t)a->light_count))
+            return 0;
     return a->light_count > 0 && a->light_count == b->light_count;
 }
 
@@ -1099,7 +1143,8 @@ TEST(cells_surround_their_point)
             fiv__sample_offset(a, &o.grid, (size_t)i);
             fiv__sample_offset(b, &o.grid, fiv__first_twin(&o.grid, (size_t)i));
             for (k = 0; k < 3; k++) EXPECT_NEAR(a[k], b[k], 1e-6 * (double)o.grid.last);
-            EXPECT(fiv__first_twin(&o.grid, fiv__first_twin(&o.grid, (size_t)i)) == fiv__first_twin(&o.grid, (size_t)i));
+            EXPECT(fiv__first_twin(&o.grid, fiv__first_twin(&o.grid, (size_t)i)) ==
+                   fiv__first_twin(&o.grid, (size_t)i));
         }
     }
 }
@@ -1475,7 +1520,8 @@ TEST(failing_allocators)
             options.allocator = eo.allocator = support_allocator(&memory);
             memory.fail_at = fail;
             if (fiv_environment_create(&e, &sky, &eo, NULL) != SAT_OK) EXPECT(e == NULL);
-            if (fiv_occluder_create(&o, m.positions, m.vertices, m.indices, m.triangles, &options, NULL) != SAT_OK) EXPECT(o == NULL);
+            if (fiv_occluder_create(&o, m.positions, m.vertices, m.indices, m.triangles, &options, NULL) != SAT_OK)
+                EXPECT(o == NULL);
             if (o && kind == 0 && fiv_occluder_share(&share, o) != SAT_OK) EXPECT(share == NULL);
             if (fail == 13) EXPECT(e && o);
             fiv_occluder_destroy(share);
@@ -1554,7 +1600,8 @@ TEST(progress_and_cancelling)
     EXPECT(state[2] > 10);
     fiv_occluder_destroy(o);
     state[0] = 0, state[1] = 0.5f;
-    EXPECT_EQ(fiv_occluder_create(&o, m.positions, m.vertices, m.indices, m.triangles, &options, NULL), SAT_ERR_CANCELLED);
+    EXPECT_EQ(fiv_occluder_create(&o, m.positions, m.vertices, m.indices, m.triangles, &options, NULL),
+              SAT_ERR_CANCELLED);
     EXPECT(o == NULL);
     EXPECT(state[0] < 0.6f);
     reference_mesh_free(&m);
@@ -1571,7 +1618,8 @@ TEST(bad_arguments)
     fiv_environment *e = NULL, *other = NULL;
     fiv_occluder *o = NULL, *none = NULL;
     fiv_instance instance, many[FIV_MAX_INSTANCES + 1];
-    float p[3] = {0, 0, 0}, n[3] = {0, 1, 0}, rgb[3], skew[9] = {1, 0.1f, 0, 0, 1, 0, 0, 0, 1}, mirror[9] = {-1, 0, 0, 0, 1, 0, 0, 0, 1};
+    float p[3] = {0, 0, 0}, n[3] = {0, 1, 0}, rgb[3], skew[9] = {1, 0.1f, 0, 0, 1, 0, 0, 0, 1},
+          mirror[9] = {-1, 0, 0, 0, 1, 0, 0, 0, 1};
     unsigned over[3] = {0, 1, 320};
     int i;
     EXPECT_EQ(fiv_environment_create(NULL, &sky, NULL, NULL), SAT_ERR_ARGUMENT);
@@ -1611,7 +1659,8 @@ TEST(bad_arguments)
         if (i == 10) bad.max_lights = -1;
         if (i == 11) bad.threads.workers = -1;
         if (i == 12) bad.first_shell = test_nan();
-        EXPECT_EQ(fiv_occluder_create(&none, m.positions, m.vertices, m.indices, m.triangles, &bad, NULL), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(fiv_occluder_create(&none, m.positions, m.vertices, m.indices, m.triangles, &bad, NULL),
+                  SAT_ERR_ARGUMENT);
     }
     EXPECT_EQ(fiv_occluder_create(&none, m.positions, m.vertices, over, 1, &oo, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(fiv_occluder_create(&none, NULL, 3, over, 1, &oo, NULL), SAT_ERR_ARGUMENT);
@@ -1665,7 +1714,11 @@ TEST(options_of_environments_are_checked_and_named)
         if (f->type != 'i' && f->type != 'f') continue;
         for (at = 0; at < 6; at++) {
             fiv_environment_options o = fiv_environment_defaults();
-            double v = at == 0 ? f->initial : at == 1 ? f->low : at == 2 ? f->high : at == 3 ? f->low - 1 : f->high * 1.1 + 1;
+            double v = at == 0   ? f->initial
+                       : at == 1 ? f->low
+                       : at == 2 ? f->high
+                       : at == 3 ? f->low - 1
+                                 : f->high * 1.1 + 1;
             if (at == 5 && f->type != 'f') continue;
             sat__field_set(f, &o, at == 5 ? (double)test_nan() : v);
             if (at < 3) {
@@ -1680,8 +1733,8 @@ TEST(options_of_environments_are_checked_and_named)
     }
 }
 
-/* One bright texel on black: its power is its radiance times its solid angle; beside the poles, where texels are narrow, a part
-   of it stays in the cube. */
+/* One bright texel on black: its power is its radiance times its solid angle; beside the poles, where texels are
+   narrow, a part of it stays in the cube. */
 TEST(power_of_a_split_off_light)
 {
     static float pixels[SKY_WIDTH * SKY_HEIGHT * 3];
@@ -1715,7 +1768,8 @@ TEST(defaults_are_the_stated_ones)
     EXPECT_EQ(e.face, 32);
     EXPECT_NEAR(e.delta_ratio, 400, 0);
     EXPECT_EQ(e.max_lights, 8);
-    EXPECT(o.theta == 32 && o.phi == 17 && o.rho == 15 && o.face == 32 && o.keep_masks == 1 && o.lazy == 0 && o.max_lights == 8 && o.keep_mesh == 0);
+    EXPECT(o.theta == 32 && o.phi == 17 && o.rho == 15 && o.face == 32 && o.keep_masks == 1 && o.lazy == 0 &&
+           o.max_lights == 8 && o.keep_mesh == 0);
     EXPECT_NEAR(o.first_shell, 0.3f, 0);
     EXPECT_NEAR(o.last_shell, 6, 0);
     EXPECT(i.accuracy == FIV_SCALED && i.partial == 1 && i.overlap == 1);

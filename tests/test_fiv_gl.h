@@ -37,7 +37,8 @@ static void test_sky(int suns)
     fiv_environment_options o = fiv_environment_defaults();
     int i;
     o.delta_ratio = 100;
-    for (i = 0; i < 64 * 32 * 3; i++) pixels[i] = (i / 3 / 64 < 16 ? 1.0f : 0.2f) * (1 + 0.5f * sinf(0.1f * (float)(i / 3 % 64) + (float)(i % 3)));
+    for (i = 0; i < 64 * 32 * 3; i++)
+        pixels[i] = (i / 3 / 64 < 16 ? 1.0f : 0.2f) * (1 + 0.5f * sinf(0.1f * (float)(i / 3 % 64) + (float)(i % 3)));
     for (i = 0; i < suns; i++) pixels[3 * (64 * (4 + 2 * i) + 9 * i) + i % 3] = 3000;
     fiv_environment_destroy(scene.environment);
     EXPECT_EQ(fiv_environment_create(&scene.environment, &image, &o, NULL), SAT_OK);
@@ -62,7 +63,8 @@ static void test_receivers(void)
         fiv__normalise(n, n);
         if (i == 5) n[1] = 0;
         for (k = 0; k < 3; k++) {
-            scene.points[4 * i + k] = (float)(k == 1 ? (i < COUNT / 2 ? -0.9 : 2 * support_uniform(&seed) - 1) : 8 * support_uniform(&seed) - 4);
+            scene.points[4 * i + k] = (float)(k == 1 ? (i < COUNT / 2 ? -0.9 : 2 * support_uniform(&seed) - 1)
+                                                     : 8 * support_uniform(&seed) - 4);
             scene.normals[4 * i + k] = n[k];
         }
         scene.points[4 * i + 3] = scene.normals[4 * i + 3] = 1;
@@ -81,7 +83,9 @@ static int test_open(fiv_storage storage, int self)
     scene.mesh = reference_knot(2, 3, 40, 8, 0.25);
     o.theta = 16, o.phi = 9, o.rho = 8;
     o.storage = storage;
-    EXPECT_EQ(fiv_occluder_create(&scene.upright, scene.mesh.positions, scene.mesh.vertices, scene.mesh.indices, scene.mesh.triangles, &o, NULL), SAT_OK);
+    EXPECT_EQ(fiv_occluder_create(&scene.upright, scene.mesh.positions, scene.mesh.vertices, scene.mesh.indices,
+                                  scene.mesh.triangles, &o, NULL),
+              SAT_OK);
     EXPECT_EQ(fiv_occluder_share(&scene.turned, scene.upright), SAT_OK);
     test_sky(1);
     test_light();
@@ -98,8 +102,10 @@ static int test_open(fiv_storage storage, int self)
     if (result) printf("%s\n", fiv_gl_message(scene.gl));
     if (!EXPECT_EQ(result, SAT_OK)) return 0;
     sat__gl_begin(&scene.gl->gl, &state, 1);
-    EXPECT_EQ(sat__gl_texture(&scene.gl->gl, &scene.point_texture, SAT__GL_RGBA32F, WIDTH, HEIGHT, scene.points), SAT_OK);
-    EXPECT_EQ(sat__gl_texture(&scene.gl->gl, &scene.normal_texture, SAT__GL_RGBA32F, WIDTH, HEIGHT, scene.normals), SAT_OK);
+    EXPECT_EQ(sat__gl_texture(&scene.gl->gl, &scene.point_texture, SAT__GL_RGBA32F, WIDTH, HEIGHT, scene.points),
+              SAT_OK);
+    EXPECT_EQ(sat__gl_texture(&scene.gl->gl, &scene.normal_texture, SAT__GL_RGBA32F, WIDTH, HEIGHT, scene.normals),
+              SAT_OK);
     sat__gl_end(&scene.gl->gl, &state);
     return 1;
 }
@@ -131,7 +137,9 @@ static void test_cpu(float rgb[3], int i, size_t count)
         if (!(point[3] >= (float)j + 2 && point[3] < (float)j + 3)) others[n++] = scene.instances[j];
 #ifndef FIV_NO_SELF
     if (n < count) {
-        EXPECT_EQ(fiv_self_irradiance(rgb, point, normal, 1, scene.environment, &scene.instances[(int)point[3] - 2], others, n, &o, NULL), SAT_OK);
+        EXPECT_EQ(fiv_self_irradiance(rgb, point, normal, 1, scene.environment, &scene.instances[(int)point[3] - 2],
+                                      others, n, &o, NULL),
+                  SAT_OK);
         return;
     }
 #endif
@@ -189,8 +197,8 @@ TEST(receiver_pass_equals_the_cpu)
 }
 
 #ifndef FIV_NO_SELF
-/* Receivers on the knots, in turn on each of the first two instances, and every fifth one as it was: on none, or on one that is not there.
-   Writes the texture anew. */
+/* Receivers on the knots, in turn on each of the first two instances, and every fifth one as it was: on none, or on one
+   that is not there. Writes the texture anew. */
 static void test_receivers_on_knots(void)
 {
     static const float none[5] = {1, 0, -3, 2 + 3, 1e9f};
@@ -204,8 +212,11 @@ static void test_receivers_on_knots(void)
         scene.points[4 * i + 3] = i % 5 ? (float)(2 + (i & 1)) : none[i / 5 % 5];
         if (i % 5 == 0) continue;
         for (j = 0; j < 3; j++) p[j] = scene.mesh.positions + 3 * (size_t)corner[j];
-        for (k = 0; k < 3; k++) e[0][k] = p[1][k] - p[0][k], e[1][k] = p[2][k] - p[0][k], middle[k] = (p[0][k] + p[1][k] + p[2][k]) / 3;
-        for (k = 0; k < 3; k++) n[k] = (float)self->occluder->mesh.turn * (e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3]);
+        for (k = 0; k < 3; k++)
+            e[0][k] = p[1][k] - p[0][k], e[1][k] = p[2][k] - p[0][k], middle[k] = (p[0][k] + p[1][k] + p[2][k]) / 3;
+        for (k = 0; k < 3; k++)
+            n[k] = (float)self->occluder->mesh.turn *
+                   (e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3]);
         fiv__turn(scene.normals + 4 * i, self->occluder->rotation, n);
         fiv__turn(scene.points + 4 * i, self->occluder->rotation, middle);
         for (k = 0; k < 3; k++) scene.points[4 * i + k] = self->position[k] + self->scale * scene.points[4 * i + k];
@@ -233,11 +244,14 @@ TEST(self_shadows_equal_the_cpu)
                 test_difference(&worst, &rms, count);
                 EXPECT(worst < 2e-3);
                 EXPECT(rms < 1e-4);
-                if (suns == 1 && count == 3) REPORT("GPU against CPU, receivers on occluders: worst", worst, "of the largest");
-                if (suns == 1 && count == 3) REPORT("GPU against CPU, receivers on occluders: rms", rms, "of the largest");
+                if (suns == 1 && count == 3)
+                    REPORT("GPU against CPU, receivers on occluders: worst", worst, "of the largest");
+                if (suns == 1 && count == 3)
+                    REPORT("GPU against CPU, receivers on occluders: rms", rms, "of the largest");
             }
         }
-        for (i = 0; i < COUNT; i++) scene.points[4 * i + 3] = 1; /* on the CPU alone: the difference sees what is compared */
+        for (i = 0; i < COUNT; i++) scene.points[4 * i + 3] = 1; /* on the CPU alone: the difference sees what is
+                                                                    compared */
         test_difference(&worst, &rms, 3);
         EXPECT(rms > 0.02);
         test_close();
@@ -288,7 +302,14 @@ TEST(moving_needs_no_tables)
 
 TEST(state_is_put_back)
 {
-    enum { VIEWPORT = 0x0BA2, PROGRAM = 0x8B8D, DRAW_FRAMEBUFFER = 0x8CA6, VERTEX_ARRAY = 0x85B5, TEXTURE_2D = 0x8069, ACTIVE = 0x84E0 };
+    enum {
+        VIEWPORT = 0x0BA2,
+        PROGRAM = 0x8B8D,
+        DRAW_FRAMEBUFFER = 0x8CA6,
+        VERTEX_ARRAY = 0x85B5,
+        TEXTURE_2D = 0x8069,
+        ACTIVE = 0x84E0
+    };
     static const unsigned names[6] = {VIEWPORT, PROGRAM, DRAW_FRAMEBUFFER, VERTEX_ARRAY, TEXTURE_2D, ACTIVE};
     int before[6][4], after[6][4], i;
     unsigned texture = 0;

@@ -75,7 +75,8 @@ static double rg_compare(rg_scene *s, raindrop_gl *g, const raindrop_rain *rain,
     sat__gl_state state;
     int x, y, c;
     memcpy(s->cpu, s->background, sizeof(float) * 3 * RG_W * RG_H);
-    EXPECT_EQ(raindrop_render(s->cpu, RG_W * 12, RG_W, RG_H, NULL, &s->camera, rain, s->environment, options, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_render(s->cpu, RG_W * 12, RG_W, RG_H, NULL, &s->camera, rain, s->environment, options, NULL),
+              SAT_OK);
     for (y = 0; y < RG_H; y++)
         for (x = 0; x < RG_W; x++) {
             for (c = 0; c < 3; c++) s->gpu[4 * ((RG_H - 1 - y) * RG_W + x) + c] = s->background[3 * (y * RG_W + x) + c];
@@ -140,7 +141,8 @@ TEST(raindrop_gl_draws_the_picture_of_the_cpu)
             if (!quads) s.camera.near_distance = 0.03f; /* no centre of a drop that is seen lies outside */
             error = rg_compare(&s, g, few, &o);
             if (quads) EXPECT(error < 5e-4);
-            REPORT(names[look], error, quads ? "RMSE from the CPU, near drops, quads" : "RMSE from the CPU, near drops, points");
+            REPORT(names[look], error,
+                   quads ? "RMSE from the CPU, near drops, quads" : "RMSE from the CPU, near drops, points");
         }
         EXPECT(reference_rmse(s.cpu, s.background, NULL, RG_W * RG_H, s.key) > 0.01); /* there was something to see */
         raindrop_gl_destroy(g);
@@ -150,8 +152,8 @@ TEST(raindrop_gl_draws_the_picture_of_the_cpu)
     rg_close(&s);
 }
 
-/* Streaks and lenses of any size, near and far; the camera moves too. Point sprites are left out: they vanish with their
-   centres. */
+/* Streaks and lenses of any size, near and far; the camera moves too. Point sprites are left out: they vanish with
+   their centres. */
 static void rg_compare_soft(rg_scene *s, double exposure, double aperture, const char *name)
 {
     raindrop_gl_options g_options = raindrop_gl_defaults();
@@ -180,7 +182,8 @@ static void rg_compare_soft(rg_scene *s, double exposure, double aperture, const
         EXPECT(error < 5e-4 && near_error < 5e-4);
         s->camera.exposure = s->camera.aperture = 0;
         memcpy(s->gpu, s->background, sizeof(float) * 3 * RG_W * RG_H);
-        EXPECT_EQ(raindrop_render(s->gpu, RG_W * 12, RG_W, RG_H, NULL, &s->camera, few, s->environment, &o, NULL), SAT_OK);
+        EXPECT_EQ(raindrop_render(s->gpu, RG_W * 12, RG_W, RG_H, NULL, &s->camera, few, s->environment, &o, NULL),
+                  SAT_OK);
         sharp = reference_rmse(s->gpu, s->cpu, NULL, RG_W * RG_H, s->key);
         EXPECT(sharp > 20 * near_error); /* there was something to be wrong */
     }
@@ -246,11 +249,14 @@ TEST(raindrop_gl_flattens_as_the_cpu)
             s.camera.exposure = soft == 1 ? 0.002f : 0;
             s.camera.aperture = soft == 2 ? 0.002f : 0;
             error = rg_compare(&s, g, rain, &o);
-            REPORT(names[look], error, soft == 2 ? "RMSE from the CPU, flattened, blurred" : soft ? "RMSE from the CPU, flattened streaks"
-                                                                                                    : "RMSE from the CPU, flattened");
+            REPORT(names[look], error,
+                   soft == 2 ? "RMSE from the CPU, flattened, blurred"
+                   : soft    ? "RMSE from the CPU, flattened streaks"
+                             : "RMSE from the CPU, flattened");
             EXPECT(error < 5e-4);
             memcpy(s.gpu, s.background, sizeof(float) * 3 * RG_W * RG_H);
-            EXPECT_EQ(raindrop_render(s.gpu, RG_W * 12, RG_W, RG_H, NULL, &s.camera, spheres, s.environment, &o, NULL), SAT_OK);
+            EXPECT_EQ(raindrop_render(s.gpu, RG_W * 12, RG_W, RG_H, NULL, &s.camera, spheres, s.environment, &o, NULL),
+                      SAT_OK);
             EXPECT(reference_rmse(s.gpu, s.cpu, NULL, RG_W * RG_H, s.key) > 20 * error);
         }
     raindrop_gl_destroy(g);
@@ -285,7 +291,8 @@ TEST(raindrop_gl_reflects_inside_as_the_cpu)
             REPORT(exit ? "orders, only the last one's own light" : "orders", error, "RMSE from the CPU");
             o.orders_radius = 1e9f;
             memcpy(s.gpu, s.background, sizeof(float) * 3 * RG_W * RG_H);
-            EXPECT_EQ(raindrop_render(s.gpu, RG_W * 12, RG_W, RG_H, NULL, &s.camera, rain, s.environment, &o, NULL), SAT_OK);
+            EXPECT_EQ(raindrop_render(s.gpu, RG_W * 12, RG_W, RG_H, NULL, &s.camera, rain, s.environment, &o, NULL),
+                      SAT_OK);
             EXPECT(reference_rmse(s.gpu, s.cpu, NULL, RG_W * RG_H, s.key) > 20 * error);
         }
     o.look = RAINDROP_LOOK_RAY; /* out of range: an error, as on the CPU */
@@ -384,7 +391,8 @@ static double rg_advance(raindrop_gl *g, raindrop_rain *rain, const double *step
     }
     EXPECT_EQ(raindrop_gl_read_drops(g, gpu, n), SAT_OK);
     for (i = 0; i < n; i++) {
-        int same = fabsf(gpu[i].radius - cpu[i].radius) <= 1e-5f * cpu[i].radius && fabsf(gpu[i].axis_ratio - cpu[i].axis_ratio) < 1e-5f;
+        int same = fabsf(gpu[i].radius - cpu[i].radius) <= 1e-5f * cpu[i].radius &&
+                   fabsf(gpu[i].axis_ratio - cpu[i].axis_ratio) < 1e-5f;
         for (c = 0; c < 3; c++) {
             same = same && fabsf(gpu[i].position[c] - cpu[i].position[c]) < 3e-4f;
             same = same && fabsf(gpu[i].velocity[c] - cpu[i].velocity[c]) < 1e-4f * (1 + fabsf(cpu[i].velocity[c]));
@@ -451,7 +459,8 @@ TEST(raindrop_gl_steps_1um_drops)
     EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
     EXPECT_EQ(raindrop_gl_advance(g, 10), SAT_OK);
     EXPECT_EQ(raindrop_gl_read_drops(g, back, 4), SAT_OK);
-    for (i = 0; i < 4; i++) EXPECT_REL(-back[i].velocity[1], raindrop_terminal_velocity((double)dust[i].radius * 2e3), 2e-5);
+    for (i = 0; i < 4; i++)
+        EXPECT_REL(-back[i].velocity[1], raindrop_terminal_velocity((double)dust[i].radius * 2e3), 2e-5);
     raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
     rg_close(&s);
@@ -567,7 +576,8 @@ static void SAT__GL_CALL rg_es_source(unsigned shader, int count, const char *co
         if (strlen(text[i]) > rg_longest) rg_longest = strlen(text[i]);
     }
     if (file) fclose(file);
-    snprintf(command, sizeof command, "glslangValidator -S %s %s >%s.log 2>&1", is_vertex ? "vert" : "frag", path, path);
+    snprintf(command, sizeof command, "glslangValidator -S %s %s >%s.log 2>&1", is_vertex ? "vert" : "frag", path,
+             path);
     rg_shaders++;
     rg_valid += system(command) == 0;
     remove(path);

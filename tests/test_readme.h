@@ -120,7 +120,8 @@ TEST(readme_raindrop)
         raindrop_environment_create(&environment, &sky, NULL, NULL);
         raindrop_rain_create(&rain, NULL);                              /* 10 mm/h in a box of 8 m */
         raindrop_rain_advance(rain, 1 / 60.0);                          /* every frame, then: */
-        raindrop_render(picture, (ptrdiff_t)sizeof(float) * 3 * width, width, height, depth, &camera, rain, environment, NULL, &stats);
+        raindrop_render(picture, (ptrdiff_t)sizeof(float) * 3 * width, width, height, depth, &camera, rain, environment,
+                        NULL, &stats);
         /* README end */
         raindrop_rain_destroy(rain);
         raindrop_environment_destroy(environment);

@@ -2,9 +2,11 @@
 
 /* ---- scans */
 
-static const sat_scan_algorithm scan_algorithms[] = {SAT_SCAN_SEQUENTIAL, SAT_SCAN_RECURSIVE_DOUBLING, SAT_SCAN_BALANCED_TREE};
+static const sat_scan_algorithm scan_algorithms[] = {SAT_SCAN_SEQUENTIAL, SAT_SCAN_RECURSIVE_DOUBLING,
+                                                     SAT_SCAN_BALANCED_TREE};
 static const int scan_ks[] = {2, 3, 4, 5, 6, 7, 8, 16, 64};
-static const size_t scan_sizes[] = {0, 1, 2, 3, 4, 5, 7, 8, 9, 15, 16, 17, 27, 31, 64, 65, 100, 243, 255, 256, 257, 1000, 4099};
+static const size_t scan_sizes[] = {0,  1,  2,  3,  4,   5,   7,   8,   9,   15,   16,  17,
+                                    27, 31, 64, 65, 100, 243, 255, 256, 257, 1000, 4099};
 enum { SCAN_KS = sizeof scan_ks / sizeof *scan_ks, SCAN_SIZES = sizeof scan_sizes / sizeof *scan_sizes };
 
 static int scan_is_right(size_t n, const sat_scan_options *o, int in_place)
@@ -36,7 +38,8 @@ TEST(scan_every_algorithm_k_and_length)
                     o.algorithm = scan_algorithms[a];
                     o.k = scan_ks[k];
                     o.exclusive = variant & 1;
-                    if (!EXPECT(scan_is_right(scan_sizes[n], &o, variant >> 1))) printf("algorithm %d k %d n %d variant %d\n", a, o.k, (int)scan_sizes[n], variant);
+                    if (!EXPECT(scan_is_right(scan_sizes[n], &o, variant >> 1)))
+                        printf("algorithm %d k %d n %d variant %d\n", a, o.k, (int)scan_sizes[n], variant);
                 }
 }
 
@@ -62,7 +65,8 @@ TEST(scan_counters_equal_the_closed_formulas)
         EXPECT_EQ(c.writes, c.nodes);
         EXPECT_EQ(c.copies, 0);
         /* accesses n (k^2/2 + 7k/2 + 1) / (k - 1), smallest at k = 4, up to the top of the tree */
-        EXPECT_REL((double)(c.reads + c.writes), (double)n * ((double)(k * k) / 2 + 3.5 * (double)k + 1) / (double)(k - 1), 0.02);
+        EXPECT_REL((double)(c.reads + c.writes),
+                   (double)n * ((double)(k * k) / 2 + 3.5 * (double)k + 1) / (double)(k - 1), 0.02);
 
         o.algorithm = SAT_SCAN_RECURSIVE_DOUBLING;
         EXPECT_EQ(sat_scan_u64(values, values, n, &o), SAT_OK);
@@ -221,7 +225,8 @@ TEST(reduction_in_a_fixed_order)
 /* ---- tables */
 
 static const sat_kind kinds[] = {SAT_KIND_TILED, SAT_KIND_FLOAT, SAT_KIND_DOUBLE, SAT_KIND_FIXED32, SAT_KIND_FIXED64};
-static const int shapes[][2] = {{1, 1}, {2, 1}, {1, 2}, {1, 300}, {300, 1}, {7, 9}, {8, 8}, {31, 33}, {32, 32}, {33, 31}, {64, 65}, {129, 70}, {513, 20}, {20, 521}, {1030, 40}};
+static const int shapes[][2] = {{1, 1},   {2, 1},   {1, 2},   {1, 300},  {300, 1},  {7, 9},    {8, 8},    {31, 33},
+                                {32, 32}, {33, 31}, {64, 65}, {129, 70}, {513, 20}, {20, 521}, {1030, 40}};
 enum { SHAPES = sizeof shapes / sizeof *shapes };
 
 /* One value of an image, with the rule for non-finite pixels left out. */
@@ -271,8 +276,11 @@ static void check_boxes(const sat_table *t, const sat_image *view, int boxes, ui
         w = sat__min_int(b[2], view->width) - sat__max_int(b[0], 0);
         h = sat__min_int(b[3], view->height) - sat__max_int(b[1], 0);
         area = w > 0 && h > 0 ? (double)w * h : 0;
-        EXPECT_NEAR(sat_sum(t, c, b[0], b[1], b[2], b[3]), exact, area * sat_error_bound(t, c, w > 0 ? w : 1, h > 0 ? h : 1));
-        if (area > 0) EXPECT_NEAR(sat_mean(t, c, b[0], b[1], b[2], b[3]), exact / area, 1.0001 * sat_error_bound(t, c, w, h) + 1e-300);
+        EXPECT_NEAR(sat_sum(t, c, b[0], b[1], b[2], b[3]), exact,
+                    area * sat_error_bound(t, c, w > 0 ? w : 1, h > 0 ? h : 1));
+        if (area > 0)
+            EXPECT_NEAR(sat_mean(t, c, b[0], b[1], b[2], b[3]), exact / area,
+                        1.0001 * sat_error_bound(t, c, w, h) + 1e-300);
         else EXPECT_NEAR(sat_mean(t, c, b[0], b[1], b[2], b[3]), 0, 0);
     }
 }
@@ -298,7 +306,8 @@ TEST(tables_of_every_kind_shape_and_format)
                 for (i = 0; i < n; i++) {
                     if (f == 1) memory[i] = (unsigned char)support_random(&state);
                     if (f == 2) ((uint16_t *)(void *)memory)[i] = (uint16_t)support_random(&state);
-                    if (f == 3) ((uint16_t *)(void *)memory)[i] = sat__half_from_float((float)(100 * support_gaussian(&state)));
+                    if (f == 3)
+                        ((uint16_t *)(void *)memory)[i] = sat__half_from_float((float)(100 * support_gaussian(&state)));
                 }
                 view.pixels = memory;
                 if (s % 2) { /* the same rows upside down in memory */
@@ -401,8 +410,11 @@ TEST(constant_images_are_exact_in_every_kind)
         for (i = 0; i < 500; i++) {
             int b[4];
             random_box(&state, 150, 130, 140, b);
-            if (b[0] < 150 && b[1] < 130 && b[2] > 0 && b[3] > 0) EXPECT_NEAR(sat_mean(t, 0, b[0], b[1], b[2], b[3]), 0.75, 0);
-            EXPECT_NEAR(sat_mean_border(t, 0, b[0] + 0.25, b[1] + 0.5, b[2], b[3] + 0.125, SAT_BORDER_WRAP, SAT_BORDER_MIRROR), 0.75, 1e-15);
+            if (b[0] < 150 && b[1] < 130 && b[2] > 0 && b[3] > 0)
+                EXPECT_NEAR(sat_mean(t, 0, b[0], b[1], b[2], b[3]), 0.75, 0);
+            EXPECT_NEAR(
+                sat_mean_border(t, 0, b[0] + 0.25, b[1] + 0.5, b[2], b[3] + 0.125, SAT_BORDER_WRAP, SAT_BORDER_MIRROR),
+                0.75, 1e-15);
         }
         sat_destroy(t);
     }
@@ -567,7 +579,8 @@ TEST(box_filters_are_the_means_they_promise)
             for (y = 0; y < 50; y++)
                 for (x = 0; x < 70; x++)
                     for (c = 0; c < 3; c++)
-                        EXPECT_NEAR(means[(y * 70 + x) * 3 + c], (float)sat_mean(t, c, x - rs[i], y - rs[i], x + rs[i] + 1, y + rs[i] + 1), 0);
+                        EXPECT_NEAR(means[(y * 70 + x) * 3 + c],
+                                    (float)sat_mean(t, c, x - rs[i], y - rs[i], x + rs[i] + 1, y + rs[i] + 1), 0);
             free(means);
         }
         EXPECT_EQ(sat_box_filter_variable(out, 70 * 12, t, radii, 70 * 4), SAT_OK);
@@ -576,7 +589,10 @@ TEST(box_filters_are_the_means_they_promise)
             x = i % 70;
             y = i / 70;
             if (i == 1) reach = 120;
-            EXPECT_REL(out[i * 3 + 1], sat_mean_border(t, 1, x + 0.5 - reach, y + 0.5 - reach, x + 0.5 + reach, y + 0.5 + reach, SAT_BORDER_CLIP, SAT_BORDER_CLIP), 1e-6);
+            EXPECT_REL(out[i * 3 + 1],
+                       sat_mean_border(t, 1, x + 0.5 - reach, y + 0.5 - reach, x + 0.5 + reach, y + 0.5 + reach,
+                                       SAT_BORDER_CLIP, SAT_BORDER_CLIP),
+                       1e-6);
         }
         EXPECT_EQ(sat_box_filter(out, 70 * 12, t, -1), SAT_ERR_ARGUMENT);
         EXPECT_EQ(sat_box_filter(out, 70 * 12 - 4, t, 1), SAT_ERR_ARGUMENT);
@@ -618,7 +634,8 @@ TEST(streams_equal_the_whole_image_bit_for_bit)
                 EXPECT_EQ(sat_stream_push(s, row_out, &got, y < H ? &row : NULL), SAT_OK);
                 if (y >= H && !got) break;
                 if (!got) continue;
-                if (!EXPECT(memcmp(row_out, whole + (size_t)given * W * 2, sizeof row_out) == 0)) printf("kind %d radius %d row %d\n", k, rs[r], given);
+                if (!EXPECT(memcmp(row_out, whole + (size_t)given * W * 2, sizeof row_out) == 0))
+                    printf("kind %d radius %d row %d\n", k, rs[r], given);
                 given++;
             }
             EXPECT_EQ(given, H);
@@ -701,9 +718,11 @@ TEST(updates_equal_fresh_builds)
         t = build(&view, &o);
         for (i = 0; i < 25; i++) {
             int x0 = support_below(&state, W), y0 = support_below(&state, H), x, y;
-            int x1 = sat__min_int(W, x0 + 1 + support_below(&state, 70)), y1 = sat__min_int(H, y0 + 1 + support_below(&state, 70));
+            int x1 = sat__min_int(W, x0 + 1 + support_below(&state, 70)),
+                y1 = sat__min_int(H, y0 + 1 + support_below(&state, 70));
             for (y = y0; y < y1; y++)
-                for (x = x0; x < x1; x++) p[y * W + x] = (float)pow(10, 5 * support_uniform(&state)) * (i % 3 ? 1.0f : -1.0f);
+                for (x = x0; x < x1; x++)
+                    p[y * W + x] = (float)pow(10, 5 * support_uniform(&state)) * (i % 3 ? 1.0f : -1.0f);
             if (i == 9) p[y0 * W + x0] = sat__float_from_bits(0x7fc00000u);
             EXPECT_EQ(sat_update(t, &view, x0, y0, x1, y1), SAT_OK);
             fresh = build(&view, &o);
@@ -768,7 +787,8 @@ TEST(a_bad_pixel_changes_no_box_without_it)
 }
 
 /* A table whose error stays where it is made: what users reported of others, and of this one's strips. */
-static int boxes_off(const sat_table *t, const float *p, int w, int h, int r, double tolerance, int with_x, int with_y, int *negative)
+static int boxes_off(const sat_table *t, const float *p, int w, int h, int r, double tolerance, int with_x, int with_y,
+                     int *negative)
 {
     int x, y, a, b, off = 0;
     for (y = r; y < h - r; y++)
@@ -822,7 +842,8 @@ TEST(skies_of_any_sentinel_leave_the_ground_alone)
         double worst = 0;
         for (y = 0; y < H; y++)
             for (x = 0; x < W; x++)
-                p[y * W + x] = y < 60 + x / 8 ? (s < 3 ? skies[s] : sat__float_from_bits(0x7f800000u)) : (float)(1 + 0.001 * (H - y) + 0.01 * support_uniform(&state));
+                p[y * W + x] = y < 60 + x / 8 ? (s < 3 ? skies[s] : sat__float_from_bits(0x7f800000u))
+                                              : (float)(1 + 0.001 * (H - y) + 0.01 * support_uniform(&state));
         t = build(&view, NULL);
         for (y = R; y < H - R; y++)
             for (x = R; x < W - R; x++) {
@@ -849,7 +870,8 @@ TEST(fourteen_smooth_decades)
     int x, y, i, r;
     for (y = 0; y < N; y++)
         for (x = 0; x < N; x++) {
-            double e = 7 * sin(x * 0.0031 + 1.3 * sin(y * 0.0017)) * cos(y * 0.0023 + 0.7) + 1 + 0.6 * (support_uniform(&state) - 0.5);
+            double e = 7 * sin(x * 0.0031 + 1.3 * sin(y * 0.0017)) * cos(y * 0.0023 + 0.7) + 1 +
+                       0.6 * (support_uniform(&state) - 0.5);
             p[y * N + x] = (float)fmin(fmax(pow(10, e), 1e-6), 1e8);
         }
     t = build(&view, NULL);
@@ -889,7 +911,8 @@ TEST(large_boxes_across_super_tiles)
         o.tile = tile;
         t = build(&view, &o);
         for (i = 0; i < 12; i++) {
-            int x0 = support_below(&state, W / 2), y0 = support_below(&state, H / 2), x1 = x0 + 1 + support_below(&state, W / 2), y1 = y0 + 1 + support_below(&state, H / 2);
+            int x0 = support_below(&state, W / 2), y0 = support_below(&state, H / 2),
+                x1 = x0 + 1 + support_below(&state, W / 2), y1 = y0 + 1 + support_below(&state, H / 2);
             exact[0] = 0;
             for (y = y0; y < y1; y++)
                 for (x = x0; x < x1; x++) exact[0] += p[y * W + x];
@@ -922,7 +945,10 @@ TEST(extreme_floats_keep_finite_sums)
             uint64_t state = 6;
             for (i = 0; i < W * H; i++) {
                 double sign = support_uniform(&state) < 0.5 ? -1 : 1, exponent = 76 * support_uniform(&state) - 38;
-                p[i] = pattern == 0 ? 3.4e38f : pattern == 1 ? (float)(sign * 1.7 * pow(10, exponent)) : pattern == 2 ? 1e-44f : (float)(sign * 3.4e38);
+                p[i] = pattern == 0   ? 3.4e38f
+                       : pattern == 1 ? (float)(sign * 1.7 * pow(10, exponent))
+                       : pattern == 2 ? 1e-44f
+                                      : (float)(sign * 3.4e38);
             }
             o.kind = kinds[k];
             t = build(&view, &o);
@@ -932,7 +958,8 @@ TEST(extreme_floats_keep_finite_sums)
                 random_box(&state, W, H, 80, b);
                 sum = sat_sum(t, 0, b[0], b[1], b[2], b[3]);
                 EXPECT(sat__is_finite_double(sum));
-                if (pattern == 2 && !sat__is_fixed(o.kind)) EXPECT_NEAR(sum, exact_sum(&view, 0, b[0], b[1], b[2], b[3]), 1e-44);
+                if (pattern == 2 && !sat__is_fixed(o.kind))
+                    EXPECT_NEAR(sum, exact_sum(&view, 0, b[0], b[1], b[2], b[3]), 1e-44);
             }
             sat_destroy(t);
         }
@@ -940,7 +967,8 @@ TEST(extreme_floats_keep_finite_sums)
 
 TEST(real_pictures_with_nan_infinity_and_every_half)
 {
-    static const char *const names[] = {"hdr/BrightRingsNanInf.exr", "hdr/AllHalfValues.exr", "hdr/WideFloatRange.exr", "hdr/Desk.exr"};
+    static const char *const names[] = {"hdr/BrightRingsNanInf.exr", "hdr/AllHalfValues.exr", "hdr/WideFloatRange.exr",
+                                        "hdr/Desk.exr"};
     int i, k;
     for (i = 0; i < 4; i++) {
         const char *path = support_data(names[i]);
@@ -973,7 +1001,8 @@ static void bound_image(float *p, int which)
     int i;
     if (which == 1) support_hdr_image(p, BOUND_W, BOUND_H, 1, 5);
     else
-        for (i = 0; i < BOUND_W * BOUND_H; i++) p[i] = (float)(which == 3 ? support_gaussian(&state) : support_uniform(&state));
+        for (i = 0; i < BOUND_W * BOUND_H; i++)
+            p[i] = (float)(which == 3 ? support_gaussian(&state) : support_uniform(&state));
     if (which == 2) p[BOUND_W * 100 + 200] = 1e8f;
 }
 
@@ -997,7 +1026,9 @@ TEST(error_bounds_hold_and_the_expected_error_is_near)
                 for (i = 0; i < n; i++) {
                     int x = support_below(&state, BOUND_W - boxes[b]), y = support_below(&state, BOUND_H - boxes[b]);
                     double area = (double)boxes[b] * boxes[b];
-                    double e = fabs(sat_sum(t, 0, x, y, x + boxes[b], y + boxes[b]) - exact_sum(&view, 0, x, y, x + boxes[b], y + boxes[b])) / area;
+                    double e = fabs(sat_sum(t, 0, x, y, x + boxes[b], y + boxes[b]) -
+                                    exact_sum(&view, 0, x, y, x + boxes[b], y + boxes[b])) /
+                               area;
                     squares += e * e;
                     if (e > worst) worst = e;
                 }
@@ -1005,7 +1036,8 @@ TEST(error_bounds_hold_and_the_expected_error_is_near)
                 EXPECT(worst <= sat_error_bound(t, 0, boxes[b], boxes[b]));
                 if (which < 2 && kinds[k] != (which ? SAT_KIND_FIXED32 : SAT_KIND_DOUBLE) && rms > 0) {
                     double ratio = sat_error_rms(t, 0, boxes[b], boxes[b]) / rms;
-                    if (!EXPECT(ratio > 1.0 / 4 && ratio < 4)) printf("image %d kind %d box %d ratio %g\n", which, k, boxes[b], ratio);
+                    if (!EXPECT(ratio > 1.0 / 4 && ratio < 4))
+                        printf("image %d kind %d box %d ratio %g\n", which, k, boxes[b], ratio);
                 }
             }
             sat_destroy(t);
@@ -1052,7 +1084,8 @@ TEST(plans_keep_their_word)
             for (i = 0; i < BOUND_W * BOUND_H; i++) mean += fabs((double)p[i]) / (BOUND_W * BOUND_H);
             for (i = 0; i < 500; i++) {
                 int x = support_below(&state, BOUND_W - 7), y = support_below(&state, BOUND_H - 7);
-                EXPECT_NEAR(sat_mean(t, 0, x, y, x + 7, y + 7), exact_sum(&view, 0, x, y, x + 7, y + 7) / 49, allowed * mean);
+                EXPECT_NEAR(sat_mean(t, 0, x, y, x + 7, y + 7), exact_sum(&view, 0, x, y, x + 7, y + 7) / 49,
+                            allowed * mean);
             }
             sat_destroy(t);
         }
@@ -1109,7 +1142,8 @@ static double exact_covariance(const sat_image *view, int a, int b, int x0, int 
             mb += (long double)pixel(view, x, y, b) / n;
         }
     for (y = y0; y < y1; y++)
-        for (x = x0; x < x1; x++) co += ((long double)pixel(view, x, y, a) - ma) * ((long double)pixel(view, x, y, b) - mb);
+        for (x = x0; x < x1; x++)
+            co += ((long double)pixel(view, x, y, a) - ma) * ((long double)pixel(view, x, y, b) - mb);
     return (double)(co / n);
 }
 
@@ -1132,7 +1166,9 @@ TEST(variance_is_right_where_it_is_small_beside_the_mean)
         uint64_t state = 5;
         sat_moments *m;
         for (i = 0; i < W * H; i++)
-            p[i] = which == 0 ? (float)(1e4 + support_gaussian(&state)) : which == 1 ? (float)(4096 + (i % W + i / W) % 2) : 65025.0f;
+            p[i] = which == 0   ? (float)(1e4 + support_gaussian(&state))
+                   : which == 1 ? (float)(4096 + (i % W + i / W) % 2)
+                                : 65025.0f;
         m = moments_of(&view, NULL);
         for (s = 0; s < 5; s++)
             for (i = 0; i < 400; i++) {
@@ -1140,7 +1176,8 @@ TEST(variance_is_right_where_it_is_small_beside_the_mean)
                 double got = sat_variance(m, 0, x, y, x + sides[s], y + sides[s]);
                 EXPECT_NEAR(got, exact_covariance(&view, 0, 0, x, y, x + sides[s], y + sides[s]), 1e-9);
                 EXPECT(got >= 0);
-                EXPECT_REL(sat_moments_mean(m, 0, x, y, x + sides[s], y + sides[s]), exact_sum(&view, 0, x, y, x + sides[s], y + sides[s]) / (sides[s] * sides[s]), 1e-13);
+                EXPECT_REL(sat_moments_mean(m, 0, x, y, x + sides[s], y + sides[s]),
+                           exact_sum(&view, 0, x, y, x + sides[s], y + sides[s]) / (sides[s] * sides[s]), 1e-13);
             }
         EXPECT_EQ(sat_moments_filter(filtered_out, mean, W * 4, m, 0, 0, 7), SAT_OK);
         for (i = 0; i < W * H; i++) {
@@ -1174,8 +1211,10 @@ TEST(covariance_of_every_pair_and_bad_pixels_leave_other_boxes_alone)
         int x = support_below(&state, W - 30), y = support_below(&state, H - 30), side = 1 + support_below(&state, 30);
         for (a = 0; a < 3; a++)
             for (b = 0; b < 3; b++) {
-                double scale = sqrt(exact_covariance(&view, a, a, x, y, x + side, y + side) * exact_covariance(&view, b, b, x, y, x + side, y + side));
-                EXPECT_NEAR(sat_covariance(m, a, b, x, y, x + side, y + side), exact_covariance(&view, a, b, x, y, x + side, y + side), 1e-9 * scale + 1e-9);
+                double scale = sqrt(exact_covariance(&view, a, a, x, y, x + side, y + side) *
+                                    exact_covariance(&view, b, b, x, y, x + side, y + side));
+                EXPECT_NEAR(sat_covariance(m, a, b, x, y, x + side, y + side),
+                            exact_covariance(&view, a, b, x, y, x + side, y + side), 1e-9 * scale + 1e-9);
             }
     }
     p[(45 * W + 70) * 3] = sat__float_from_bits(0x7f800000u);
@@ -1185,8 +1224,11 @@ TEST(covariance_of_every_pair_and_bad_pixels_leave_other_boxes_alone)
     for (i = 0; i < 2000; i++) {
         int box[4];
         random_box(&state, W, H, 40, box);
-        if (box[2] > 70 && box[0] < 72 && box[3] > 45 && box[1] < 46) EXPECT(sat__is_finite_double(sat_covariance(other, 0, 1, box[0], box[1], box[2], box[3])));
-        else EXPECT_NEAR(sat_covariance(other, 0, 1, box[0], box[1], box[2], box[3]), sat_covariance(m, 0, 1, box[0], box[1], box[2], box[3]), 1e-7);
+        if (box[2] > 70 && box[0] < 72 && box[3] > 45 && box[1] < 46)
+            EXPECT(sat__is_finite_double(sat_covariance(other, 0, 1, box[0], box[1], box[2], box[3])));
+        else
+            EXPECT_NEAR(sat_covariance(other, 0, 1, box[0], box[1], box[2], box[3]),
+                        sat_covariance(m, 0, 1, box[0], box[1], box[2], box[3]), 1e-7);
     }
     sat_moments_destroy(other);
     o.non_finite = SAT_NON_FINITE_REFUSE;
@@ -1217,7 +1259,8 @@ TEST(covariance_of_every_pair_and_bad_pixels_leave_other_boxes_alone)
 /* Every row of a table: values outside its range are refused and named, its ends and its default are not. */
 typedef int refuse_fn(const void *options, char *text);
 
-static void walk_fields(const sat__field *fields, int count, void *options, const void *defaults, size_t bytes, refuse_fn *refused)
+static void walk_fields(const sat__field *fields, int count, void *options, const void *defaults, size_t bytes,
+                        refuse_fn *refused)
 {
     int i, j;
     for (i = 0; i < count; i++) {
@@ -1282,7 +1325,8 @@ TEST(every_refusal_names_its_field)
     sat_image view = sat_image_f32(pixels, 4, 2, 2);
     walk_fields(sat__table_fields, SAT__COUNT(sat__table_fields), &table, &table_defaults, sizeof table, table_refused);
     walk_fields(sat__scan_fields, SAT__COUNT(sat__scan_fields), &scan, &scan_defaults, sizeof scan, scan_refused);
-    walk_fields(sat__moments_fields, SAT__COUNT(sat__moments_fields), &moments, &moments_defaults, sizeof moments, moments_refused);
+    walk_fields(sat__moments_fields, SAT__COUNT(sat__moments_fields), &moments, &moments_defaults, sizeof moments,
+                moments_refused);
     table.tile = 48;
     EXPECT(strcmp(sat_explain(text, sizeof text, 4, 4, 1, &table), "tile is 48; 8..128, a power of two") == 0);
     EXPECT(strcmp(sat_explain(text, sizeof text, 4, 4, 9, NULL), "channels is 9; 1..4") == 0);
@@ -1444,8 +1488,10 @@ TEST(half_floats_there_and_back)
             EXPECT(fabs((double)v) >= 65520);
             continue;
         }
-        if (sat__is_finite(sat__half_to_float(next))) EXPECT(fabs((double)back - (double)v) <= fabs((double)sat__half_to_float(next) - (double)v));
-        if (half & 0x7fff) EXPECT(fabs((double)back - (double)v) <= fabs((double)sat__half_to_float(previous) - (double)v));
+        if (sat__is_finite(sat__half_to_float(next)))
+            EXPECT(fabs((double)back - (double)v) <= fabs((double)sat__half_to_float(next) - (double)v));
+        if (half & 0x7fff)
+            EXPECT(fabs((double)back - (double)v) <= fabs((double)sat__half_to_float(previous) - (double)v));
     }
 }
 

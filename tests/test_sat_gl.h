@@ -57,7 +57,8 @@ static void SAT__GL_CALL test_DeleteProgram(unsigned program)
 }
 static const unsigned char *SAT__GL_CALL test_GetString(unsigned name)
 {
-    return test_as_es && name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)" : test_f.real.GetString(name);
+    return test_as_es && name == SAT__GL_VERSION ? (const unsigned char *)"OpenGL ES 3.0 (pretended)"
+                                                 : test_f.real.GetString(name);
 }
 static void SAT__GL_CALL test_ShaderSource(unsigned shader, int count, const char *const *parts, const int *lengths)
 {
@@ -71,8 +72,8 @@ static void SAT__GL_CALL test_ShaderSource(unsigned shader, int count, const cha
     if (test_shader_file) fputs("\n@\n", test_shader_file);
     test_f.real.ShaderSource(shader, n, text, lengths);
 }
-static void SAT__GL_CALL test_TexImage2D(unsigned target, int level, int internal, int width, int height, int border, unsigned format,
-                                         unsigned type, const void *pixels)
+static void SAT__GL_CALL test_TexImage2D(unsigned target, int level, int internal, int width, int height, int border,
+                                         unsigned format, unsigned type, const void *pixels)
 {
     if (test_bad_textures) internal = 1;
     test_f.real.TexImage2D(target, level, internal, width, height, border, format, type, pixels);
@@ -238,7 +239,9 @@ static void test_one(sat_gl *g, sat_gl_format format, test_case *t)
     size_t n = (size_t)t->width * (size_t)t->height;
     float *table = (float *)malloc(n * 2 * sizeof *table);
     unsigned texture = test_texture(SAT__GL_R32F, t->width, t->height, t->pixels);
-    EXPECT_EQ(t->rows_only ? sat_gl_scan(g, 0, texture, t->width, t->height) : sat_gl_build(g, 0, texture, t->width, t->height), SAT_OK);
+    EXPECT_EQ(t->rows_only ? sat_gl_scan(g, 0, texture, t->width, t->height)
+                           : sat_gl_build(g, 0, texture, t->width, t->height),
+              SAT_OK);
     test_read(table, sat_gl_table(g), sat__gl_internal(format), t->width, t->height);
     if (format == SAT_GL_FIXED32) {
         uint32_t *bits = (uint32_t *)malloc(n * sizeof *bits);
@@ -337,7 +340,8 @@ TEST(larger_tables)
     for (format = 0; format < 3; format++)
         for (kind = 0; kind < 3; kind++) {
             if (kind == 2 && !test_f.real.has_compute) continue;
-            g = test_create((sat_gl_format)format, kind == 1 ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE, kind == 2 ? 32 : 4, kind == 2);
+            g = test_create((sat_gl_format)format, kind == 1 ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE,
+                            kind == 2 ? 32 : 4, kind == 2);
             test_one(g, (sat_gl_format)format, &t);
             sat_gl_destroy(g);
         }
@@ -376,7 +380,8 @@ TEST(fixed_equals_the_cpu_table)
     test_read(table, sat_gl_table(g), SAT__GL_R32UI, t.width, t.height);
     for (y = 1; y <= t.height; y++)
         for (x = 1; x <= t.width; x++) { /* modulo 2^32, as a box sum */
-            double sum = (double)(int32_t)table[(size_t)(y - 1) * (size_t)t.width + (size_t)(x - 1)] * sat_gl_quantum(g);
+            double sum =
+                (double)(int32_t)table[(size_t)(y - 1) * (size_t)t.width + (size_t)(x - 1)] * sat_gl_quantum(g);
             wrong += sum < sat_sum(cpu, 0, 0, 0, x, y) || sum > sat_sum(cpu, 0, 0, 0, x, y);
         }
     EXPECT_EQ(wrong, 0);
@@ -440,7 +445,8 @@ TEST(borrowed_table_and_untouched_input)
         return;
     }
     for (kind = 0; kind < 4; kind++) {
-        g = test_create(SAT_GL_TWO_FLOAT, kind & 1 ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE, kind & 2 ? 8 : 2, 0);
+        g = test_create(SAT_GL_TWO_FLOAT, kind & 1 ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE,
+                        kind & 2 ? 8 : 2, 0);
         for (part = 0; part < 2; part++) {
             int w = part ? 23 : 61, h = part ? 9 : 47, x, y;
             test_case_make(&t, 61, 47, 5);
@@ -525,7 +531,8 @@ static void test_box(int x, int y, int width, int height, int box[4])
 }
 
 /* The exact integral over the box, of values rounded to `quantum` (0: not rounded), and the integral of |value|. */
-static long double test_integral(const test_case *t, const double box[4], double limit, double quantum, long double *size)
+static long double test_integral(const test_case *t, const double box[4], double limit, double quantum,
+                                 long double *size)
 {
     long double sum = 0;
     int x, y;
@@ -563,7 +570,8 @@ static void test_lookups_of(sat_gl_format format, const test_case *t)
     const char *library[2];
     static int boxes[32 * 32][4];
     static float out[32 * 32][4];
-    unsigned input = test_texture(SAT__GL_R32F, t->width, t->height, t->pixels), target = 0, program = 0, fetch = 0, framebuffer = 0;
+    unsigned input = test_texture(SAT__GL_R32F, t->width, t->height, t->pixels), target = 0, program = 0, fetch = 0,
+             framebuffer = 0;
     sat__gl_shaders shaders;
     sat__gl_state state;
     double epsilon = format == SAT_GL_FLOAT ? 0 : 3e-7, limit, quantum;
@@ -658,11 +666,12 @@ static void test_get(test_state *s, unsigned name, int values)
 /* More than sat__gl_begin promises: everything of OpenGL 3.3 that a pass could have changed. */
 static void test_snapshot(test_state *s)
 {
-    static const unsigned one[] = {
-        0x0B44, 0x0B45, 0x0B46, 0x0B71, 0x0B72, 0x0B74, 0x0B73, 0x0B90, 0x0B98, 0x0BD0, 0x0BE2, 0x0BF2, 0x0BF0, 0x0C11, 0x809E,
-        0x80A0, 0x8DB9, 0x8C89, 0x8642, 0x8009, 0x883D, 0x80C8, 0x80C9, 0x80CA, 0x80CB, 0x0CF0, 0x0CF1, 0x0CF2, 0x0CF3, 0x0CF4,
-        0x0CF5, 0x806D, 0x806E, 0x0D00, 0x0D01, 0x0D02, 0x0D03, 0x0D04, 0x0D05, 0x84E0, 0x8B8D, 0x85B5, 0x8894, 0x88ED, 0x88EF,
-        0x8C8F, 0x8A28, 0x8CA6, 0x8CAA, 0x0B20, 0x0B11, 0x2A01, 0x2A02, 0x8037, 0x8F9D, 0x8F9E, 0x8CA7};
+    static const unsigned one[] = {0x0B44, 0x0B45, 0x0B46, 0x0B71, 0x0B72, 0x0B74, 0x0B73, 0x0B90, 0x0B98, 0x0BD0,
+                                   0x0BE2, 0x0BF2, 0x0BF0, 0x0C11, 0x809E, 0x80A0, 0x8DB9, 0x8C89, 0x8642, 0x8009,
+                                   0x883D, 0x80C8, 0x80C9, 0x80CA, 0x80CB, 0x0CF0, 0x0CF1, 0x0CF2, 0x0CF3, 0x0CF4,
+                                   0x0CF5, 0x806D, 0x806E, 0x0D00, 0x0D01, 0x0D02, 0x0D03, 0x0D04, 0x0D05, 0x84E0,
+                                   0x8B8D, 0x85B5, 0x8894, 0x88ED, 0x88EF, 0x8C8F, 0x8A28, 0x8CA6, 0x8CAA, 0x0B20,
+                                   0x0B11, 0x2A01, 0x2A02, 0x8037, 0x8F9D, 0x8F9E, 0x8CA7};
     sat__gl *gl = &test_f.real;
     int i, active = 0;
     s->count = 0;
@@ -802,7 +811,8 @@ TEST(state_is_restored)
         for (i = 0; i < before.count && after.values[i] == before.values[i]; i++) {}
         EXPECT(kind > 0 || i < before.count); /* the disturbance shows */
         before = after;
-        g = test_create(SAT_GL_TWO_FLOAT, kind == 1 ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE, 4, kind == 2 && gl->has_compute);
+        g = test_create(SAT_GL_TWO_FLOAT, kind == 1 ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE, 4,
+                        kind == 2 && gl->has_compute);
         EXPECT_EQ(sat_gl_build(g, 0, texture, 97, 101), SAT_OK);
         EXPECT_EQ(sat_gl_mean(g, &mean, texture, 97, 101), SAT_OK);
         test_snapshot(&after);
@@ -885,7 +895,8 @@ TEST(every_refusal_names_its_field)
             sat_gl_options options = sat_gl_defaults();
             sat__field_set(f, &options, bad[j]);
             EXPECT(test_gl_refused(&options));
-            if (!EXPECT(strncmp(sat_explain_gl(text, sizeof text, &options), f->name, strlen(f->name)) == 0)) printf("%s: \"%s\"\n", f->name, text);
+            if (!EXPECT(strncmp(sat_explain_gl(text, sizeof text, &options), f->name, strlen(f->name)) == 0))
+                printf("%s: \"%s\"\n", f->name, text);
         }
     }
     EXPECT(strcmp(sat_explain_gl(text, sizeof text, NULL), "") == 0);
@@ -997,7 +1008,9 @@ TEST(broken_shader_is_explained)
         test_garbage = "this is no GLSL;\n";
         test_good_shaders = good;
         EXPECT_EQ(sat_gl_create(&g, test_get_proc, NULL), SAT_ERR_GL_SHADER);
-        if (strstr(sat_gl_message(g), "sat: ") && strstr(sat_gl_message(g), "compile") && strstr(sat_gl_message(g), "  1 #version")) failed++;
+        if (strstr(sat_gl_message(g), "sat: ") && strstr(sat_gl_message(g), "compile") &&
+            strstr(sat_gl_message(g), "  1 #version"))
+            failed++;
         EXPECT_EQ(sat_gl_build(g, 0, 1, 4, 4), SAT_ERR_ARGUMENT);
         sat_gl_destroy(g);
         EXPECT_EQ(test_objects, 0);
@@ -1078,7 +1091,8 @@ TEST(shaders_are_valid_es)
     test_as_es = 1;
     for (format = 0; format < 3; format++)
         for (kind = 0; kind < 2; kind++)
-            sat_gl_destroy(test_create((sat_gl_format)format, kind ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE, 4, 0));
+            sat_gl_destroy(
+                test_create((sat_gl_format)format, kind ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE, 4, 0));
     rewind(test_shader_file);
     size = fread(text, 1, sizeof text - 1, test_shader_file);
     text[size] = 0;
@@ -1104,9 +1118,10 @@ TEST(shaders_are_valid_es)
 
 TEST(texture_formats)
 {
-    static const unsigned formats[] = {SAT__GL_R8, SAT__GL_RG8, SAT__GL_RGBA8, SAT__GL_R8UI, SAT__GL_R16UI, SAT__GL_R16F, SAT__GL_RG16F,
-                                       SAT__GL_RGBA16F, SAT__GL_R32F, SAT__GL_RG32F, SAT__GL_RGBA32F, SAT__GL_R32I, SAT__GL_RGBA32I,
-                                       SAT__GL_R32UI, SAT__GL_RG32UI, SAT__GL_RGBA32UI};
+    static const unsigned formats[] = {SAT__GL_R8,      SAT__GL_RG8,   SAT__GL_RGBA8,   SAT__GL_R8UI,
+                                       SAT__GL_R16UI,   SAT__GL_R16F,  SAT__GL_RG16F,   SAT__GL_RGBA16F,
+                                       SAT__GL_R32F,    SAT__GL_RG32F, SAT__GL_RGBA32F, SAT__GL_R32I,
+                                       SAT__GL_RGBA32I, SAT__GL_R32UI, SAT__GL_RG32UI,  SAT__GL_RGBA32UI};
     sat__gl *gl = &test_f.real;
     unsigned char in[3 * 5 * 16], out[3 * 5 * 16];
     sat__gl_state state;

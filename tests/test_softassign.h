@@ -69,12 +69,27 @@ static float cost_repeated(int i, int j, uint64_t *seed)
     (void)seed;
     return (float)(((uint32_t)(i * 7 + j / 40) * 2654435761u >> 20) & 1023u);
 }
-static float cost_wide(int i, int j, uint64_t *seed) { (void)i; (void)j; return (float)pow(10, -30 + 60 * support_uniform(seed)); }
-static float cost_negative(int i, int j, uint64_t *seed) { (void)i; (void)j; return (float)(-1e3 * support_uniform(seed)); }
+static float cost_wide(int i, int j, uint64_t *seed)
+{
+    (void)i;
+    (void)j;
+    return (float)pow(10, -30 + 60 * support_uniform(seed));
+}
+static float cost_negative(int i, int j, uint64_t *seed)
+{
+    (void)i;
+    (void)j;
+    return (float)(-1e3 * support_uniform(seed));
+}
 static float cost_offset(int i, int j, uint64_t *seed) { (void)i; (void)j; return 1e6f + (float)support_uniform(seed); }
 static float cost_product(int i, int j, uint64_t *seed) { (void)seed; return (float)(i + 1) * (float)(j + 1); }
 static float cost_steps(int i, int j, uint64_t *seed) { (void)i; (void)j; return (float)support_below(seed, 4); }
-static float cost_denormal(int i, int j, uint64_t *seed) { (void)i; (void)j; return (float)(1e-40 * support_uniform(seed)); }
+static float cost_denormal(int i, int j, uint64_t *seed)
+{
+    (void)i;
+    (void)j;
+    return (float)(1e-40 * support_uniform(seed));
+}
 
 static float cost_forced(int i, int j, uint64_t *seed) /* row 3 can only choose huge costs */
 {
@@ -166,7 +181,8 @@ TEST(softassign_defaults_are_as_documented)
 
 TEST(softassign_exact_on_features)
 {
-    static const int sizes[][3] = {{1, 1, 3}, {1, 50, 3}, {7, 7, 1}, {40, 40, 12}, {60, 200, 13}, {90, 90, 48}, {150, 700, 48}, {30, 2000, 5}};
+    static const int sizes[][3] = {{1, 1, 3},     {1, 50, 3},   {7, 7, 1},      {40, 40, 12},
+                                   {60, 200, 13}, {90, 90, 48}, {150, 700, 48}, {30, 2000, 5}};
     size_t k;
     for (k = 0; k < sizeof sizes / sizeof *sizes; k++) {
         problem q = make_features(sizes[k][0], sizes[k][1], sizes[k][2], 7 + k);
@@ -177,8 +193,9 @@ TEST(softassign_exact_on_features)
 
 TEST(softassign_exact_on_matrices)
 {
-    static float (*const costs[])(int, int, uint64_t *) = {cost_uniform, cost_zero, cost_equal, cost_repeated, cost_wide, cost_negative,
-                                                           cost_offset, cost_product, cost_steps, cost_denormal, cost_forced};
+    static float (*const costs[])(int, int, uint64_t *) = {cost_uniform, cost_zero,     cost_equal,  cost_repeated,
+                                                           cost_wide,    cost_negative, cost_offset, cost_product,
+                                                           cost_steps,   cost_denormal, cost_forced};
     size_t k;
     for (k = 0; k < sizeof costs / sizeof *costs; k++) {
         problem tall = make_dense(60, 60, costs[k], k), wide = make_dense(60, 400, costs[k], k + 50);
@@ -309,7 +326,8 @@ TEST(softassign_ties_go_by_index)
 TEST(softassign_one_rounding_of_every_pair)
 {
     int rows = 120, columns = 600, n = 11, i, k, x[120];
-    float *a = (float *)malloc((size_t)rows * (size_t)n * sizeof *a), *b = (float *)malloc((size_t)columns * (size_t)n * sizeof *b);
+    float *a = (float *)malloc((size_t)rows * (size_t)n * sizeof *a),
+          *b = (float *)malloc((size_t)columns * (size_t)n * sizeof *b);
     softassign_problem p;
     softassign_report r;
     softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
@@ -365,7 +383,8 @@ TEST(softassign_capacities)
     uint64_t seed = 9;
     int turn, k, x[60], capacity[40];
     for (turn = 0; turn < 12; turn++) {
-        problem q = turn % 2 ? make_features(60, 40, 7, (uint64_t)turn) : make_dense(60, 40, turn % 4 ? cost_uniform : cost_steps, (uint64_t)turn);
+        problem q = turn % 2 ? make_features(60, 40, 7, (uint64_t)turn)
+                             : make_dense(60, 40, turn % 4 ? cost_uniform : cost_steps, (uint64_t)turn);
         softassign_report r;
         for (k = 0; k < 40; k++) capacity[k] = support_below(&seed, 5);
         for (k = 0; k < 10; k++) capacity[k] = 4;
@@ -402,7 +421,8 @@ TEST(softassign_minimum_use)
 {
     int turn, k, x[50], capacity[30], least[30], used[30];
     for (turn = 0; turn < 6; turn++) {
-        problem q = turn % 2 ? make_features(50, 30, 5, (uint64_t)turn) : make_dense(50, 30, cost_uniform, (uint64_t)turn);
+        problem q =
+            turn % 2 ? make_features(50, 30, 5, (uint64_t)turn) : make_dense(50, 30, cost_uniform, (uint64_t)turn);
         softassign_report r;
         for (k = 0; k < 30; k++) {
             capacity[k] = 2 + k % 4;
@@ -581,7 +601,8 @@ TEST(softassign_impossible_problems_name_a_row)
         EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_ERR_LIMIT);
         EXPECT_EQ(r.row_error, 11);
     }
-    for (k = 0; k < 45; k++) q.cost[11 * 45 + k] = q.cost[12 * 45 + k] = k == 5 ? 1 : INFINITY; /* two rows want column 5 */
+    for (k = 0; k < 45; k++)
+        q.cost[11 * 45 + k] = q.cost[12 * 45 + k] = k == 5 ? 1 : INFINITY; /* two rows want column 5 */
     for (m = 0; m < 9; m++) {
         softassign_options o = quick_options(all_methods[m]);
         EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_ERR_LIMIT);
@@ -671,7 +692,8 @@ TEST(softassign_capacity_zero_everywhere)
 
 TEST(softassign_tiny_temperatures_stay_finite)
 {
-    static float (*const costs[])(int, int, uint64_t *) = {cost_uniform, cost_wide, cost_equal, cost_zero, cost_negative};
+    static float (*const costs[])(int, int, uint64_t *) = {cost_uniform, cost_wide, cost_equal, cost_zero,
+                                                           cost_negative};
     static const double temperatures[] = {1e-3, 1e-6, 1e-12};
     size_t k, t;
     int m, x[50];
@@ -763,7 +785,8 @@ TEST(softassign_more_than_2_31_cells)
     p.row_features = a;
     p.column_features = b;
     p.feature_count = 1;
-    o = softassign_method_defaults(SOFTASSIGN_ENTROPIC); /* the matrix alone is 9.6 GB: asked for in full, and refused */
+    o = softassign_method_defaults(SOFTASSIGN_ENTROPIC); /* the matrix alone is 9.6 GB: asked for in full, and
+                                                            refused */
     o.allocator = support_allocator(&m);
     m.fail_at = 1;
     for (k = 0; k < rows; k++) a[k] = (float)k;
@@ -868,7 +891,8 @@ static void check_steps(problem *q, softassign_options o, size_t budget)
 
 TEST(softassign_steps_are_valid_at_any_moment)
 {
-    problem q = make_features(90, 1200, 12, 60), small = make_dense(40, 60, cost_uniform, 4), forbidden = make_dense(40, 60, cost_uniform, 4);
+    problem q = make_features(90, 1200, 12, 60), small = make_dense(40, 60, cost_uniform, 4),
+            forbidden = make_dense(40, 60, cost_uniform, 4);
     softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
     int k;
     check_steps(&q, o, 1);
@@ -912,7 +936,8 @@ TEST(softassign_progress_can_stop_every_method)
         check_solution(&q, x, &r, 1e9);
         EXPECT(c.calls <= 3);
         EXPECT_EQ(c.valid + c.empty, c.calls);
-        if (m == SOFTASSIGN_ANTS || m == SOFTASSIGN_ANNEALING || m == SOFTASSIGN_EXACT) EXPECT(c.calls > 0 && c.empty == 0);
+        if (m == SOFTASSIGN_ANTS || m == SOFTASSIGN_ANNEALING || m == SOFTASSIGN_EXACT)
+            EXPECT(c.calls > 0 && c.empty == 0);
     }
     free_problem(&q);
 }
@@ -925,7 +950,8 @@ TEST(softassign_greedy_is_the_published_one)
     int x[70], y[70];
     for (seed = 1; seed < 10; seed++) {
         problem q = make_features(70, 70 + (int)seed * 30, 9, seed);
-        softassign_options o = softassign_method_defaults(SOFTASSIGN_GREEDY), two = softassign_method_defaults(SOFTASSIGN_GREEDY_2OPT);
+        softassign_options o = softassign_method_defaults(SOFTASSIGN_GREEDY),
+                           two = softassign_method_defaults(SOFTASSIGN_GREEDY_2OPT);
         softassign_report r, better;
         reference_greedy(q.cost, 70, q.p.columns, y);
         EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
@@ -969,7 +995,8 @@ TEST(softassign_published_is_the_pseudo_code)
         }
         EXPECT(sharpest > (gold ? 0.2 : 0.9)); /* the run went from blur to decision */
         EXPECT(worst < (wide ? 1e-5 : 2e-3));
-        REPORT(wide ? "PUBLISHED, double against the pseudo-code" : "PUBLISHED, float against the pseudo-code", worst, "largest difference of S");
+        REPORT(wide ? "PUBLISHED, double against the pseudo-code" : "PUBLISHED, float against the pseudo-code", worst,
+               "largest difference of S");
         for (k = 0; k < 70; k++) {
             for (column = 0, i = 0; i < 30; i++) column += soft[i * 70 + k];
             widest = fmax(widest, column);
@@ -1113,8 +1140,10 @@ TEST(softassign_feature_means_are_exact_box_means)
             for (cx = 0; cx < gw; cx++)
                 for (v = 0; v < py; v++)
                     for (u = 0; u < px; u++) {
-                        double x0 = (double)w * (cx * px + u) / (gw * px), x1 = (double)w * (cx * px + u + 1) / (gw * px);
-                        double y0 = (double)h * (cy * py + v) / (gh * py), y1 = (double)h * (cy * py + v + 1) / (gh * py);
+                        double x0 = (double)w * (cx * px + u) / (gw * px),
+                               x1 = (double)w * (cx * px + u + 1) / (gw * px);
+                        double y0 = (double)h * (cy * py + v) / (gh * py),
+                               y1 = (double)h * (cy * py + v + 1) / (gh * py);
                         for (c = 0; c < 3; c++, at++) {
                             double sum = 0;
                             for (j = 0; j < h; j++)
@@ -1295,7 +1324,8 @@ static float brute_cost(int kind, uint64_t *seed)
     }
 }
 
-static void brute_check(brute *b, const softassign_problem *p, sat_result result, const int *x, const softassign_report *r, const char *what)
+static void brute_check(brute *b, const softassign_problem *p, sat_result result, const int *x,
+                        const softassign_report *r, const char *what)
 {
     long double sum = 0, allowed;
     int used[BRUTE_COLUMNS] = {0}, i, ok = 1;
@@ -1310,7 +1340,8 @@ static void brute_check(brute *b, const softassign_problem *p, sat_result result
     for (i = 0; i < p->columns; i++) ok &= used[i] >= b->least[i];
     allowed = 1e-12L * b->magnitude;
     ok &= sum <= b->best + allowed && r->complete == 1;
-    ok &= (long double)r->lower_bound <= b->best + 1e-17L * b->magnitude && (long double)r->lower_bound >= b->best - allowed;
+    ok &= (long double)r->lower_bound <= b->best + 1e-17L * b->magnitude &&
+          (long double)r->lower_bound >= b->best - allowed;
     if (!ok) {
         printf("%s: %d x %d, cost %.17g optimum %.17Lg bound %.17g complete %d\n", what, b->rows, b->columns, (double)sum, b->best, r->lower_bound, r->complete);
         EXPECT(ok);
@@ -1328,7 +1359,8 @@ TEST(softassign_all_kinds_by_brute_force)
     for (n = 0; n < runs && expect_state.failures < 10; n++) {
         brute b;
         softassign_problem p;
-        int kind = (int)support_below(&seed, 9), i, j, m, x[BRUTE_ROWS], capacities = support_below(&seed, 3) == 0, least = support_below(&seed, 4) == 0;
+        int kind = (int)support_below(&seed, 9), i, j, m, x[BRUTE_ROWS], capacities = support_below(&seed, 3) == 0,
+            least = support_below(&seed, 4) == 0;
         memset(&b, 0, sizeof b);
         memset(&p, 0, sizeof p);
         p.rows = b.rows = 1 + (int)support_below(&seed, BRUTE_ROWS);
@@ -1352,9 +1384,11 @@ TEST(softassign_all_kinds_by_brute_force)
             o.gap = 1e-14;
             brute_check(&b, &p, softassign_solve(x, &p, &o, &r), x, &r, names[m]);
             if (m == SOFTASSIGN_FAST || least) continue;
-            if (!warm[b.rows - 1][b.columns - 1][m]) EXPECT_EQ(softassign_create(&warm[b.rows - 1][b.columns - 1][m], b.rows, b.columns, &o), SAT_OK);
+            if (!warm[b.rows - 1][b.columns - 1][m])
+                EXPECT_EQ(softassign_create(&warm[b.rows - 1][b.columns - 1][m], b.rows, b.columns, &o), SAT_OK);
             softassign_next_frame(warm[b.rows - 1][b.columns - 1][m]);
-            brute_check(&b, &p, softassign_step(warm[b.rows - 1][b.columns - 1][m], x, &p, 1000000, &r), x, &r, m ? "warm exact" : "warm auto");
+            brute_check(&b, &p, softassign_step(warm[b.rows - 1][b.columns - 1][m], x, &p, 1000000, &r), x, &r,
+                        m ? "warm exact" : "warm auto");
         }
     }
     for (n = 0; n < BRUTE_ROWS * BRUTE_COLUMNS * 2; n++) softassign_destroy((&warm[0][0][0])[n]);
@@ -1403,7 +1437,8 @@ TEST(softassign_warm_frames_with_big_gates_are_optimal)
             softassign_problem p;
             softassign_report r;
             double best;
-            for (i = 0; i < N * N; i++) cost[i] = support_uniform(&seed) < 0.85 ? gates[g] : (float)support_uniform(&seed);
+            for (i = 0; i < N * N; i++)
+                cost[i] = support_uniform(&seed) < 0.85 ? gates[g] : (float)support_uniform(&seed);
             for (i = 0; i < N; i++) cost[i * N + (i * 7 + frame) % N] = (float)support_uniform(&seed);
             memset(&p, 0, sizeof p);
             p.rows = p.columns = N, p.cost = cost, p.stride = N;
@@ -1487,7 +1522,8 @@ TEST(softassign_stamps_start_again_before_they_overflow)
 TEST(softassign_closed_columns_leave_lists_whole)
 {
     enum { M = 60, NN = 4100, F = 12 };
-    float *rows = (float *)malloc(M * F * sizeof(float)), *columns = (float *)malloc(NN * F * sizeof(float)), *cost = (float *)malloc((size_t)M * NN * sizeof(float));
+    float *rows = (float *)malloc(M * F * sizeof(float)), *columns = (float *)malloc(NN * F * sizeof(float)),
+          *cost = (float *)malloc((size_t)M * NN * sizeof(float));
     int capacity[NN], x[M], t, i, j, k;
     uint64_t seed = 88;
     for (t = 0; t < 12; t++) {
@@ -1501,11 +1537,14 @@ TEST(softassign_closed_columns_leave_lists_whole)
         for (i = 0; i < M * F; i++) rows[i] = steps ? (float)support_below(&seed, 3) : (float)support_uniform(&seed);
         for (j = 0; j < n; j++) {
             capacity[j] = t >= 8 || support_uniform(&seed) > closed;
-            for (k = 0; k < F; k++) columns[j * F + k] = steps ? (float)support_below(&seed, 3) : (float)(support_uniform(&seed) + (capacity[j] ? off : 0));
+            for (k = 0; k < F; k++)
+                columns[j * F + k] =
+                    steps ? (float)support_below(&seed, 3) : (float)(support_uniform(&seed) + (capacity[j] ? off : 0));
         }
         for (i = 0; i < M; i++)
             for (j = 0; j < n; j++)
-                cost[i * n + j] = capacity[j] ? softassign__distance(rows + i * F, columns + j * F, F) : SOFTASSIGN__INFINITY;
+                cost[i * n + j] =
+                    capacity[j] ? softassign__distance(rows + i * F, columns + j * F, F) : SOFTASSIGN__INFINITY;
         best = (double)reference_optimum(cost, M, n, NULL, NULL);
         p.rows = M, p.columns = n, p.feature_count = F, p.row_features = rows, p.column_features = columns;
         if (t < 8) p.capacity = capacity;
@@ -1520,7 +1559,10 @@ TEST(softassign_closed_columns_leave_lists_whole)
 
 /* ---- options and problems: each row of the table, each sentence ---- */
 
-static inline void set_field(const sat__field *field, softassign_options *o, double value) { sat__field_set(field, o, value); }
+static inline void set_field(const sat__field *field, softassign_options *o, double value)
+{
+    sat__field_set(field, o, value);
+}
 
 /* Refused by solve and create, and named. */
 static inline void check_refused(const softassign_options *o, const char *name)
@@ -1579,7 +1621,8 @@ TEST(softassign_corners_of_options_in_pairs)
                 const sat__field *f = &softassign__fields[a], *g = &softassign__fields[b];
                 const double first[3] = {f->low, f->high < 2e9 || f->type == 'd' ? f->high : 3, f->initial};
                 const double second[3] = {g->low, g->high < 2e9 || g->type == 'd' ? g->high : 3, g->initial};
-                softassign_options o = softassign_method_defaults((softassign_method)((a + b + k) % (SOFTASSIGN_ANTS + 1)));
+                softassign_options o =
+                    softassign_method_defaults((softassign_method)((a + b + k) % (SOFTASSIGN_ANTS + 1)));
                 softassign_report r;
                 char text[200];
                 int x[6], j;
@@ -1624,7 +1667,8 @@ TEST(softassign_every_refused_problem_is_named)
     REFUSED((p.maximise = 1, o.method = SOFTASSIGN_ANTS), "maximise is 1; only AUTO, EXACT and FAST take it");
     REFUSED((p.unassigned_cost = 1, o.method = SOFTASSIGN_GREEDY), "unassigned_cost is above 0; only AUTO, EXACT and FAST take it");
     REFUSED((p.unassigned_cost = 1, o.grid_width = 2, o.min_distance = 2), "unassigned_cost is above 0; min_distance does not go with it");
-    REFUSED((p.minimum_use = none, o.method = SOFTASSIGN_GREEDY), "minimum_use is given; only AUTO, EXACT and FAST take it");
+    REFUSED((p.minimum_use = none, o.method = SOFTASSIGN_GREEDY),
+            "minimum_use is given; only AUTO, EXACT and FAST take it");
     REFUSED((p.minimum_use = none, o.row_price = price), "minimum_use is given; row_price and column_price do not go with it");
     REFUSED((o.method = SOFTASSIGN_FAST, o.column_price = price), "row_price or column_price is given; only AUTO and EXACT have them");
     REFUSED(o.min_distance = 1, "grid_width is 0; min_distance above 0 needs the grid");
@@ -1647,8 +1691,10 @@ TEST(softassign_every_refused_problem_is_named)
 
 /* ---- rows left out, the largest total, dual prices: against enumeration ---- */
 
-/* u_i + v_j <= cost (maximise: >= gain), equal where used, 0 where there is room; together they are worth the optimum. */
-static inline int prices_are_dual(const brute *b, int columns, const int *x, const double *u, const double *v, double price, int square, long double optimum)
+/* u_i + v_j <= cost (maximise: >= gain), equal where used, 0 where there is room; together they are worth the
+   optimum. */
+static inline int prices_are_dual(const brute *b, int columns, const int *x, const double *u, const double *v,
+                                  double price, int square, long double optimum)
 {
     double scale = price, sum = 0;
     int i, j, ok = 1, used[BRUTE_COLUMNS] = {0};
@@ -1660,7 +1706,9 @@ static inline int prices_are_dual(const brute *b, int columns, const int *x, con
         ok &= price == 0 || u[i] <= price + 1e-12 * scale;
         ok &= x[i] >= 0 || fabs(u[i] - price) <= 1e-12 * scale;
         for (j = 0; j < columns; j++) {
-            double off = brute_is_forbidden(b->cost[i * BRUTE_COLUMNS + j]) || b->left[j] == 0 ? 0 : (double)b->cost[i * BRUTE_COLUMNS + j] - u[i] - v[j];
+            double off = brute_is_forbidden(b->cost[i * BRUTE_COLUMNS + j]) || b->left[j] == 0
+                             ? 0
+                             : (double)b->cost[i * BRUTE_COLUMNS + j] - u[i] - v[j];
             ok &= off >= -1e-12 * scale && (x[i] != j || off <= 1e-12 * scale);
         }
     }
@@ -1680,7 +1728,8 @@ TEST(softassign_rows_left_out_and_the_largest_total_by_brute_force)
         brute b;
         softassign_problem p;
         float given[BRUTE_ROWS * BRUTE_COLUMNS];
-        int kind = kinds[support_below(&seed, 6)], capacities = support_below(&seed, 3) == 0, optional = support_below(&seed, 3) > 0;
+        int kind = kinds[support_below(&seed, 6)], capacities = support_below(&seed, 3) == 0,
+            optional = support_below(&seed, 3) > 0;
         int maximise = (int)support_below(&seed, 2);
         float price = optional ? (float)(support_uniform(&seed) * (kind == 0 ? 0.8 : kind == 8 ? 4e5 : 4)) + 1e-3f : 0;
         memset(&b, 0, sizeof b);
@@ -1728,7 +1777,8 @@ TEST(softassign_rows_left_out_and_the_largest_total_by_brute_force)
             if (result != SAT_OK || !b.found || m == SOFTASSIGN_FAST || kind == 3) continue;
             for (i = 0; maximise && i < p.rows; i++) u[i] = -u[i];
             for (j = 0; maximise && j < p.columns; j++) v[j] = -v[j];
-            if (maximise && optional) { /* the price is a gain: compare as a shifted problem is no proof, so only the sums */
+            if (maximise && optional) { /* the price is a gain: compare as a shifted problem is no proof, so only the
+                                           sums */
                 double sum = 0;
                 for (i = 0; i < p.rows; i++) sum += u[i];
                 for (j = 0; j < p.columns; j++) sum += b.left[j] * v[j];
@@ -1763,11 +1813,13 @@ TEST(softassign_rows_left_out_of_larger_problems)
     for (turn = 0; turn < 4; turn++) {
         int rows = 60, columns = turn % 2 ? 2000 : 40, x[60], none = 0;
         problem q = make_features(rows, columns, 5, (uint64_t)turn + 3);
-        float *wide = (float *)malloc((size_t)rows * (size_t)(rows + columns) * sizeof *wide), price = turn % 2 ? 14 : 40;
+        float *wide = (float *)malloc((size_t)rows * (size_t)(rows + columns) * sizeof *wide),
+              price = turn % 2 ? 14 : 40;
         softassign_report r;
         long double optimum, sum = 0;
         for (i = 0; i < rows; i++)
-            for (j = 0; j < columns + rows; j++) wide[i * (columns + rows) + j] = j < columns ? q.cost[i * columns + j] : price;
+            for (j = 0; j < columns + rows; j++)
+                wide[i * (columns + rows) + j] = j < columns ? q.cost[i * columns + j] : price;
         optimum = reference_optimum(wide, rows, columns + rows, NULL, NULL);
         q.p.unassigned_cost = price;
         if (turn < 2) {

@@ -1,4 +1,5 @@
-/* softassign.h on the GPU against the same methods on the CPU. Needs OSMesa (or a GPU, see gl_context.h); skips without. */
+/* softassign.h on the GPU against the same methods on the CPU. Needs OSMesa (or a GPU, see gl_context.h); skips
+   without. */
 
 #include "gl_context.h"
 #include "gl_es.h"
@@ -66,7 +67,8 @@ TEST(softassign_gl_published_equals_the_cpu)
         for (evolves = 0; evolves < 2; evolves++) {
             int rows = sizes[k][0], columns = sizes[k][1], *x = (int *)malloc((size_t)rows * sizeof *x);
             size_t n = (size_t)rows * (size_t)columns;
-            float *cost = make_costs(rows, columns, k + 1), *cpu = (float *)malloc(n * sizeof *cpu), *gpu = (float *)malloc(n * sizeof *gpu);
+            float *cost = make_costs(rows, columns, k + 1), *cpu = (float *)malloc(n * sizeof *cpu),
+                  *gpu = (float *)malloc(n * sizeof *gpu);
             softassign_problem p = problem_of(cost, rows, columns);
             softassign_options o = softassign_method_defaults(SOFTASSIGN_PUBLISHED);
             softassign_report r;
@@ -85,7 +87,8 @@ TEST(softassign_gl_published_equals_the_cpu)
             o.soft = cpu;
             o.soft_stride = columns;
             EXPECT_EQ(softassign_solve(x, &p, &o, &r), SAT_OK);
-            if (!EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, &o), SAT_OK)) puts(softassign_gl_message(gl));
+            if (!EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, &o), SAT_OK))
+                puts(softassign_gl_message(gl));
             EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_OK);
             EXPECT_EQ(softassign_gl_published(gl, gpu, columns, &soft_cost), SAT_OK);
             worst = largest_difference(cpu, gpu, n);
@@ -155,7 +158,8 @@ TEST(softassign_gl_sweep_equals_the_cpu)
         for (t = 0; t < 3; t++) {
             int rows = sizes[k][0], columns = sizes[k][1], i, j, turn, sweeps = 5;
             float *cost = make_costs(rows, columns, k + 5), *price = (float *)calloc((size_t)columns, sizeof *price);
-            double *v = (double *)calloc((size_t)columns, sizeof *v), *sum = (double *)malloc((size_t)columns * sizeof *sum);
+            double *v = (double *)calloc((size_t)columns, sizeof *v),
+                   *sum = (double *)malloc((size_t)columns * sizeof *sum);
             double bound = 0, gpu_bound = 0, eps = temperatures[t], worst = 0;
             softassign_problem p = problem_of(cost, rows, columns);
             softassign_options o = softassign_defaults();
@@ -176,7 +180,8 @@ TEST(softassign_gl_sweep_equals_the_cpu)
                     for (j = 0; j < columns; j++) sum[j] += exp((least - ((double)c[j] - v[j])) / eps) / all;
                     bound += least;
                 }
-                for (j = 0; j < columns; j++) v[j] = fmin(0, sum[j] < 1e-36 ? v[j] + 82 * eps : v[j] - eps * log(sum[j]));
+                for (j = 0; j < columns; j++)
+                    v[j] = fmin(0, sum[j] < 1e-36 ? v[j] + 82 * eps : v[j] - eps * log(sum[j]));
             }
             EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, &o), SAT_OK);
             EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_OK);
@@ -202,18 +207,29 @@ typedef struct gl_state { int values[64]; int count; } gl_state;
 
 static void snapshot(gl_state *s)
 {
-    static const unsigned names[] = {SAT__GL_CURRENT_PROGRAM, SAT__GL_VERTEX_ARRAY_BINDING, SAT__GL_DRAW_FRAMEBUFFER_BINDING,
-                                     SAT__GL_READ_FRAMEBUFFER_BINDING, SAT__GL_ACTIVE_TEXTURE, SAT__GL_TEXTURE_BINDING_2D,
-                                     SAT__GL_SAMPLER_BINDING, SAT__GL_UNPACK_ALIGNMENT, SAT__GL_PACK_ALIGNMENT, SAT__GL_UNPACK_ROW_LENGTH,
-                                     SAT__GL_DEPTH_FUNC, SAT__GL_BLEND_SRC_RGB, SAT__GL_PIXEL_PACK_BUFFER_BINDING,
+    static const unsigned names[] = {SAT__GL_CURRENT_PROGRAM,
+                                     SAT__GL_VERTEX_ARRAY_BINDING,
+                                     SAT__GL_DRAW_FRAMEBUFFER_BINDING,
+                                     SAT__GL_READ_FRAMEBUFFER_BINDING,
+                                     SAT__GL_ACTIVE_TEXTURE,
+                                     SAT__GL_TEXTURE_BINDING_2D,
+                                     SAT__GL_SAMPLER_BINDING,
+                                     SAT__GL_UNPACK_ALIGNMENT,
+                                     SAT__GL_PACK_ALIGNMENT,
+                                     SAT__GL_UNPACK_ROW_LENGTH,
+                                     SAT__GL_DEPTH_FUNC,
+                                     SAT__GL_BLEND_SRC_RGB,
+                                     SAT__GL_PIXEL_PACK_BUFFER_BINDING,
                                      SAT__GL_PIXEL_UNPACK_BUFFER_BINDING};
-    static const unsigned capabilities[] = {SAT__GL_BLEND, SAT__GL_DEPTH_TEST, SAT__GL_SCISSOR_TEST, SAT__GL_CULL_FACE, SAT__GL_STENCIL_TEST};
+    static const unsigned capabilities[] = {SAT__GL_BLEND, SAT__GL_DEPTH_TEST, SAT__GL_SCISSOR_TEST, SAT__GL_CULL_FACE,
+                                            SAT__GL_STENCIL_TEST};
     size_t i;
     memset(s, 0, sizeof *s);
     for (i = 0; i < sizeof names / sizeof *names; i++) test_gl.GetIntegerv(names[i], &s->values[s->count++]);
     test_gl.GetIntegerv(SAT__GL_VIEWPORT, &s->values[s->count]);
     s->count += 4;
-    for (i = 0; i < sizeof capabilities / sizeof *capabilities; i++) s->values[s->count++] = test_gl.IsEnabled(capabilities[i]);
+    for (i = 0; i < sizeof capabilities / sizeof *capabilities; i++)
+        s->values[s->count++] = test_gl.IsEnabled(capabilities[i]);
     for (i = 0; i < 4; i++) {
         int active;
         test_gl.GetIntegerv(SAT__GL_ACTIVE_TEXTURE, &active);
@@ -256,7 +272,10 @@ TEST(softassign_gl_state_is_restored)
     close_gl();
 }
 
-static sat_gl_proc without_draw(const char *name) { return strcmp(name, "glDrawArrays") == 0 ? NULL : test_context.get_proc(name); }
+static sat_gl_proc without_draw(const char *name)
+{
+    return strcmp(name, "glDrawArrays") == 0 ? NULL : test_context.get_proc(name);
+}
 
 TEST(softassign_gl_refuses_and_names)
 {
@@ -370,7 +389,8 @@ TEST(softassign_gl_bound_holds_for_many_features)
             double row = HUGE_VAL;
             for (j = 0; j < 12; j++) {
                 int c;
-                for (cost[i][j] = 0, c = 0; c < n; c++) cost[i][j] += pow((double)f[i * n + c] - (double)f[(12 + j) * n + c], 2);
+                for (cost[i][j] = 0, c = 0; c < n; c++)
+                    cost[i][j] += pow((double)f[i * n + c] - (double)f[(12 + j) * n + c], 2);
                 row = fmin(row, sqrt(cost[i][j]));
             }
             least += row;

@@ -64,7 +64,8 @@ static int all_within(const float *v, size_t n, float low, float high)
 /* ---- planes ---- */
 
 /* Depth of the plane n.P = -1 (z forward), 0 where it is not in front. */
-static void draw_plane(const ssao_sat__camera *c, float *depth, float *normals, int w, int h, double nx, double ny, double nz)
+static void draw_plane(const ssao_sat__camera *c, float *depth, float *normals, int w, int h, double nx, double ny,
+                       double nz)
 {
     double length = sqrt(nx * nx + ny * ny + nz * nz);
     int x, y;
@@ -81,7 +82,8 @@ static void draw_plane(const ssao_sat__camera *c, float *depth, float *normals, 
 }
 
 /* The least accessibility on a wall, everywhere, borders and horizon included. */
-static double darkest_on_plane(ssao_sat_method method, int orthographic, double nx, double ny, double nz, int skip, int give_normals)
+static double darkest_on_plane(ssao_sat_method method, int orthographic, double nx, double ny, double nz, int skip,
+                               int give_normals)
 {
     static float depth[96 * 80], normals[96 * 80 * 3], out[96 * 80];
     ref_picture p;
@@ -110,18 +112,22 @@ static double darkest_on_plane(ssao_sat_method method, int orthographic, double 
 
 TEST(flat_walls_are_open_at_any_slant)
 {
-    static const double normal[6][3] = {{0, 0, -0.5}, {0.3, 0, -0.5}, {0, 0.6, -0.25}, {-0.5, 0.4, -0.3}, {0, 1, -0.1}, {0.2, -0.9, -0.12}};
+    static const double normal[6][3] = {{0, 0, -0.5},      {0.3, 0, -0.5}, {0, 0.6, -0.25},
+                                        {-0.5, 0.4, -0.3}, {0, 1, -0.1},   {0.2, -0.9, -0.12}};
     int i, orthographic, skip, given;
     for (orthographic = 0; orthographic < 2; orthographic++)
         for (i = 0; i < 6; i++)
             for (skip = 0; skip < 2; skip++)
                 for (given = 0; given < 2; given++) {
-                    double s = darkest_on_plane(SSAO_SAT_SLABS, orthographic, normal[i][0], normal[i][1], normal[i][2], skip, given);
-                    double p = darkest_on_plane(SSAO_SAT_PLANE, orthographic, normal[i][0], normal[i][1], normal[i][2], skip, given);
+                    double s = darkest_on_plane(SSAO_SAT_SLABS, orthographic, normal[i][0], normal[i][1], normal[i][2],
+                                                skip, given);
+                    double p = darkest_on_plane(SSAO_SAT_PLANE, orthographic, normal[i][0], normal[i][1], normal[i][2],
+                                                skip, given);
                     EXPECT(s >= 0.999);
                     EXPECT(p >= 0.999);
                     if (s < 0.999 || p < 0.999)
-                        printf("    wall %d, %s, skip %d, normals %d: slabs %g, plane %g\n", i, orthographic ? "orthographic" : "perspective", skip, given, s, p);
+                        printf("    wall %d, %s, skip %d, normals %d: slabs %g, plane %g\n", i,
+                               orthographic ? "orthographic" : "perspective", skip, given, s, p);
                 }
 }
 
@@ -255,13 +261,17 @@ static double brute_mean(const brute *b, int x0, int y0, int x1, int y1)
     return sum / ((x1 - x0) * (y1 - y0));
 }
 
-static double brute_deficit(const brute *b, double mean, double z) { return b->o.inverted_depth ? (mean * z - 1) * z : z - mean; }
+static double brute_deficit(const brute *b, double mean, double z)
+{
+    return b->o.inverted_depth ? (mean * z - 1) * z : z - mean;
+}
 
 static double brute_refine(const brute *b, double z, int x0, int y0, int x1, int y1, int level)
 {
     double parent_mean = brute_mean(b, x0, y0, x1, y1), parent = brute_deficit(b, parent_mean, z), sum = 0, weight = 0;
     int xs[3], ys[3], i, j;
-    if (level >= b->o.refine_levels || fabs(parent) >= b->o.refine_threshold * z || x1 - x0 < 2 || y1 - y0 < 2) return parent;
+    if (level >= b->o.refine_levels || fabs(parent) >= b->o.refine_threshold * z || x1 - x0 < 2 || y1 - y0 < 2)
+        return parent;
     xs[0] = x0; xs[1] = (x0 + x1) / 2; xs[2] = x1;
     ys[0] = y0; ys[1] = (y0 + y1) / 2; ys[2] = y1;
     for (j = 0; j < 2; j++)
@@ -278,7 +288,8 @@ static double brute_refine(const brute *b, double z, int x0, int y0, int x1, int
 static double brute_accessibility(const brute *b, int x, int y, double nearest, double farthest)
 {
     const ref_picture *p = b->p;
-    double z = (double)p->z[y * p->width + x], reach = ssao_sat__fits[b->o.method].reach, half, cx = x + 0.5, cy = y + 0.5, deficit, gain, fade;
+    double z = (double)p->z[y * p->width + x], reach = ssao_sat__fits[b->o.method].reach, half, cx = x + 0.5,
+           cy = y + 0.5, deficit, gain, fade;
     const float *n = p->normals + 3 * (y * p->width + x);
     int x0, y0, x1, y1;
     if (!(z < 1e18)) return 1;
@@ -333,7 +344,8 @@ static void check_published(ssao_sat_options o, double tolerance)
         e = (double)out[y * SIDE + x] - brute_accessibility(&b, x, y, low, high);
         sum += e * e;
     }
-    if (!EXPECT_NEAR(sqrt(sum / count), 0, tolerance)) printf("    method %d, as_printed %d\n", (int)o.method, o.as_printed);
+    if (!EXPECT_NEAR(sqrt(sum / count), 0, tolerance))
+        printf("    method %d, as_printed %d\n", (int)o.method, o.as_printed);
 }
 
 TEST(published_methods_are_what_the_text_says)
@@ -381,7 +393,8 @@ TEST(refinement_shares_corners)
     ssao_sat_stats stats;
     uint64_t state = 1;
     int i;
-    for (i = 0; i < 64 * 64; i++) z[i] = 5 + (float)support_uniform(&state) * 0.01f; /* all means within the threshold */
+    for (i = 0; i < 64 * 64; i++)
+        z[i] = 5 + (float)support_uniform(&state) * 0.01f; /* all means within the threshold */
     o.half_resolution = 0;
     o.region_pixels = 8;
     o.normal_offset = 0;
@@ -398,7 +411,8 @@ TEST(refinement_shares_corners)
 
 /* ---- tables ---- */
 
-/* Wide pictures: sums are exact modulo 2^32 wherever the box lies, so the error of a mean is that of the rounding alone. */
+/* Wide pictures: sums are exact modulo 2^32 wherever the box lies, so the error of a mean is that of the rounding
+   alone. */
 TEST(table_errors_at_every_width)
 {
     int widths[] = {512, 2048, 8192, 16384}, k, i;
@@ -427,7 +441,8 @@ TEST(table_errors_at_every_width)
                     real += (double)value;
                 }
             worst = support_larger(worst, fabs((double)got - (double)exact));
-            steps = support_larger(steps, fabs(((double)got * (double)ao->value.quantum + 289 * (double)ao->value.low) - real) / 289);
+            steps = support_larger(
+                steps, fabs(((double)got * (double)ao->value.quantum + 289 * (double)ao->value.low) - real) / 289);
         }
         EXPECT_NEAR(worst, 0, 0);
         EXPECT_NEAR(steps, 0, 1 / 65536.0); /* of the largest 1/z, which is 1 */
@@ -451,7 +466,8 @@ TEST(slab_sums_are_exact)
     if (!EXPECT_EQ(ssao_sat_create(&ao, SIDE, SIDE, &o), SAT_OK)) return;
     EXPECT_EQ(ssao_sat_apply(ao, out, 0, &in, NULL), SAT_OK);
     for (i = 0; i < 200; i++) {
-        int x0 = support_below(&state, SIDE), y0 = support_below(&state, SIDE), x1 = x0 + support_below(&state, SIDE - x0) + 1;
+        int x0 = support_below(&state, SIDE), y0 = support_below(&state, SIDE),
+            x1 = x0 + support_below(&state, SIDE - x0) + 1;
         int y1 = y0 + support_below(&state, SIDE - y0) + 1, word;
         for (k = 0; k < ao->frame_slabs; k++) {
             uint32_t sum[4] = {0, 0, 0, 0};
@@ -468,17 +484,20 @@ TEST(slab_sums_are_exact)
                     sum[3] += (uint32_t)y;
                 }
             for (word = 0; word < 4; word++)
-                wrong += ssao_sat__box(ao, ao->table + 4 * (size_t)k * ao->table_plane + word, 4, x0, y0, x1, y1) != sum[word];
+                wrong += ssao_sat__box(ao, ao->table + 4 * (size_t)k * ao->table_plane + word, 4, x0, y0, x1, y1) !=
+                         sum[word];
         }
     }
     EXPECT_EQ(wrong, 0);
     ssao_sat_destroy(ao);
 }
 
-/* What a third of an axis counts at the border: its side's part that is in the picture, and what the other side lacks. */
+/* What a third of an axis counts at the border: its side's part that is in the picture, and what the other side
+   lacks. */
 static double brute_third(const int *border, int at, int outer, int inner, int third)
 {
-    double first = (double)(border[1] - border[0]) / (outer - inner), last = (double)(border[3] - border[2]) / (outer - inner);
+    double first = (double)(border[1] - border[0]) / (outer - inner),
+           last = (double)(border[3] - border[2]) / (outer - inner);
     if (border[0] == at - outer && border[3] == at + outer + 1) return 1;
     return third == 0 ? first : third == 2 ? last : 1 + 0.73 * (2 - first - last);
 }
@@ -487,17 +506,22 @@ static double brute_third(const int *border, int at, int outer, int inner, int t
 static double brute_slabs(const ssao_sat *s, const ref_picture *p, int x, int y)
 {
     size_t at = (size_t)y * (size_t)p->width + (size_t)x;
-    double z = (double)p->z[at], f = 0.5 * p->height / tan(0.5 * p->fov), sum = 0, total = 0, r = (double)s->reach * f / z, fade = fmin(r / s->options.min_pixels - 1, 1);
+    double z = (double)p->z[at], f = 0.5 * p->height / tan(0.5 * p->fov), sum = 0, total = 0,
+           r = (double)s->reach * f / z, fade = fmin(r / s->options.min_pixels - 1, 1);
     double px = (x + 0.5 - 0.5 * p->width) / f * z, py = (0.5 * p->height - y - 0.5) / f * z, range = (double)s->range;
     const float *n = p->normals + 3 * at;
     int ring, j, i, k, u, v;
     for (ring = 0; ring < s->options.scales; ring++, r /= 3) {
-        int inner = sat__max_int(1, (int)((float)r / 3 + 0.5f)), outer = sat__max_int(inner + 1, (int)((float)r + 0.5f));
+        int inner = sat__max_int(1, (int)((float)r / 3 + 0.5f)),
+            outer = sat__max_int(inner + 1, (int)((float)r + 0.5f));
         int xs[4], ys[4];
         xs[0] = x - outer; xs[1] = x - inner; xs[2] = x + inner + 1; xs[3] = x + outer + 1;
         ys[0] = y - outer; ys[1] = y - inner; ys[2] = y + inner + 1; ys[3] = y + outer + 1;
         total += 8 * (double)ssao_sat__ring_weights[ring];
-        for (i = 0; i < 4; i++) { xs[i] = sat__clamp_int(xs[i], 0, p->width); ys[i] = sat__clamp_int(ys[i], 0, p->height); }
+        for (i = 0; i < 4; i++) {
+            xs[i] = sat__clamp_int(xs[i], 0, p->width);
+            ys[i] = sat__clamp_int(ys[i], 0, p->height);
+        }
         for (j = 0; j < 3; j++)
             for (i = 0; i < 3; i++) {
                 double area = (xs[i + 1] - xs[i]) * (ys[j + 1] - ys[j]);
@@ -508,7 +532,9 @@ static double brute_slabs(const ssao_sat *s, const ref_picture *p, int x, int y)
                     for (v = ys[j]; v < ys[j + 1]; v++)
                         for (u = xs[i]; u < xs[i + 1]; u++) {
                             float q = p->z[v * p->width + u];
-                            if (!(q < 1e18f) || (k > 0 && q < s->edge[k]) || (k < s->frame_slabs - 1 && q >= s->edge[k + 1])) continue;
+                            if (!(q < 1e18f) || (k > 0 && q < s->edge[k]) ||
+                                (k < s->frame_slabs - 1 && q >= s->edge[k + 1]))
+                                continue;
                             count++;
                             w += 1 / (double)q;
                             mx += u + 0.5;
@@ -546,7 +572,8 @@ TEST(slab_estimates_equal_brute_force)
         EXPECT_EQ(ssao_sat_apply(ao, out, 0, &in, NULL), SAT_OK);
         for (i = 0; i < 300; i++) {
             int x = (i * 7919) % SIDE, y = (i * 104729 / 7) % SIDE;
-            if (p->z[y * SIDE + x] < 1e18f) worst = support_larger(worst, fabs((double)out[y * SIDE + x] - brute_slabs(ao, p, x, y)));
+            if (p->z[y * SIDE + x] < 1e18f)
+                worst = support_larger(worst, fabs((double)out[y * SIDE + x] - brute_slabs(ao, p, x, y)));
             else EXPECT_NEAR(out[y * SIDE + x], 1, 0);
         }
         EXPECT_NEAR(worst, 0, 2e-3);
@@ -680,8 +707,10 @@ TEST(signed_output_is_depth_unsharp_masking)
             int x = (i * 7919) % SIDE, y = (i * 104729 / 7) % SIDE, u, v, n = 0, x0, y0, x1, y1;
             double z = (double)p->z[y * SIDE + x], half = 0.4 * f / z, sum = 0, mean, want;
             if (!(z < 1e18)) { EXPECT_NEAR(out[y * SIDE + x], 0, 0); continue; }
-            x0 = sat__clamp_int((int)floor(x + 1 - half), 0, SIDE - 1); y0 = sat__clamp_int((int)floor(y + 1 - half), 0, SIDE - 1);
-            x1 = sat__clamp_int((int)floor(x + 1 + half), x0 + 1, SIDE); y1 = sat__clamp_int((int)floor(y + 1 + half), y0 + 1, SIDE);
+            x0 = sat__clamp_int((int)floor(x + 1 - half), 0, SIDE - 1);
+            y0 = sat__clamp_int((int)floor(y + 1 - half), 0, SIDE - 1);
+            x1 = sat__clamp_int((int)floor(x + 1 + half), x0 + 1, SIDE);
+            y1 = sat__clamp_int((int)floor(y + 1 + half), y0 + 1, SIDE);
             for (v = y0; v < y1; v++)
                 for (u = x0; u < x1; u++) {
                     double q = (double)p->z[v * SIDE + u];
@@ -800,13 +829,17 @@ TEST(no_seams_at_the_border)
                 EXPECT_EQ(run(out, &in, &o, NULL), SAT_OK);
                 for (x = 10; x < N - 10; x++)
                     for (y = 1; y < N; y++) {
-                        double v = (double)(turned ? out[x * N + y] : out[y * N + x]), w = (double)(turned ? out[x * N + y - 1] : out[(y - 1) * N + x]);
+                        double v = (double)(turned ? out[x * N + y] : out[y * N + x]),
+                               w = (double)(turned ? out[x * N + y - 1] : out[(y - 1) * N + x]);
                         double centre = (double)(turned ? out[x * N + N / 2] : out[N / 2 * N + x]);
                         step = support_larger(step, fabs(v - w));
                         off = support_larger(off, fabs(v - centre));
                     }
-                /* half resolution: 6 table pixels a region; the upsample alone makes .009 of it, in the middle of the picture too */
-                if (!EXPECT(step < (half && r == 0 ? 0.018 : 0.01) && off < 0.03)) printf("    turned %d, half %d, radius %g: step %.4f, off %.4f\n", turned, half, radii[r], step, off);
+                /* half resolution: 6 table pixels a region; the upsample alone makes .009 of it, in the middle of the
+                   picture too */
+                if (!EXPECT(step < (half && r == 0 ? 0.018 : 0.01) && off < 0.03))
+                    printf("    turned %d, half %d, radius %g: step %.4f, off %.4f\n", turned, half, radii[r], step,
+                           off);
             }
 }
 
@@ -876,7 +909,8 @@ TEST(steep_walls_are_open)
                 o.plane_boxes = m == 2 ? 1 : 2;
                 in.normals = n;
                 for (i = 0; i < N * N; i++) {
-                    double rx = (i % N + 0.5 - N / 2) / f, ry = (N / 2 - i / N - 0.5) / f, d = sin(a) * (across ? rx : ry) - cos(a);
+                    double rx = (i % N + 0.5 - N / 2) / f, ry = (N / 2 - i / N - 0.5) / f,
+                           d = sin(a) * (across ? rx : ry) - cos(a);
                     z[i] = d < -1e-6 ? (float)(-3 * fmax(cos(a), 0.05) / d) : sat__float_from_bits(0x7f800000u);
                     n[3 * i + (across ? 0 : 1)] = (float)sin(a);
                     n[3 * i + (across ? 1 : 0)] = 0;
@@ -884,7 +918,8 @@ TEST(steep_walls_are_open)
                 }
                 EXPECT_EQ(run(out, &in, &o, NULL), SAT_OK);
                 for (i = 0; i < N * N; i++) least = fmin(least, (double)out[i]);
-                if (!EXPECT(least > 0.999)) printf("    slant %g, method %d, across %d: %.4f\n", slant[q], m, across, least);
+                if (!EXPECT(least > 0.999))
+                    printf("    slant %g, method %d, across %d: %.4f\n", slant[q], m, across, least);
             }
 }
 
@@ -934,7 +969,8 @@ TEST(matrices_may_be_rounded)
     }
 }
 
-/* A mirror's or the water's near plane (Lengyel 2005): the third row holds a plane; depth is decoded along every ray. */
+/* A mirror's or the water's near plane (Lengyel 2005): the third row holds a plane; depth is decoded along every
+   ray. */
 TEST(oblique_planes_and_left_hands)
 {
     static float z[SIDE * SIDE], n[3 * SIDE * SIDE], base[SIDE * SIDE], out[SIDE * SIDE];
@@ -953,11 +989,13 @@ TEST(oblique_planes_and_left_hands)
         in.projection[6] = -0.013f * in.projection[10];
         if (!EXPECT(ssao_sat__read_camera(&c, &in, 1, 0))) continue;
         for (i = 0; i < SIDE * SIDE; i++) {
-            double x = c.full[0] * (i % SIDE + 0.5) + c.full[1], y = c.full[2] * (i / SIDE + 0.5) + c.full[3], d = (double)p->z[i], w = 1;
+            double x = c.full[0] * (i % SIDE + 0.5) + c.full[1], y = c.full[2] * (i / SIDE + 0.5) + c.full[3],
+                   d = (double)p->z[i], w = 1;
             const float *m = in.projection;
             if (!(d < 1e18)) { depth[i] = 1; continue; }
             if (!orthographic) { x *= d; y *= d; w = d; }
-            depth[i] = (float)(0.5 + 0.5 * ((double)m[2] * x + (double)m[6] * y - (double)m[10] * d + (double)m[14]) / w);
+            depth[i] =
+                (float)(0.5 + 0.5 * ((double)m[2] * x + (double)m[6] * y - (double)m[10] * d + (double)m[14]) / w);
             if (!(depth[i] >= 0)) depth[i] = 0;
         }
         EXPECT_EQ(run(out, &in, &o, NULL), SAT_OK);
@@ -1071,7 +1109,8 @@ TEST(same_bits_for_any_worker_count_and_band)
                     o.threads = odd ? support_odd_threads(workers[w]) : support_threads(workers[w]);
                     o.band_rows = band ? 17 : 0;
                     if (!EXPECT_EQ(ssao_sat_create(&ao, SIDE, SIDE, &o), SAT_OK)) return;
-                    if (m == SSAO_SAT_SLABS) EXPECT_EQ(ssao_sat_apply_bent(ao, out, 0, other_bent, 0, &in, &stats), SAT_OK);
+                    if (m == SSAO_SAT_SLABS)
+                        EXPECT_EQ(ssao_sat_apply_bent(ao, out, 0, other_bent, 0, &in, &stats), SAT_OK);
                     else EXPECT_EQ(ssao_sat_apply(ao, out, 0, &in, &stats), SAT_OK);
                     ssao_sat_destroy(ao);
                     if (w == 0 && !odd && !band) {
@@ -1189,7 +1228,8 @@ TEST(all_sky_and_all_one_depth)
 
 TEST(any_size_is_legal)
 {
-    static const int sizes[][2] = {{1, 1}, {1, 9}, {9, 1}, {2, 2}, {3, 5}, {17, 16}, {16, 17}, {31, 33}, {2, 300}, {257, 3}};
+    static const int sizes[][2] = {{1, 1},   {1, 9},   {9, 1},   {2, 2},   {3, 5},
+                                   {17, 16}, {16, 17}, {31, 33}, {2, 300}, {257, 3}};
     int i, m, half;
     for (i = 0; i < 10; i++)
         for (m = 0; m < 5; m++)
@@ -1221,7 +1261,10 @@ TEST(nine_decades_of_depth)
         for (x = 0; x < 128; x++) {
             int far = x >= 64, u = x % 64;
             int box = u >= 24 && u < 40 && y >= 24 && y < 40;
-            z[y * 128 + x] = far ? (box ? 0.97e6f : 1e6f) : (box ? 0.97e-3f : 1e-3f) * (x < 12 ? 1e4f : x < 16 ? 1e6f : 1);
+            z[y * 128 + x] = far ? (box ? 0.97e6f : 1e6f)
+                                 : (box ? 0.97e-3f : 1e-3f) * (x < 12   ? 1e4f
+                                                               : x < 16 ? 1e6f
+                                                                        : 1);
         }
     o.radius = 1e5;
     EXPECT_EQ(run(out, &in, &o, NULL), SAT_OK);
@@ -1249,7 +1292,8 @@ TEST(normals_that_are_none_come_from_depth)
     in.normals = NULL;
     EXPECT_EQ(run(from_depth, &in, &o, NULL), SAT_OK);
     EXPECT_NEAR(ref_rmse(p, from_depth, given), 0, 0.06);
-    for (i = 0; i < SIDE * SIDE * 3; i++) n[i] = i % 9 < 3 ? sat__float_from_bits(0x7fc00001u) : i % 9 < 6 ? 0 : INFINITY;
+    for (i = 0; i < SIDE * SIDE * 3; i++)
+        n[i] = i % 9 < 3 ? sat__float_from_bits(0x7fc00001u) : i % 9 < 6 ? 0 : INFINITY;
     in.normals = n;
     EXPECT_EQ(run(out, &in, &o, &stats), SAT_OK);
     EXPECT_NEAR(largest_difference(out, from_depth, SIDE * SIDE), 0, 0);
@@ -1303,8 +1347,11 @@ TEST(bad_arguments_are_refused_and_write_nothing)
     ssao_sat *ao;
     double no_number = (double)sat__float_from_bits(0x7fc00001u);
     support_fill(z, 64, 1, 2, 1);
-#define REFUSED(member, value) \
-    o = ssao_sat_defaults(); o.member = value; EXPECT_EQ(ssao_sat_create(&ao, 8, 8, &o), SAT_ERR_ARGUMENT); EXPECT(ao == NULL)
+#define REFUSED(member, value)                                                                                         \
+    o = ssao_sat_defaults();                                                                                           \
+    o.member = value;                                                                                                  \
+    EXPECT_EQ(ssao_sat_create(&ao, 8, 8, &o), SAT_ERR_ARGUMENT);                                                       \
+    EXPECT(ao == NULL)
     REFUSED(method, (ssao_sat_method)5);
     REFUSED(radius, -1);
     REFUSED(radius, no_number);
@@ -1359,7 +1406,8 @@ static void refused(ssao_sat_options o, const char *name)
     char text[160];
     ssao_sat *ao;
     EXPECT_EQ(ssao_sat_create(&ao, 16, 16, &o), SAT_ERR_ARGUMENT);
-    if (!EXPECT(strstr(ssao_sat_explain(text, sizeof text, 16, 16, &o), name) == text)) printf("    %s: \"%s\"\n", name, text);
+    if (!EXPECT(strstr(ssao_sat_explain(text, sizeof text, 16, 16, &o), name) == text))
+        printf("    %s: \"%s\"\n", name, text);
 }
 
 TEST(every_option_is_checked_and_named)
@@ -1495,7 +1543,8 @@ TEST(shading_helpers)
     EXPECT_NEAR(ssao_sat_multi_bounce(1, 0.8f), 1, 0.01);
     EXPECT_NEAR(ssao_sat_multi_bounce(0, 0.8f), 0, 0);
     for (v = 0; v <= 1; v += 0.05f) { /* never darker, lighter with albedo */
-        EXPECT(ssao_sat_multi_bounce(v, 0) >= v && ssao_sat_multi_bounce(v, 0.9f) >= ssao_sat_multi_bounce(v, 0.3f) - 0.02f);
+        EXPECT(ssao_sat_multi_bounce(v, 0) >= v &&
+               ssao_sat_multi_bounce(v, 0.9f) >= ssao_sat_multi_bounce(v, 0.3f) - 0.02f);
         EXPECT(ssao_sat_specular(v, 0.9f, 0.5f) >= last - 1e-5f);
         last = ssao_sat_specular(v, 0.9f, 0.5f);
         EXPECT(last >= 0 && last <= 1);

@@ -1,4 +1,5 @@
-/* ssao_sat.h on the GPU: equal to the C code, state left alone, errors. Needs OSMesa (or a GPU, see gl_context.h); skips without. */
+/* ssao_sat.h on the GPU: equal to the C code, state left alone, errors. Needs OSMesa (or a GPU, see gl_context.h);
+   skips without. */
 
 #include "gl_es.h"
 
@@ -10,7 +11,8 @@ static sat__gl test_f;
 static int open_gl(void)
 {
     static int state;
-    if (state == 0) state = gl_context_open(&test_gl, 3, 3) && sat__gl_open(&test_f, test_gl.get_proc) == SAT_OK ? 1 : -1;
+    if (state == 0)
+        state = gl_context_open(&test_gl, 3, 3) && sat__gl_open(&test_f, test_gl.get_proc) == SAT_OK ? 1 : -1;
     return state > 0;
 }
 
@@ -52,7 +54,8 @@ static sat_result run_c(float *out, const ssao_sat_input *in, const ssao_sat_opt
     return r;
 }
 
-static void compare(const ref_picture *p, ssao_sat_options o, ref_convention convention, int with_normals, double tolerance)
+static void compare(const ref_picture *p, ssao_sat_options o, ref_convention convention, int with_normals,
+                    double tolerance)
 {
     static float depth[GL_WIDTH * GL_HEIGHT], a[GL_WIDTH * GL_HEIGHT], b[GL_WIDTH * GL_HEIGHT];
     ssao_sat_input in = ref_input(p, convention, depth);
@@ -86,7 +89,9 @@ TEST(gpu_equals_c)
             o.method = (ssao_sat_method)m;
             o.radius = 0.3;
             o.half_resolution = (m + orthographic) % 2 == 0;
-            compare(&p, o, REF_LINEAR, 1, m == SSAO_SAT_REFINED ? 0.01 : 2e-3); /* refined: a child on its parent's edge falls to either side */
+            compare(&p, o, REF_LINEAR, 1,
+                    m == SSAO_SAT_REFINED ? 0.01
+                                          : 2e-3); /* refined: a child on its parent's edge falls to either side */
         }
         ref_free(&p);
     }
@@ -153,8 +158,10 @@ TEST(gpu_gets_its_radius_0)
 TEST(gpu_state_is_restored)
 {
     static float z[GL_WIDTH * GL_HEIGHT], out[GL_WIDTH * GL_HEIGHT];
-    static const unsigned names[] = {SAT__GL_CURRENT_PROGRAM, SAT__GL_VERTEX_ARRAY_BINDING, SAT__GL_DRAW_FRAMEBUFFER_BINDING, SAT__GL_READ_FRAMEBUFFER_BINDING,
-                                     SAT__GL_ACTIVE_TEXTURE, SAT__GL_TEXTURE_BINDING_2D, SAT__GL_UNPACK_ALIGNMENT, SAT__GL_DEPTH_FUNC};
+    static const unsigned names[] = {SAT__GL_CURRENT_PROGRAM,          SAT__GL_VERTEX_ARRAY_BINDING,
+                                     SAT__GL_DRAW_FRAMEBUFFER_BINDING, SAT__GL_READ_FRAMEBUFFER_BINDING,
+                                     SAT__GL_ACTIVE_TEXTURE,           SAT__GL_TEXTURE_BINDING_2D,
+                                     SAT__GL_UNPACK_ALIGNMENT,         SAT__GL_DEPTH_FUNC};
     int before[16], after[16], viewport[2][4], i, k;
     ssao_sat_input in = ssao_sat_input_linear(z, GL_WIDTH, GL_HEIGHT, 1);
     ssao_sat_gl *gl = NULL;
@@ -193,7 +200,10 @@ TEST(gpu_state_is_restored)
 }
 
 static const char *hidden;
-static sat_gl_proc hiding_get_proc(const char *name) { return hidden && strcmp(name, hidden) == 0 ? NULL : test_gl.get_proc(name); }
+static sat_gl_proc hiding_get_proc(const char *name)
+{
+    return hidden && strcmp(name, hidden) == 0 ? NULL : test_gl.get_proc(name);
+}
 
 TEST(gpu_errors_have_names)
 {

@@ -121,7 +121,8 @@ TEST(gl_context_opens_or_names_the_package)
 {
     gl_context gl;
     if (!gl_context_open(&gl, 3, 3)) {
-        EXPECT(strstr(gl.message, "libosmesa6") || strstr(gl.message, "EGL") || strstr(gl.message, "LIGHTSCAN_GL=none"));
+        EXPECT(strstr(gl.message, "libosmesa6") || strstr(gl.message, "EGL") ||
+               strstr(gl.message, "LIGHTSCAN_GL=none"));
         SKIP(gl.message);
     }
     EXPECT(gl.get_proc("glDrawArrays") != NULL);

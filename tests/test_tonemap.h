@@ -1,4 +1,5 @@
-/* Tests of tonemap.h. The implementation is in this file's translation unit, so that private functions can be called. */
+/* Tests of tonemap.h. The implementation is in this file's translation unit, so that private functions can be
+   called. */
 
 #include "support.h"
 #include "reference_tonemap.h"
@@ -53,7 +54,9 @@ static float *room_pixels(int width, int height, uint64_t seed)
             if (u < 0.3 && v > 0.6) light = 0.01 * (1 + (x / 3 + y / 3) % 2 * 2);
             if ((x - width / 2) * (x - width / 2) + (y - height / 2) * (y - height / 2) < 30) light = 5000;
             light *= 1 + 0.04 * (support_uniform(&seed) - 0.5);
-            for (c = 0; c < 3; ++c) p[3 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c] = (float)(light * (1 + 0.4 * sin(5 * u + 2 * c + 3 * v)));
+            for (c = 0; c < 3; ++c)
+                p[3 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c] =
+                    (float)(light * (1 + 0.4 * sin(5 * u + 2 * c + 3 * v)));
         }
     return p;
 }
@@ -274,7 +277,12 @@ static void check_local(int width, int height, int scales, double epsilon)
 }
 
 TEST(local_operator_is_eq_A4_to_A9) { check_local(150, 131, 8, 0.05); }
-TEST(local_operator_with_fewer_scales) { check_local(90, 77, 4, 0.05); check_local(40, 30, 1, 0.05); check_local(40, 30, 2, 0.05); }
+TEST(local_operator_with_fewer_scales)
+{
+    check_local(90, 77, 4, 0.05);
+    check_local(40, 30, 1, 0.05);
+    check_local(40, 30, 2, 0.05);
+}
 TEST(local_operator_on_small_and_thin_pictures)
 {
     int sizes[][2] = {{1, 1}, {1, 90}, {90, 1}, {2, 3}, {15, 16}, {16, 15}, {17, 33}, {41, 41}, {42, 20}, {3, 200}}, i;
@@ -307,7 +315,8 @@ TEST(vector_and_plain_code_give_the_same_bits)
             const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
             memset(scale, 0, sizeof scale);
             if (y == 0) memset(tonemap__ring_row(map, w, 0), 0, (size_t)map->ring_row * 4);
-            for (j = y == 0 ? 0 : y + map->frame.reach; j < H && j <= y + map->frame.reach; ++j) tonemap__add_ring_row(map, w, j);
+            for (j = y == 0 ? 0 : y + map->frame.reach; j < H && j <= y + map->frame.reach; ++j)
+                tonemap__add_ring_row(map, w, j);
             tonemap__open_window(&window, map, w, y);
             scale[0][0] = W;
             if (kind == 0) tonemap__search_vector(w->local, luminance, &window, &map->frame, scale[0], 0, W);
@@ -428,7 +437,8 @@ TEST(a_bad_pixel_stays_in_its_window)
             centre[0] = bad[i];
             centre[1] = centre[2] = i < 3 ? 1 : bad[i];
             s = shoot(&view, &o);
-            /* -1 in red alone leaves a positive luminance; that and 1e8 are light, and move the log-average by less than a code */
+            /* -1 in red alone leaves a positive luminance; that and 1e8 are light, and move the log-average by less
+               than a code */
             EXPECT_NEAR(worst_outside(clean.u8, s.u8, W, H), 0, i == 1 || i == 5);
             for (c = 0; c < 3; ++c) { /* unusable pixels show the mean of those around them */
                 int shown = s.u8[3 * (H / 2 * W + W / 2) + c], sum = -shown, u, v;
@@ -497,7 +507,8 @@ TEST(black_is_black_and_constant_is_the_key)
             shot_free(&s);
             for (i = 0; i < W * H * 3; ++i) pixels[i] = 0.037f;
             s = shoot(&view, &o);
-            expected = operation >= 2 || automatic ? 0.18 : 0.18 / 1.18; /* with the estimated white of 1 the curve is a line */
+            expected = operation >= 2 || automatic ? 0.18 : 0.18 / 1.18; /* with the estimated white of 1 the curve is a
+                                                                            line */
             for (i = 0; i < W * H * 3; i += 31) EXPECT_REL(s.f32[i], expected, operation == 0 ? 2e-4 : 1e-5);
             shot_free(&s);
             o.metering = TONEMAP_METERING_PERCENTILES; /* to half a step of 1/64 octave */
@@ -516,13 +527,15 @@ TEST(fourteen_decades_and_one_hot_pixels)
     shot s = shoot(&view, NULL);
     int y, rising = 0;
     EXPECT_NEAR(log10(s.stats.high / s.stats.low), 12.9, 0.5);
-    for (y = 8; y < H; ++y) rising += s.u8[3 * (y * W + 100) + 1] > s.u8[3 * ((y - 8) * W + 100) + 1] + 12; /* brightness falls downwards */
+    for (y = 8; y < H; ++y)
+        rising += s.u8[3 * (y * W + 100) + 1] > s.u8[3 * ((y - 8) * W + 100) + 1] + 12; /* brightness falls downwards */
     EXPECT_EQ(rising, 0);
     shot_free(&s);
     for (y = 0; y < W * H * 3; ++y) pixels[y] = 0;
     for (y = 0; y < 3; ++y) pixels[3 * (100 * W + 50) + y] = 1e8f;
     s = shoot(&view, NULL);
-    EXPECT(s.f32[3 * (100 * W + 50) + 1] > 0.15f && s.f32[3 * (100 * W + 50) + 1] <= 0.18f); /* the only light there is: the key */
+    EXPECT(s.f32[3 * (100 * W + 50) + 1] > 0.15f &&
+           s.f32[3 * (100 * W + 50) + 1] <= 0.18f); /* the only light there is: the key */
     EXPECT(s.f32[3 * (100 * W + 51)] == 0);
     shot_free(&s);
     free(pixels);
@@ -741,8 +754,10 @@ TEST(tile_ranges_hold_every_box_mean)
             for (x = 0; x < W; ++x) {
                 tonemap__range r = map->tile_range[y / 8 * map->tiles_x + x / 8];
                 for (ty = y / 8 - 3; ty <= y / 8 + 3; ++ty)
-                    if (ty >= 0 && ty < map->tiles_y) tonemap__merge_range(&r, &map->tile_reached[ty * map->tiles_x + x / 8]);
-                outside += mean[y * W + x] < (double)r.low * (1 - 1e-6) || mean[y * W + x] > (double)r.high * (1 + 1e-6);
+                    if (ty >= 0 && ty < map->tiles_y)
+                        tonemap__merge_range(&r, &map->tile_reached[ty * map->tiles_x + x / 8]);
+                outside +=
+                    mean[y * W + x] < (double)r.low * (1 - 1e-6) || mean[y * W + x] > (double)r.high * (1 + 1e-6);
             }
     }
     EXPECT_EQ(outside, 0);
@@ -785,7 +800,12 @@ TEST(selective_searches_only_edges)
             int i, j;
             for (j = -1; j <= 1; ++j)
                 for (i = -1; i <= 1; ++i) {
-                    int px = x + i < 0 ? 0 : x + i >= W ? W - 1 : x + i, py = y + j < 0 ? 0 : y + j >= H ? H - 1 : y + j;
+                    int px = x + i < 0    ? 0
+                             : x + i >= W ? W - 1
+                                          : x + i,
+                        py = y + j < 0    ? 0
+                             : y + j >= H ? H - 1
+                                          : y + j;
                     double v = 0.18 / average * lr[py * W + px];
                     g[0] += i * (2 - abs(j)) * v;
                     g[1] += j * (2 - abs(i)) * v;
@@ -793,7 +813,8 @@ TEST(selective_searches_only_edges)
             size = hypot(g[0], g[1]);
             marked += size > 0.1;
             if (fabs(size - 0.1) < 1e-4) continue;
-            wrong += memcmp(selective.f32 + 3 * (y * W + x), (size > 0.1 ? full : global).f32 + 3 * (y * W + x), 12) != 0;
+            wrong +=
+                memcmp(selective.f32 + 3 * (y * W + x), (size > 0.1 ? full : global).f32 + 3 * (y * W + x), 12) != 0;
         }
     EXPECT_EQ(wrong, 0);
     EXPECT(marked > 100 && marked < W * H - 100);
@@ -854,7 +875,8 @@ TEST(mesopic_filter_is_eq_A10_to_A14)
     check_mesopic(TONEMAP_MESOPIC_LOCAL, 0.5);
     check_mesopic(TONEMAP_MESOPIC_LOCAL, 8);
     EXPECT_NEAR(tonemap__rho(0), 22.0 / 57, 2e-3);
-    for (lux = 1e-9; lux < 20; lux *= 1.1) EXPECT_NEAR(tonemap__rho((float)lux), reference_rho(lux), lux > 1e-6 ? 1e-3 : 2e-3);
+    for (lux = 1e-9; lux < 20; lux *= 1.1)
+        EXPECT_NEAR(tonemap__rho((float)lux), reference_rho(lux), lux > 1e-6 ? 1e-3 : 2e-3);
     EXPECT_NEAR(tonemap__rho(9.99f), 1, 2e-4);
     EXPECT(tonemap__rho(10) == 1 && tonemap__rho(FLT_MAX) == 1);
 }
@@ -966,7 +988,8 @@ static void check_ashikhmin(tonemap_operator operation, double cd)
         if (rounded[i] * 1048576 < 64) continue; /* the operator takes the pixel itself unrounded */
         tm = (reference_capacity(a * unit, 1) - c0) / (c1 - c0);
         reference_colour(rgb, pixels + 3 * i, (tm > 0 ? tm : 0) * luminance[i] / a, 1, 1);
-        for (k = 1, rgb[1] = rgb[1] < 0 ? 0 : rgb[1] > 1 ? 1 : rgb[1]; k < 2; ++k) off += fabs(rgb[k] - (double)s.f32[3 * i + k]) > 2e-3 * rgb[k] + 2e-4;
+        for (k = 1, rgb[1] = rgb[1] < 0 ? 0 : rgb[1] > 1 ? 1 : rgb[1]; k < 2; ++k)
+            off += fabs(rgb[k] - (double)s.f32[3 * i + k]) > 2e-3 * rgb[k] + 2e-4;
     }
     EXPECT(off <= N / 200);
     shot_free(&s);
@@ -1231,7 +1254,10 @@ TEST(every_option_is_checked_and_named)
 /* ---- colours beyond the display */
 
 /* Degrees of HSV hue. */
-static double hue_of(double r, double g, double b) { return atan2(sqrt(3.0) * (g - b), 2 * r - g - b) * 57.29577951308232; }
+static double hue_of(double r, double g, double b)
+{
+    return atan2(sqrt(3.0) * (g - b), 2 * r - g - b) * 57.29577951308232;
+}
 
 TEST(bright_colours_keep_their_hue)
 {
@@ -1258,7 +1284,8 @@ TEST(bright_colours_keep_their_hue)
             low = (double)q[2] < low ? (double)q[2] : low;
             outside += !(top <= 1 && low >= 0);
             if (top < 0.9999 || top - low < 0.02) continue; /* inside; or white, which has no hue */
-            off = fabs(hue_of((double)p[0], (double)p[1], (double)p[2]) - hue_of((double)q[0], (double)q[1], (double)q[2]));
+            off = fabs(hue_of((double)p[0], (double)p[1], (double)p[2]) -
+                       hue_of((double)q[0], (double)q[1], (double)q[2]));
             off = off > 180 ? 360 - off : off;
             if (k < 3) wrong += off > 1;
             else wrong_clipped += off > 15;
@@ -1553,7 +1580,9 @@ TEST(boxes_are_close_to_gaussians_on_photographs)
         reference_codes(a, scaled, la, n);
         for (k = 0; k < n; ++k) { /* luminance from green: the factor is the same for the three */
             float green = picture.pixels[3 * k + 1];
-            b[k] = s.f32[3 * k + 1] > 0 && s.f32[3 * k + 1] < 1 ? metrics_code((double)s.f32[3 * k + 1] / (double)green * scaled[k] * s.stats.adapted / 0.18) : a[k];
+            b[k] = s.f32[3 * k + 1] > 0 && s.f32[3 * k + 1] < 1
+                       ? metrics_code((double)s.f32[3 * k + 1] / (double)green * scaled[k] * s.stats.adapted / 0.18)
+                       : a[k];
         }
         ssim = metrics_ssim(a, b, picture.width, picture.height);
         REPORT(names[i], ssim, "SSIM of boxes against Gaussians");

@@ -66,20 +66,23 @@ static float *lit_pixels(int width, int height, int bad)
 }
 
 /* Shares of codes that differ by more than one, and the largest difference. */
-static void compare(screen *s, const tonemap_options *options, int width, int height, int bad, double most, const char *name)
+static void compare(screen *s, const tonemap_options *options, int width, int height, int bad, double most,
+                    const char *name)
 {
     float *pixels = lit_pixels(width, height, bad);
     sat_image view = sat_image_f32(pixels, width, height, 4);
     size_t n = (size_t)width * (size_t)height * 4, i;
     unsigned char *cpu = (unsigned char *)malloc(n), *gpu = (unsigned char *)malloc(n);
-    unsigned hdr = screen_texture(s, SAT__GL_RGBA32F, width, height, pixels), ldr = screen_texture(s, SAT__GL_RGBA8, width, height, NULL);
+    unsigned hdr = screen_texture(s, SAT__GL_RGBA32F, width, height, pixels),
+             ldr = screen_texture(s, SAT__GL_RGBA8, width, height, NULL);
     tonemap *map = NULL;
     tonemap_gl *gl = NULL;
     size_t over = 0, alpha = 0, any = 0;
     int largest = 0;
     EXPECT_EQ(tonemap_create(&map, width, height, options), SAT_OK);
     EXPECT_EQ(tonemap_apply_u8(map, cpu, (ptrdiff_t)width * 4, &view, 0, NULL), SAT_OK);
-    if (!EXPECT_EQ(tonemap_gl_create(&gl, s->context.get_proc, width, height, options), SAT_OK)) puts(tonemap_gl_message(gl));
+    if (!EXPECT_EQ(tonemap_gl_create(&gl, s->context.get_proc, width, height, options), SAT_OK))
+        puts(tonemap_gl_message(gl));
     EXPECT_EQ(tonemap_gl_apply(gl, ldr, hdr, 0), SAT_OK);
     screen_read(s, gpu, ldr, width, height);
     for (i = 0; i < n; ++i) {
@@ -165,8 +168,10 @@ TEST(gl_takes_every_corner_of_the_options)
                     sat__field_set(g, &o, b ? g->high : g->low);
                     EXPECT_EQ(tonemap_create(&map, 16, 16, &o), SAT_OK);
                     tonemap_destroy(map);
-                    if (++turn % 9 && o.scales > 1) continue; /* each costs eight programs: a ninth of them, and all with one scale */
-                    if (!EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, 16, 16, &o), SAT_OK)) puts(tonemap_gl_message(gl));
+                    if (++turn % 9 && o.scales > 1) continue; /* each costs eight programs: a ninth of them, and all
+                                                                 with one scale */
+                    if (!EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, 16, 16, &o), SAT_OK))
+                        puts(tonemap_gl_message(gl));
                     tonemap_gl_destroy(gl);
                 }
     {

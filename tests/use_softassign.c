@@ -15,5 +15,6 @@ int main(void)
     problem.columns = 3;
     problem.cost = cost;
     problem.stride = 3;
-    return softassign_solve(column_of_row, &problem, NULL, NULL) != SAT_OK || column_of_row[0] != 1 || column_of_row[1] != 0;
+    return softassign_solve(column_of_row, &problem, NULL, NULL) != SAT_OK || column_of_row[0] != 1 ||
+           column_of_row[1] != 0;
 }

@@ -7,13 +7,13 @@
        # table: Box sums against the exact ones           a title starts a table
        # plot: Error against time; x=time_ratio; y=error; by=kind; log=xy     any number of plots of this table
        # note: one sentence under the table
-       kind    size    time_ratio    error    default      the names of the columns, units in the name (_ms, _mb, _ratio)
+       kind    size    time_ratio    error    default   the names of the columns, units in the name (_ms, _mb, _ratio)
        tiled   64      1.02          3e-7     1            one row a configuration; default = 1 marks the default
        (an empty line, or the next title, ends the table)
 
    plot keys: x, y (columns); by (one colour per value of this column); where (only these rows, as in
-   where=picture:14 decades,radius:1); log (x, y or xy); style (points, lines or linespoints; points unless told); picture (the
-   name under which `make docs` keeps the plot for README.md).
+   where=picture:14 decades,radius:1); log (x, y or xy); style (points, lines or linespoints; points unless told);
+   picture (the name under which `make docs` keeps the plot for README.md).
    Times are ratios to a reference in the same run wherever the machine matters: bench_ratio runs A B A B ...
 
        bench_start("sat.h");
@@ -115,8 +115,8 @@ static inline void bench_row(const char *format, ...)
     fflush(stdout);
 }
 
-/* Seconds that this thread has computed: other programs on the machine count less than by the wall clock. Work that starts
-   threads must be timed by support_clock instead. */
+/* Seconds that this thread has computed: other programs on the machine count less than by the wall clock. Work that
+   starts threads must be timed by support_clock instead. */
 static inline double bench_clock(void)
 {
     struct timespec t;

@@ -76,7 +76,8 @@ static reference_mesh load(const char *name, const char **label)
 
 /* ---- environments: four maps and the thesis' two made ones ---- */
 
-static const char *const environment_names[ENVIRONMENTS] = {"forest", "city", "interior", "night", "1 point light", "2 area lights"};
+static const char *const environment_names[ENVIRONMENTS] = {"forest", "city",          "interior",
+                                                            "night",  "1 point light", "2 area lights"};
 
 static void make_lights(image *out, int kind)
 {
@@ -122,7 +123,8 @@ static int open_environment(bench *b, int kind)
 /* ---- brute force: rays to all lights above the horizon, the ball of the occluder as their only bound ---- */
 
 /* one point's rays: Embree's where it is, else our own in double */
-static void trace_rays(const bench *b, unsigned char *covered, const float *directions, size_t count, const float *point, const unsigned char *wanted)
+static void trace_rays(const bench *b, unsigned char *covered, const float *directions, size_t count,
+                       const float *point, const unsigned char *wanted)
 {
 #ifdef HAVE_EMBREE
     reference_trace(covered, &b->scene, directions, count, point, wanted);
@@ -136,7 +138,8 @@ static void trace_rays(const bench *b, unsigned char *covered, const float *dire
 #endif
 }
 
-static void trace_point(unsigned char *covered, const bench *b, const float *directions, size_t count, const float *point)
+static void trace_point(unsigned char *covered, const bench *b, const float *directions, size_t count,
+                        const float *point)
 {
     float axis[3], square = fiv__dot(point, point), limit = square > 1 ? sqrtf(square - 1) / sqrtf(square) : -2;
     static unsigned char wanted[FIV_MAX_LIGHTS + 6 * 64 * 64];
@@ -160,7 +163,8 @@ static void plane_truth(bench *b, int trace)
         if (split) trace_point(lights, b, b->directions, split, b->points + 3 * n);
         for (i = 0; i < b->lights; i++)
             if (b->directions[3 * i + 1] > 0 && !(i < split ? lights[i] : covered[i - split]))
-                for (k = 0; k < 3; k++) sum[k] += (double)b->powers[3 * i + (size_t)k] * (double)b->directions[3 * i + 1];
+                for (k = 0; k < 3; k++)
+                    sum[k] += (double)b->powers[3 * i + (size_t)k] * (double)b->directions[3 * i + 1];
         for (k = 0; k < 3; k++) b->truth[3 * n + (size_t)k] = (float)sum[k];
     }
     if (trace) b->brute_seconds = seconds_used() - start;
@@ -174,7 +178,9 @@ static void open_plane(bench *b, int side)
     fiv_occluder_options o = fiv_occluder_defaults();
     fiv_occluder *probe;
     o.keep_masks = 0, o.lazy = 1;
-    check(fiv_occluder_create(&probe, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o, &b->stats), "probe");
+    check(fiv_occluder_create(&probe, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o,
+                              &b->stats),
+          "probe");
     fiv_occluder_destroy(probe);
     for (k = 0; k < 3; k++) zero[k] = -b->stats.centre[k] / b->stats.radius;
     memset(&b->scene, 0, sizeof b->scene);
@@ -210,7 +216,8 @@ static fiv_instance instance_of(const bench *b, const fiv_occluder *o)
     return i;
 }
 
-static fiv_occluder *make(const bench *b, int theta, int phi, int rho, fiv_storage storage, int lights, double *seconds, fiv_occluder_stats *stats)
+static fiv_occluder *make(const bench *b, int theta, int phi, int rho, fiv_storage storage, int lights, double *seconds,
+                          fiv_occluder_stats *stats)
 {
     fiv_occluder_options o = fiv_occluder_defaults();
     fiv_occluder *out;
@@ -218,7 +225,8 @@ static fiv_occluder *make(const bench *b, int theta, int phi, int rho, fiv_stora
     o.theta = theta, o.phi = phi, o.rho = rho;
     o.storage = storage;
     o.max_lights = lights;
-    check(fiv_occluder_create(&out, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o, stats), "occluder");
+    check(fiv_occluder_create(&out, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o, stats),
+          "occluder");
     *seconds = seconds_used() - start;
     return out;
 }
@@ -230,8 +238,9 @@ typedef struct run { bench *b; const fiv_instance *instances; size_t count; fiv_
 static void run_once(void *user)
 {
     run *r = (run *)user;
-    check(fiv_irradiance(r->b->rgb, r->b->points, r->b->normals, (size_t)(r->b->side * r->b->side), r->b->environment, r->instances,
-                         r->count, &r->options, NULL), "irradiance");
+    check(fiv_irradiance(r->b->rgb, r->b->points, r->b->normals, (size_t)(r->b->side * r->b->side), r->b->environment,
+                         r->instances, r->count, &r->options, NULL),
+          "irradiance");
 }
 
 static const struct { const char *name; fiv_accuracy accuracy; int partial, overlap; } steps[5] = {
@@ -257,7 +266,8 @@ static void ladder(bench *b)
     fiv_occluder_stats stats[4];
     double precompute[4];
     double pixels = b->side * b->side;
-    for (s = 0; s < count; s++) o[s] = make(b, sets[s][0], sets[s][1], sets[s][2], FIV_STORAGE_FLOAT, 8, &precompute[s], &stats[s]);
+    for (s = 0; s < count; s++)
+        o[s] = make(b, sets[s][0], sets[s][1], sets[s][2], FIV_STORAGE_FLOAT, 8, &precompute[s], &stats[s]);
     bench_table("A plane below the mesh: accuracy, samples and environments (figures 18 and 19; published 0.023, 0.008, 0.007; point 0.1)",
                 "mesh\tenvironment\tsamples\taccuracy\tnrmse\tpoint_us\tbrute_ratio\tprecompute_s\tvectors_mb\tmasks_mb\tdefault");
     bench_plot("Forest: error against time; x=point_us; y=nrmse; by=accuracy; where=environment:forest; log=xy; picture=plot_fiv");
@@ -274,8 +284,9 @@ static void ladder(bench *b)
             check(fiv_occluder_light(o[s], b->environment, NULL), "light");
             for (a = 0; a < 5; a++) {
                 double seconds, error = error_of(&r, a, &seconds);
-                bench_row("%s\t%s\t%dx%dx%d\t%s\t%.4f\t%.3f\t%.0f\t%.2f\t%.2f\t%.2f\t%d", b->mesh_name, environment_names[e], sets[s][0],
-                          sets[s][1], sets[s][2], steps[a].name, error, 1e6 * seconds / pixels, b->brute_seconds / seconds, precompute[s],
+                bench_row("%s\t%s\t%dx%dx%d\t%s\t%.4f\t%.3f\t%.0f\t%.2f\t%.2f\t%.2f\t%d", b->mesh_name,
+                          environment_names[e], sets[s][0], sets[s][1], sets[s][2], steps[a].name, error,
+                          1e6 * seconds / pixels, b->brute_seconds / seconds, precompute[s],
                           1e-6 * (double)stats[s].table_bytes, 1e-6 * (double)stats[s].mask_bytes, s == 0 && a == 3);
             }
         }
@@ -287,8 +298,14 @@ static void ladder(bench *b)
 
 static void table_2(bench *b)
 {
-    static const struct { int set[3]; double minutes, mb; } rows[5] = {{{256, 129, 30}, 397, 34.0}, {{128, 65, 30}, 99, 8.56},
-        {{64, 33, 30}, 24, 2.17}, {{64, 33, 15}, 12, 1.08}, {{32, 17, 15}, 3, 0.28}};
+    static const struct {
+        int set[3];
+        double minutes, mb;
+    } rows[5] = {{{256, 129, 30}, 397, 34.0},
+                 {{128, 65, 30}, 99, 8.56},
+                 {{64, 33, 30}, 24, 2.17},
+                 {{64, 33, 15}, 12, 1.08},
+                 {{32, 17, 15}, 3, 0.28}};
     int i, first = getenv("FULL") ? 0 : bench_quick() ? 4 : 2;
     bench_table("Table 2: precompute and memory of one occluder (published: bunny of 36k vertices on a Core 2 Duo)",
                 "mesh\tsamples\tpublished_min\tprecompute_s\tus_a_mask\tpublished_mb\tvectors_mb\tmasks_mb\trelight_ms\trelight_ratio\thalf_octahedral_mb");
@@ -306,9 +323,10 @@ static void table_2(bench *b)
             relight[k] = seconds_used() - start;
         }
         start = support_median(relight, 5);
-        bench_row("%s\t%dx%dx%d\t%.0f\t%.2f\t%.0f\t%.2f\t%.2f\t%.2f\t%.1f\t%.0f\t%.3f", b->mesh_name, s[0], s[1], s[2], rows[i].minutes, seconds,
-                  1e6 * seconds / (double)stats.rasterised, rows[i].mb, 36e-6 * (double)stats.samples, 1e-6 * (double)stats.mask_bytes,
-                  1e3 * start, seconds / start, 20e-6 * side * side * s[2]);
+        bench_row("%s\t%dx%dx%d\t%.0f\t%.2f\t%.0f\t%.2f\t%.2f\t%.2f\t%.1f\t%.0f\t%.3f", b->mesh_name, s[0], s[1], s[2],
+                  rows[i].minutes, seconds, 1e6 * seconds / (double)stats.rasterised, rows[i].mb,
+                  36e-6 * (double)stats.samples, 1e-6 * (double)stats.mask_bytes, 1e3 * start, seconds / start,
+                  20e-6 * side * side * s[2]);
         fiv_occluder_destroy(o);
     }
 }
@@ -339,7 +357,9 @@ static void masks(void)
         b.mesh = load(names[i], &b.mesh_name);
         open_plane(&b, 1);
         o.keep_masks = 0, o.lazy = 1;
-        check(fiv_occluder_create(&lazy, b.mesh.positions, b.mesh.vertices, b.mesh.indices, b.mesh.triangles, &o, &b.stats), "occluder");
+        check(fiv_occluder_create(&lazy, b.mesh.positions, b.mesh.vertices, b.mesh.indices, b.mesh.triangles, &o,
+                                  &b.stats),
+              "occluder");
         open_environment(&b, 4);
         for (s = 7; s < lazy->stats.samples && n < 400; s += lazy->stats.samples / 400) {
             uint64_t rows[FIV__MAX_ROWS];
@@ -366,8 +386,9 @@ static void masks(void)
                 wrong += bit != covered[k];
             }
         }
-        bench_row("%s\t%lu\t%d\t%.0f\t%s\t%s\t%ld\t%.5f", b.mesh_name, (unsigned long)b.stats.triangles, b.stats.closed, 1e6 * mine / (double)n,
-                  bench_cell(1e6 * theirs / (double)n, 3, embree), bench_cell(mine / theirs, 3, embree), set, 100.0 * (double)wrong / (double)set);
+        bench_row("%s\t%lu\t%d\t%.0f\t%s\t%s\t%ld\t%.5f", b.mesh_name, (unsigned long)b.stats.triangles, b.stats.closed,
+                  1e6 * mine / (double)n, bench_cell(1e6 * theirs / (double)n, 3, embree),
+                  bench_cell(mine / theirs, 3, embree), set, 100.0 * (double)wrong / (double)set);
         fiv_occluder_destroy(lazy);
         fiv_environment_destroy(b.environment);
         reference_free(&b.scene);
@@ -388,9 +409,11 @@ static void two_occluders(bench *b)
     two.environment = NULL, two.directions = two.powers = NULL;
     memset(&two.scene, 0, sizeof two.scene);
     for (k = 0; k < 3; k++) position[k] = -b->stats.centre[k] / b->stats.radius;
-    reference_add(&two.scene, b->mesh.positions, b->mesh.indices, b->mesh.triangles, NULL, position, 1 / b->stats.radius);
+    reference_add(&two.scene, b->mesh.positions, b->mesh.indices, b->mesh.triangles, NULL, position,
+                  1 / b->stats.radius);
     for (k = 0; k < 3; k++) position[k] += second[k];
-    reference_add(&two.scene, b->mesh.positions, b->mesh.indices, b->mesh.triangles, NULL, position, 1 / b->stats.radius);
+    reference_add(&two.scene, b->mesh.positions, b->mesh.indices, b->mesh.triangles, NULL, position,
+                  1 / b->stats.radius);
     reference_build(&two.scene);
 #ifdef HAVE_EMBREE
     reference_build_embree(&two.scene);
@@ -413,7 +436,8 @@ static void two_occluders(bench *b)
                     if (i >= split) two.covered[n * 6144 + i - split] = (unsigned char)hit;
                     if (hit) continue;
                 } else if (two.covered[n * 6144 + i - split]) continue;
-                for (k = 0; k < 3; k++) sum[k] += (double)two.powers[3 * i + (size_t)k] * (double)two.directions[3 * i + 1];
+                for (k = 0; k < 3; k++)
+                    sum[k] += (double)two.powers[3 * i + (size_t)k] * (double)two.directions[3 * i + 1];
             }
             for (k = 0; k < 3; k++) two.truth[3 * n + (size_t)k] = (float)sum[k];
         }
@@ -508,7 +532,8 @@ static void storage(bench *b)
         for (kind = 0; kind < 2; kind++) {
             double seconds, error;
             fiv_occluder_stats stats;
-            fiv_occluder *o = make(b, sets[s][0], sets[s][1], sets[s][2], (fiv_storage)kind, fiv_environment_get_stats(b->environment).lights, &seconds, &stats);
+            fiv_occluder *o = make(b, sets[s][0], sets[s][1], sets[s][2], (fiv_storage)kind,
+                                   fiv_environment_get_stats(b->environment).lights, &seconds, &stats);
             fiv_instance instance = instance_of(b, o);
             double published = 36.0 * sets[s][0] * sets[s][1] * sets[s][2];
             size_t bytes = stats.table_bytes - stats.samples * (size_t)fiv_environment_get_stats(b->environment).lights;
@@ -517,21 +542,24 @@ static void storage(bench *b)
             check(fiv_occluder_light(o, b->environment, NULL), "light");
             error = error_of(&r, 3, &seconds);
             if (!kind) first = error;
-            bench_row("%s\t%dx%dx%d\t%s\t%.4f\t%.3f\t%.3f\t%.3f\t%.2f", b->mesh_name, sets[s][0], sets[s][1], sets[s][2], kind ? "half octahedral" : "float",
-                      error, 1e6 * seconds / (b->side * b->side), 1e-6 * (double)bytes, (double)bytes / published, error / first);
+            bench_row("%s\t%dx%dx%d\t%s\t%.4f\t%.3f\t%.3f\t%.3f\t%.2f", b->mesh_name, sets[s][0], sets[s][1],
+                      sets[s][2], kind ? "half octahedral" : "float", error, 1e6 * seconds / (b->side * b->side),
+                      1e-6 * (double)bytes, (double)bytes / published, error / first);
             fiv_occluder_destroy(o);
         }
     }
     bench_note("vectors alone; a split-off light adds one byte a sample.");
 }
 
-/* ---- tables 17 and 18: what tone mapping leaves of the error. The share of pixels more than 2 of 255 apart stands in for the
-   thesis' VDP; before: at the exposure that shows the brightest pixel as white. ---- */
+/* ---- tables 17 and 18: what tone mapping leaves of the error. The share of pixels more than 2 of 255 apart stands in
+   for the thesis' VDP; before: at the exposure that shows the brightest pixel as white. ---- */
 
 static double different(const unsigned char *a, const unsigned char *b, size_t n)
 {
     size_t i, count = 0;
-    for (i = 0; i < n; i++) count += abs(a[3 * i] - b[3 * i]) > 2 || abs(a[3 * i + 1] - b[3 * i + 1]) > 2 || abs(a[3 * i + 2] - b[3 * i + 2]) > 2;
+    for (i = 0; i < n; i++)
+        count += abs(a[3 * i] - b[3 * i]) > 2 || abs(a[3 * i + 1] - b[3 * i + 1]) > 2 ||
+                 abs(a[3 * i + 2] - b[3 * i + 2]) > 2;
     return 100.0 * (double)count / (double)n;
 }
 
@@ -559,7 +587,10 @@ static void compare_row(bench *b, const char *what, const char *set, double publ
 
 static void tables_17_18(bench *b)
 {
-    static const struct { int set[3]; double before, after; } rows[3] = {{{32, 17, 15}, 5.94, 2.59}, {{64, 33, 30}, 0.20, 0.32}, {{256, 129, 30}, 0.13, 0.20}};
+    static const struct {
+        int set[3];
+        double before, after;
+    } rows[3] = {{{32, 17, 15}, 5.94, 2.59}, {{64, 33, 30}, 0.20, 0.32}, {{256, 129, 30}, 0.13, 0.20}};
     static const double published[ENVIRONMENTS][2] = {{11.42, 8.31}, {0, 0}, {0, 0}, {0, 0}, {1.70, 1.70}, {0, 0}};
     int i, e, last = getenv("FULL") ? 2 : bench_quick() ? 0 : 1;
     char set[32];
@@ -579,7 +610,8 @@ static void tables_17_18(bench *b)
             if (e) open_environment(b, e), plane_truth(b, 0);
             check(fiv_occluder_light(o, b->environment, NULL), "light");
             error_of(&r, 3, NULL);
-            compare_row(b, environment_names[e], set, e ? published[e][0] : rows[i].before, e ? published[e][1] : rows[i].after);
+            compare_row(b, environment_names[e], set, e ? published[e][0] : rows[i].before,
+                        e ? published[e][1] : rows[i].after);
         }
         fiv_occluder_destroy(o);
     }
@@ -613,7 +645,9 @@ static void many_occluders(bench *b)
         r.count = (size_t)counts[i];
         r.options = fiv_irradiance_defaults();
         some = median_time(run_once, &r, bench_rounds(5));
-        check(fiv_irradiance(b->rgb, b->points, b->normals, (size_t)(b->side * b->side), b->environment, instances, r.count, &r.options, &stats), "irradiance");
+        check(fiv_irradiance(b->rgb, b->points, b->normals, (size_t)(b->side * b->side), b->environment, instances,
+                             r.count, &r.options, &stats),
+              "irradiance");
         r.options.cutoff = 0;
         all = median_time(run_once, &r, bench_rounds(5));
         bench_row("%d\t%.0f\t%.3f\t%.3f\t%.1f", counts[i], fps[i], 1e6 * some / (b->side * b->side), 1e6 * all / (b->side * b->side),
@@ -636,21 +670,27 @@ static void resting_row(bench *b, const char *light, int big, double gap)
     if (big) o.theta = 64, o.phi = 33, o.rho = 30;
     for (own = 0; own < 2; own++) {
         o.keep_mesh = own;
-        check(fiv_occluder_create(&occluder, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o, NULL), "occluder");
+        check(fiv_occluder_create(&occluder, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles,
+                                  &o, NULL),
+              "occluder");
         check(fiv_occluder_light(occluder, b->environment, NULL), "light");
         instance = instance_of(b, occluder);
         r.b = b, r.instances = &instance, r.count = 1;
         error[own] = error_of(&r, 3, &seconds[own]);
-        check(fiv_irradiance(b->rgb, b->points, b->normals, (size_t)points, b->environment, &instance, 1, &r.options, &stats), "irradiance");
+        check(fiv_irradiance(b->rgb, b->points, b->normals, (size_t)points, b->environment, &instance, 1, &r.options,
+                             &stats),
+              "irradiance");
         fiv_occluder_destroy(occluder);
     }
-    bench_row("%s\t%s\t%.3f\t%dx%dx%d\t%.4f\t%.4f\t%.3f\t%.2f\t%.1f\t%.1f", b->mesh_name, light, gap, o.theta, o.phi, o.rho, error[0], error[1],
-              1e6 * seconds[0] / points, 1e6 * seconds[1] / points, 100 * (double)stats.own_masks / points, 100 * (double)stats.rays / points);
+    bench_row("%s\t%s\t%.3f\t%dx%dx%d\t%.4f\t%.4f\t%.3f\t%.2f\t%.1f\t%.1f", b->mesh_name, light, gap, o.theta, o.phi,
+              o.rho, error[0], error[1], 1e6 * seconds[0] / points, 1e6 * seconds[1] / points,
+              100 * (double)stats.own_masks / points, 100 * (double)stats.rays / points);
 }
 
 static void resting(int side)
 {
-    static const char *const names[5] = {"box", "mesh/queen.ply", "mesh/fandisk.ply", "mesh/bunny_small.ply", "mesh/dragon_res4.ply"};
+    static const char *const names[5] = {"box", "mesh/queen.ply", "mesh/fandisk.ply", "mesh/bunny_small.ply",
+                                         "mesh/dragon_res4.ply"};
     static const double gaps[2] = {0, 0.002};
     static const int lights[2] = {0, 4};
     int i, g, l, big, last = bench_smoke() ? 1 : 5;
@@ -673,7 +713,8 @@ static void resting(int side)
                 }
                 if (!open_environment(&b, lights[l])) continue;
                 plane_truth(&b, 1);
-                for (big = 0; big < (bench_quick() ? 1 : 2); big++) resting_row(&b, environment_names[lights[l]], big, gaps[g]);
+                for (big = 0; big < (bench_quick() ? 1 : 2); big++)
+                    resting_row(&b, environment_names[lights[l]], big, gaps[g]);
             }
         reference_free(&b.scene);
         reference_mesh_free(&b.mesh);

@@ -79,8 +79,14 @@ static void time_single(void *user)
         d[0] = v->direction[0][i]; d[1] = v->direction[1][i]; d[2] = v->direction[2][i];
         p[0] = v->offset[0][i]; p[1] = v->offset[1][i]; p[2] = v->offset[2][i];
         raindrop_trace(&ray, d, p, v->one_minus_b2[i], RAINDROP_WATER);
-        v->out[0][i] = ray.reflect[0]; v->out[1][i] = ray.reflect[1]; v->out[2][i] = ray.reflect[2]; v->out[6][i] = ray.fresnel;
-        v->out[3][i] = ray.refract[0]; v->out[4][i] = ray.refract[1]; v->out[5][i] = ray.refract[2]; v->out[7][i] = ray.transmit;
+        v->out[0][i] = ray.reflect[0];
+        v->out[1][i] = ray.reflect[1];
+        v->out[2][i] = ray.reflect[2];
+        v->out[6][i] = ray.fresnel;
+        v->out[3][i] = ray.refract[0];
+        v->out[4][i] = ray.refract[1];
+        v->out[5][i] = ray.refract[2];
+        v->out[7][i] = ray.transmit;
     }
 }
 
@@ -156,7 +162,8 @@ static void bench_vectors(void)
 
 static raindrop_drop drop_of(double size, double slope_x, double slope_y)
 {
-    double focal = 0.5 * SIZE, r = size / 2, distance = sqrt(1 + focal * focal / (r * r)), scale = distance / sqrt(1 + slope_x * slope_x + slope_y * slope_y);
+    double focal = 0.5 * SIZE, r = size / 2, distance = sqrt(1 + focal * focal / (r * r)),
+           scale = distance / sqrt(1 + slope_x * slope_x + slope_y * slope_y);
     raindrop_drop d;
     memset(&d, 0, sizeof d);
     d.position[0] = (float)(slope_x * scale);
@@ -166,16 +173,25 @@ static raindrop_drop drop_of(double size, double slope_x, double slope_y)
     return d;
 }
 
-typedef struct frame { raindrop_rain *rain; raindrop_render_options options; raindrop_render_stats stats; raindrop_camera camera; } frame;
+typedef struct frame {
+    raindrop_rain *rain;
+    raindrop_render_options options;
+    raindrop_render_stats stats;
+    raindrop_camera camera;
+} frame;
 
 static void draw(void *user)
 {
     frame *f = (frame *)user;
     memcpy(the.picture, the.background, sizeof(float) * 3 * SIZE * SIZE);
-    raindrop_render(the.picture, SIZE * 12, SIZE, SIZE, NULL, &f->camera, f->rain, the.environment, &f->options, &f->stats);
+    raindrop_render(the.picture, SIZE * 12, SIZE, SIZE, NULL, &f->camera, f->rain, the.environment, &f->options,
+                    &f->stats);
 }
 
-static double error_of(const unsigned char *mask) { return reference_rmse(the.picture, the.truth, mask, SIZE * SIZE, the.key); }
+static double error_of(const unsigned char *mask)
+{
+    return reference_rmse(the.picture, the.truth, mask, SIZE * SIZE, the.key);
+}
 
 static raindrop_rain *own_rain(const raindrop_drop *drops, int count)
 {
@@ -194,7 +210,8 @@ static void bench_closeup(void)
 {
     static const double sizes[6] = {256, 128, 64, 32, 16, 8};
     int off, i, base, look, quick = bench_quick();
-    bench_table("One drop against 8 x 8 rays a pixel, over its own pixels", "place\tpixels\tmethod\trmse\tssim\tdefault");
+    bench_table("One drop against 8 x 8 rays a pixel, over its own pixels",
+                "place\tpixels\tmethod\trmse\tssim\tdefault");
     bench_plot("One drop in the middle, by its size; x=pixels; y=rmse; by=method; where=place:centre; log=xy; style=linespoints");
     bench_plot("33 degrees off axis; x=pixels; y=rmse; by=method; where=place:33 degrees; log=xy; style=linespoints");
     bench_note("eq 2.5, tone-mapped luminance; 33 degrees off axis a sprite cannot be right");
@@ -221,13 +238,16 @@ static void bench_closeup(void)
             for (look = RAINDROP_LOOK_SPRITE; look <= RAINDROP_LOOK_RAY; look++) {
                 f.options.look = (raindrop_look)look;
                 draw(&f);
-                bench_row("%s\t%.0f\t%s\t%.4f\t%.3f\t%d", off ? "33 degrees" : "centre", sizes[i], look == RAINDROP_LOOK_RAY ? "ray" : "closed form, sprite", error_of(the.mask),
-                          reference_ssim(the.picture, the.truth, the.mask, SIZE, SIZE, the.key), look == RAINDROP_LOOK_RAY);
+                bench_row("%s\t%.0f\t%s\t%.4f\t%.3f\t%d", off ? "33 degrees" : "centre", sizes[i],
+                          look == RAINDROP_LOOK_RAY ? "ray" : "closed form, sprite", error_of(the.mask),
+                          reference_ssim(the.picture, the.truth, the.mask, SIZE, SIZE, the.key),
+                          look == RAINDROP_LOOK_RAY);
             }
             raindrop_rain_destroy(f.rain);
         }
     }
-    bench_table("All orders against 8 x 8 rays a pixel with orders 0..3", "pixels\torders\texit_fresnel\trmse\ttime_ratio\tdefault");
+    bench_table("All orders against 8 x 8 rays a pixel with orders 0..3",
+                "pixels\torders\texit_fresnel\trmse\ttime_ratio\tdefault");
     for (i = 0; i < 4; i++) {
         raindrop_drop drop = drop_of(sizes[i], 0.03, 0.02);
         frame f, plain;
@@ -266,10 +286,16 @@ static raindrop_rain *published(int count)
 
 static void bench_box(int count)
 {
-    static const struct { const char *name; raindrop_look look; float far_radius; int sort; } rows[9] = {
-        {"map", RAINDROP_LOOK_MAP, 0, 1}, {"map, unsorted (as published)", RAINDROP_LOOK_MAP, 0, 0}, {"closed form, sprite", RAINDROP_LOOK_SPRITE, 0, 1},
-        {"ray", RAINDROP_LOOK_RAY, 0, 1}, {"auto, far below 0.5 px", RAINDROP_LOOK_AUTO, 0.5f, 1}, {"auto, far below 1 px", RAINDROP_LOOK_AUTO, 1, 1},
-        {"auto, far below 1.5 px", RAINDROP_LOOK_AUTO, 1.5f, 1}, {"auto, far below 3 px", RAINDROP_LOOK_AUTO, 3, 1}, {"auto, far below 1.5 px, unsorted", RAINDROP_LOOK_AUTO, 1.5f, 0}};
+    static const struct { const char *name; raindrop_look look; float far_radius; int sort;
+    } rows[9] = {{"map", RAINDROP_LOOK_MAP, 0, 1},
+                 {"map, unsorted (as published)", RAINDROP_LOOK_MAP, 0, 0},
+                 {"closed form, sprite", RAINDROP_LOOK_SPRITE, 0, 1},
+                 {"ray", RAINDROP_LOOK_RAY, 0, 1},
+                 {"auto, far below 0.5 px", RAINDROP_LOOK_AUTO, 0.5f, 1},
+                 {"auto, far below 1 px", RAINDROP_LOOK_AUTO, 1, 1},
+                 {"auto, far below 1.5 px", RAINDROP_LOOK_AUTO, 1.5f, 1},
+                 {"auto, far below 3 px", RAINDROP_LOOK_AUTO, 3, 1},
+                 {"auto, far below 1.5 px, unsorted", RAINDROP_LOOK_AUTO, 1.5f, 0}};
     char title[128];
     frame f, map;
     int i;
@@ -286,7 +312,8 @@ static void bench_box(int count)
     bench_table(title, "method\tms\ttime_ratio\treference_over_this_ratio\trmse\tssim\tfragments\tdefault");
     bench_plot(count == 100000 ? "Rain: error against time; x=time_ratio; y=rmse; by=method; log=xy; picture=plot_raindrop" : "Rain: error against time; x=time_ratio; y=rmse; by=method; log=xy");
     start = bench_clock();
-    reference_render(the.truth, NULL, SIZE, SIZE, rays(), &camera, raindrop_rain_drops(f.rain, NULL), count, the.environment, 3);
+    reference_render(the.truth, NULL, SIZE, SIZE, rays(), &camera, raindrop_rain_drops(f.rain, NULL), count,
+                     the.environment, 3);
     start = bench_clock() - start;
     memcpy(the.picture, the.background, sizeof(float) * 3 * SIZE * SIZE);
     bench_row("no rain\t0\t0\t\t%.4f\t%.3f\t0\t0", error_of(NULL), reference_ssim(the.picture, the.truth, NULL, SIZE, SIZE, the.key));
@@ -338,7 +365,14 @@ static void bench_counts(void)
 
 /* ---- motion */
 
-typedef struct moments { frame still; const raindrop_drop *drops; raindrop_drop *moved; int count, steps; double exposure; float *sum; } moments;
+typedef struct moments {
+    frame still;
+    const raindrop_drop *drops;
+    raindrop_drop *moved;
+    int count, steps;
+    double exposure;
+    float *sum;
+} moments;
 
 static void draw_moments(void *user)
 {
@@ -405,7 +439,11 @@ static void bench_streaks(void)
 
 /* ---- the environment's filters */
 
-typedef struct lookups { raindrop_environment *environment; float direction[FRAGMENTS][3], footprint; float sum; } lookups;
+typedef struct lookups {
+    raindrop_environment *environment;
+    float direction[FRAGMENTS][3], footprint;
+    float sum;
+} lookups;
 
 static void look_up(void *user)
 {
@@ -420,9 +458,12 @@ static void look_up(void *user)
 
 static void bench_filters(void)
 {
-    static const struct { const char *name; raindrop_filter filter; int resolution; } rows[5] = {
-        {"mips 256", RAINDROP_FILTER_MIPS, 256}, {"mips 512", RAINDROP_FILTER_MIPS, 512}, {"mips 1024", RAINDROP_FILTER_MIPS, 1024},
-        {"mips 2048", RAINDROP_FILTER_MIPS, 2048}, {"boxes of a table", RAINDROP_FILTER_SAT, 1024}};
+    static const struct { const char *name; raindrop_filter filter; int resolution;
+    } rows[5] = {{"mips 256", RAINDROP_FILTER_MIPS, 256},
+                 {"mips 512", RAINDROP_FILTER_MIPS, 512},
+                 {"mips 1024", RAINDROP_FILTER_MIPS, 1024},
+                 {"mips 2048", RAINDROP_FILTER_MIPS, 2048},
+                 {"boxes of a table", RAINDROP_FILTER_SAT, 1024}};
     static const double sizes[3] = {256, 48, 12};
     static lookups l[5];
     uint64_t seed = 2;
@@ -447,7 +488,8 @@ static void bench_filters(void)
             frame f;
             if (bench_quick() && i != 1) continue;
             the.environment = sharp;
-            reference_render(the.truth, the.mask, SIZE, SIZE, bench_quick() && rays() > 4 ? 4 : rays(), &the.camera, &drop, 1, sharp, -1);
+            reference_render(the.truth, the.mask, SIZE, SIZE, bench_quick() && rays() > 4 ? 4 : rays(), &the.camera,
+                             &drop, 1, sharp, -1);
             the.environment = l[k].environment;
             f.rain = own_rain(&drop, 1);
             f.camera = the.camera;
@@ -524,7 +566,8 @@ static void bench_drag(void)
     for (i = 0; i < 6; i++) {
         float calm[3] = {0, 0, 0};
         raindrop_drop a = drop_of(100, 0, 0), b;
-        double d = sizes[i] * 1e-3, vt = raindrop_terminal_velocity(sizes[i]), g = 9.80665 * (1 - 1.204 / 998.2), k = 18 * 1.81e-5 / (998.2 * d * d), q = (g - k * vt) / (vt * vt);
+        double d = sizes[i] * 1e-3, vt = raindrop_terminal_velocity(sizes[i]), g = 9.80665 * (1 - 1.204 / 998.2),
+               k = 18 * 1.81e-5 / (998.2 * d * d), q = (g - k * vt) / (vt * vt);
         double truth = drag_reference(g, k, q), velocity[3];
         int step;
         a.radius = (float)(d / 2);
@@ -533,9 +576,13 @@ static void bench_drag(void)
         raindrop_fall(&a, calm, 1 / 60.0);
         raindrop_fall(&b, calm, 1 / 120.0);
         raindrop_fall(&b, calm, 1 / 120.0);
-        velocity[0] = -(double)a.velocity[1], velocity[1] = -(double)b.velocity[1], velocity[2] = 10 + (g - k * 10 - q * 100) / 60;
+        velocity[0] = -(double)a.velocity[1], velocity[1] = -(double)b.velocity[1],
+        velocity[2] = 10 + (g - k * 10 - q * 100) / 60;
         for (step = 0; step < 3; step++)
-            bench_row("%g\t%.5g\t%.3g\t%s\t%.6g\t%.2g\t%d", sizes[i], vt, (k + 2 * q * vt) / 60, step == 0 ? "exact" : step == 1 ? "exact, two halves" : "Euler",
+            bench_row("%g\t%.5g\t%.3g\t%s\t%.6g\t%.2g\t%d", sizes[i], vt, (k + 2 * q * vt) / 60,
+                      step == 0   ? "exact"
+                      : step == 1 ? "exact, two halves"
+                                  : "Euler",
                       velocity[step], fabs(velocity[step] / truth - 1), step == 0);
     }
 }

@@ -1,5 +1,5 @@
-/* Benchmarks of sat.h: build time against memcpy and cv::integral, precision against exact sums, lookups, updates, bounds,
-   k-ary scans. References are long double sums over the pixels of each box. */
+/* Benchmarks of sat.h: build time against memcpy and cv::integral, precision against exact sums, lookups, updates,
+   bounds, k-ary scans. References are long double sums over the pixels of each box. */
 #define SAT_IMPLEMENTATION
 #include "sat.h"
 #include "bench.h"
@@ -27,7 +27,8 @@ static void make_picture(float *p, int n, int which)
             const float *g = grid + (size_t)(y / 128) * (size_t)cells + (size_t)(x / 128);
             double fx = x % 128 / 128.0, fy = y % 128 / 128.0;
             if (which == HDR14) {
-                double level = (1 - fy) * ((1 - fx) * (double)g[0] + fx * (double)g[1]) + fy * ((1 - fx) * (double)g[cells] + fx * (double)g[cells + 1]);
+                double level = (1 - fy) * ((1 - fx) * (double)g[0] + fx * (double)g[1]) +
+                               fy * ((1 - fx) * (double)g[cells] + fx * (double)g[cells + 1]);
                 double light = pow(10, level * 1.3 + 0.15 * support_gaussian(&state));
                 *out = (float)(light < 1e-6 ? 1e-6 : light > 1e8 ? 1e8 : light);
             } else *out = which == CONSTANT ? 1.0f : (float)support_uniform(&state);
@@ -94,7 +95,8 @@ static void bench_build(void)
         int n = sizes[s];
         size_t pixels = (size_t)n * (size_t)n;
         float *p = (float *)malloc(pixels * 4);
-        char *to = (char *)malloc(pixels * 8), *from = (char *)malloc(pixels * 8), *out = (char *)malloc(((size_t)n + 1) * ((size_t)n + 1) * 8);
+        char *to = (char *)malloc(pixels * 8), *from = (char *)malloc(pixels * 8),
+             *out = (char *)malloc(((size_t)n + 1) * ((size_t)n + 1) * 8);
         make_picture(p, n, UNIFORM);
         memset(to, 1, pixels * 8);
         memset(from, 1, pixels * 8);
@@ -111,11 +113,18 @@ static void bench_build(void)
             c.to = to;
             c.from = from;
             /* a copy of b bytes moves 2 b: read 4 bytes a pixel, write 4 (4.5, 8) */
-            c.bytes = (size_t)((double)pixels * (4 + (k == SAT_KIND_DOUBLE || k == SAT_KIND_FIXED64 ? 8 : k == SAT_KIND_TILED ? 4.5 : 4)) / 2);
+            c.bytes = (size_t)((double)pixels *
+                               (4 + (k == SAT_KIND_DOUBLE || k == SAT_KIND_FIXED64 ? 8
+                                     : k == SAT_KIND_TILED                         ? 4.5
+                                                                                   : 4)) /
+                               2);
             double ratio = bench_ratio(build, &w, copy, &c, bench_rounds(n > 5000 ? 7 : 21)).ratio, peer = 0;
 #ifdef HAVE_OPENCV
             cv::setNumThreads(1);
-            peer = 1 / bench_ratio(build, &w, k == SAT_KIND_DOUBLE || k == SAT_KIND_FIXED64 ? integrate_f64 : integrate_f32, &w, bench_rounds(n > 5000 ? 7 : 21)).ratio;
+            peer = 1 / bench_ratio(build, &w,
+                                   k == SAT_KIND_DOUBLE || k == SAT_KIND_FIXED64 ? integrate_f64 : integrate_f32, &w,
+                                   bench_rounds(n > 5000 ? 7 : 21))
+                           .ratio;
 #endif
             bench_row("%s\t%d\t%.2f\t%s\t%.3f\t%d", kind_names[k], n, ratio, bench_cell(peer, 3, peer > 0), (double)sat_get_statistics(w.table).bytes / (double)pixels, k == 0);
             sat_destroy(w.table);
@@ -138,10 +147,11 @@ struct representation {
 };
 
 static const representation representations[] = {
-    {"float", SAT_KIND_FLOAT, 32, 0},   {"float less mean", SAT_KIND_FLOAT, 32, 1}, {"tiled 8", SAT_KIND_TILED, 8, 0},
-    {"tiled 16", SAT_KIND_TILED, 16, 0}, {"tiled 32", SAT_KIND_TILED, 32, 0},        {"tiled 64", SAT_KIND_TILED, 64, 0},
-    {"tiled 128", SAT_KIND_TILED, 128, 0}, {"double", SAT_KIND_DOUBLE, 32, 0},       {"fixed32", SAT_KIND_FIXED32, 32, 0},
-    {"fixed64", SAT_KIND_FIXED64, 32, 0},
+    {"float", SAT_KIND_FLOAT, 32, 0},      {"float less mean", SAT_KIND_FLOAT, 32, 1},
+    {"tiled 8", SAT_KIND_TILED, 8, 0},     {"tiled 16", SAT_KIND_TILED, 16, 0},
+    {"tiled 32", SAT_KIND_TILED, 32, 0},   {"tiled 64", SAT_KIND_TILED, 64, 0},
+    {"tiled 128", SAT_KIND_TILED, 128, 0}, {"double", SAT_KIND_DOUBLE, 32, 0},
+    {"fixed32", SAT_KIND_FIXED32, 32, 0},  {"fixed64", SAT_KIND_FIXED64, 32, 0},
 };
 
 enum { BOXES = 5, MOST = 20000 };
@@ -185,9 +195,9 @@ static void precision_rows(const float *p, int n, const char *picture, const rep
         }
         double rms = sqrt(squares / count);
         qsort(relative, (size_t)count, sizeof *relative, support_compare_doubles);
-        bench_row("%s\t%s\t%d\t%d\t%.2g\t%.2g\t%.2g\t%.2g\t%.2g\t%.3f\t%.2f\t%d", picture, r->name, n, side, rms / mean, worst / mean,
-                  relative[count / 2] + 1e-17, relative[count * 99 / 100] + 1e-17, relative[count - 1], (double)negative / count, time,
-                  r->kind == SAT_KIND_TILED && r->tile == 32);
+        bench_row("%s\t%s\t%d\t%d\t%.2g\t%.2g\t%.2g\t%.2g\t%.2g\t%.3f\t%.2f\t%d", picture, r->name, n, side, rms / mean,
+                  worst / mean, relative[count / 2] + 1e-17, relative[count * 99 / 100] + 1e-17, relative[count - 1],
+                  (double)negative / count, time, r->kind == SAT_KIND_TILED && r->tile == 32);
     }
     sat_destroy(t);
 }
@@ -204,7 +214,8 @@ static void bench_precision(void)
         float *p = (float *)malloc((size_t)n * (size_t)n * 4);
         for (int which = 0; which < PICTURES; which++) {
             make_picture(p, n, which);
-            for (size_t r = 0; r < sizeof representations / sizeof *representations; r++) precision_rows(p, n, picture_names[which], &representations[r]);
+            for (size_t r = 0; r < sizeof representations / sizeof *representations; r++)
+                precision_rows(p, n, picture_names[which], &representations[r]);
         }
         free(p);
     }
@@ -328,7 +339,8 @@ static void bench_whole_images(void)
     float *p = (float *)malloc((size_t)n * (size_t)n * 4), *out = (float *)malloc((size_t)n * (size_t)n * 4);
     make_picture(p, n, UNIFORM);
     sat_image image = sat_image_f32(p, n, n, 1);
-    bench_table("Whole images: time against a build of the same table", "kind\twork\tside\ttime_build_ratio\tspeedup\tdefault");
+    bench_table("Whole images: time against a build of the same table",
+                "kind\twork\tside\ttime_build_ratio\tspeedup\tdefault");
     bench_note("update: 64 x 64 pixels changed in the middle (and in the last corner); box: sat_box_filter with this radius");
     for (int k = 0; k < 5; k++) {
         sat_options o = sat_defaults();
@@ -340,7 +352,11 @@ static void bench_whole_images(void)
             w.x0 = w.y0 = place == 0 ? n / 2 + 5 : place == 1 ? n - 64 : 5;
             w.x1 = w.y1 = w.x0 + 64;
             double ratio = bench_ratio(update, &w, build, &w, bench_rounds(15)).ratio;
-            bench_row("%s\tupdate %s\t%d\t%.4f\t%.1f\t%d", kind_names[k], place == 0 ? "middle" : place == 1 ? "last corner" : "first corner", n, ratio, 1 / ratio, 1);
+            bench_row("%s\tupdate %s\t%d\t%.4f\t%.1f\t%d", kind_names[k],
+                      place == 0   ? "middle"
+                      : place == 1 ? "last corner"
+                                   : "first corner",
+                      n, ratio, 1 / ratio, 1);
         }
         for (int radius = 1; radius <= 100; radius *= 10) {
             filter_work f = {w.table, out, radius, n};
@@ -376,7 +392,9 @@ static void bench_bounds(void)
                 double squares = 0, worst = 0, area = (double)side * side;
                 for (int i = 0; i < count; i++) {
                     int x = support_below(&state, n - side), y = support_below(&state, n - side);
-                    double e = fabs(sat_sum(t, 0, x, y, x + side, y + side) - exact_sum(p, n, x, y, x + side, y + side)) / area;
+                    double e =
+                        fabs(sat_sum(t, 0, x, y, x + side, y + side) - exact_sum(p, n, x, y, x + side, y + side)) /
+                        area;
                     squares += e * e;
                     if (e > worst) worst = e;
                 }
@@ -428,8 +446,9 @@ static void bench_scans(void)
                 double e = fabs((double)(((long double)out[j] - exact) / exact)) / 5.96e-8;
                 if (e > worst) worst = e;
             }
-            bench_row("%s\t%d\t%d\t%.2f\t%.2f\t%.3f\t%.1f\t%.2f\t%d", a == 1 ? "recursive doubling" : "balanced tree", ks[i], (int)c.passes, (double)c.adds / N,
-                      (double)(c.reads + c.writes) / N, (double)c.nodes / N, ratio, worst, a == 2 && ks[i] == 4);
+            bench_row("%s\t%d\t%d\t%.2f\t%.2f\t%.3f\t%.1f\t%.2f\t%d", a == 1 ? "recursive doubling" : "balanced tree",
+                      ks[i], (int)c.passes, (double)c.adds / N, (double)(c.reads + c.writes) / N, (double)c.nodes / N,
+                      ratio, worst, a == 2 && ks[i] == 4);
         }
     free(in);
     free(out);

@@ -1,7 +1,7 @@
 /* softassign.h: certified gap against time, the tables of Slomp 2012 chapter 3 beside the optimum, memory, video.
-   Real photographs and tiles where they are (../shared/data, libstb-dev), else patches and tiles of the same kind made here.
-   The peers run in the same program: a plain dense solver (Jonker and Volgenant), and scipy's linear_sum_assignment
-   when python3 has it; both get the matrix for free. */
+   Real photographs and tiles where they are (../shared/data, libstb-dev), else patches and tiles of the same kind made
+   here. The peers run in the same program: a plain dense solver (Jonker and Volgenant), and scipy's
+   linear_sum_assignment when python3 has it; both get the matrix for free. */
 
 #define SAT_IMPLEMENTATION
 #define SOFTASSIGN_IMPLEMENTATION
@@ -35,7 +35,13 @@ static float *load_cells(const char *path, int grid_width, int grid_height)
     return out;
 }
 #else
-static float *load_cells(const char *path, int grid_width, int grid_height) { (void)path; (void)grid_width; (void)grid_height; return NULL; }
+static float *load_cells(const char *path, int grid_width, int grid_height)
+{
+    (void)path;
+    (void)grid_width;
+    (void)grid_height;
+    return NULL;
+}
 #endif
 
 /* A stand-in for photographs: slopes and texture around a level; few levels for patches, all for tiles. */
@@ -44,9 +50,11 @@ static float *make_cells(int count, int levels, uint64_t seed)
     float *out = (float *)malloc((size_t)count * FEATURES * sizeof *out);
     int i, k;
     for (i = 0; i < count; i++) {
-        double r = support_uniform(&seed), level = levels ? 255 * floor(r * levels) / levels : 255 * r, x = support_gaussian(&seed), y = support_gaussian(&seed);
+        double r = support_uniform(&seed), level = levels ? 255 * floor(r * levels) / levels : 255 * r,
+               x = support_gaussian(&seed), y = support_gaussian(&seed);
         for (k = 0; k < FEATURES; k++)
-            out[i * FEATURES + k] = (float)(level + 8 * x * (k / 3 % 4) + 8 * y * (k / 12) + 6 * (k % 3) + (levels ? 3 : 12) * support_gaussian(&seed));
+            out[i * FEATURES + k] = (float)(level + 8 * x * (k / 3 % 4) + 8 * y * (k / 12) + 6 * (k % 3) +
+                                            (levels ? 3 : 12) * support_gaussian(&seed));
     }
     return out;
 }
@@ -62,7 +70,8 @@ static float *patches_of(const char *photo, int grid_width, int grid_height)
 
 static void load_tiles(void)
 {
-    float *a = load_cells(support_data("tiles/tiles_0.png"), 64, 64), *b = load_cells(support_data("tiles/tiles_1.png"), 64, 64);
+    float *a = load_cells(support_data("tiles/tiles_0.png"), 64, 64),
+          *b = load_cells(support_data("tiles/tiles_1.png"), 64, 64);
     real_data = a && b;
     all_tiles = real_data ? (float *)malloc(8192u * FEATURES * sizeof *a) : make_cells(8192, 0, 7);
     if (real_data) {
@@ -98,7 +107,8 @@ static void open_instance(instance *q, const char *photo, int grid_width, int gr
     q->cost = (float *)malloc((size_t)rows * (size_t)columns * sizeof(float));
     for (i = 0; i < rows; i++)
         for (j = 0; j < columns; j++)
-            q->cost[(size_t)i * (size_t)columns + (size_t)j] = softassign__distance(q->patches + i * FEATURES, all_tiles + j * FEATURES, FEATURES);
+            q->cost[(size_t)i * (size_t)columns + (size_t)j] =
+                softassign__distance(q->patches + i * FEATURES, all_tiles + j * FEATURES, FEATURES);
     q->y = (int *)malloc((size_t)columns * sizeof(int));
     q->pred = (int *)malloc((size_t)columns * sizeof(int));
     q->list = (int *)malloc((size_t)columns * sizeof(int));
@@ -177,15 +187,17 @@ static double scipy_seconds(const instance *q, int rounds)
     return seconds;
 }
 
-static const char *const method_names[] = {"auto", "exact", "fast", "entropic", "published", "greedy", "greedy + 2-opt", "annealing", "ants"};
+static const char *const method_names[] = {"auto",   "exact",          "fast",      "entropic", "published",
+                                           "greedy", "greedy + 2-opt", "annealing", "ants"};
 
 /* ---- the figures: exact and fast against the peers ---- */
 
 static void table_peers(void)
 {
-    static const struct { const char *photo; int w, h; } runs[] = {
-        {"fig_bowl", 30, 30}, {"brushes", 30, 30}, {"dandelion", 30, 30}, {"dogs", 30, 30}, {"bird_lamp", 30, 30}, {"stream", 30, 30},
-        {"dogs", 64, 32}, {"fig_bowl", 64, 32}, {"stream", 64, 32}};
+    static const struct { const char *photo; int w, h;
+    } runs[] = {{"fig_bowl", 30, 30}, {"brushes", 30, 30},   {"dandelion", 30, 30},
+                {"dogs", 30, 30},     {"bird_lamp", 30, 30}, {"stream", 30, 30},
+                {"dogs", 64, 32},     {"fig_bowl", 64, 32},  {"stream", 64, 32}};
     size_t k;
     int m, have_scipy = system("/usr/bin/python3 -c 'import scipy.optimize' >/dev/null 2>&1") == 0;
     bench_table("Features to proven result, one thread, against a plain LAPJV and scipy (both without the time of the matrix)",
@@ -204,8 +216,9 @@ static void table_peers(void)
             set_method(&q, (softassign_method)m);
             t = bench_ratio(run_solver, &q, run_lapjv, &q, q.p.rows > 1000 || bench_quick() ? 1 : 5);
             run_solver(&q);
-            bench_row("%s\t%d\t%d\t%s\t%.4g\t%.3g\t%s\t%.3g\t%.3g\t%.3g\t%.3g\t%.3g\t%d", runs[k].photo, q.p.rows, q.p.columns, method_names[m],
-                      t.work * 1e3, t.ratio, bench_cell(t.work / scipy, 3, scipy > 0), q.report.gap, excess(&q), (double)q.report.bytes / 1e6,
+            bench_row("%s\t%d\t%d\t%s\t%.4g\t%.3g\t%s\t%.3g\t%.3g\t%.3g\t%.3g\t%.3g\t%d", runs[k].photo, q.p.rows,
+                      q.p.columns, method_names[m], t.work * 1e3, t.ratio, bench_cell(t.work / scipy, 3, scipy > 0),
+                      q.report.gap, excess(&q), (double)q.report.bytes / 1e6,
                       (double)q.report.bytes / (4.0 * q.p.rows * q.p.columns),
                       (double)q.report.distances_computed / ((double)q.p.rows * q.p.columns), m == SOFTASSIGN_EXACT);
         }
@@ -270,17 +283,20 @@ static void table_error_time(void)
                 q.options.gap = gaps[g];
                 if (m == SOFTASSIGN_FAST) snprintf(setting, sizeof setting, "gap %g", gaps[g]);
                 if (m == SOFTASSIGN_PUBLISHED && k > 2) q.options.iterations[0] = 2;
-                if (m == SOFTASSIGN_PUBLISHED) snprintf(setting, sizeof setting, "%d x 10 x 10", q.options.iterations[0]);
+                if (m == SOFTASSIGN_PUBLISHED)
+                    snprintf(setting, sizeof setting, "%d x 10 x 10", q.options.iterations[0]);
                 if (m == SOFTASSIGN_ANTS && k > 2) q.options.iterations[0] = 20;
                 if (m == SOFTASSIGN_ANTS) snprintf(setting, sizeof setting, "%d iterations", q.options.iterations[0]);
                 if (m == SOFTASSIGN_ANNEALING && k > 2) q.options.iterations[1] = 100;
-                if (m == SOFTASSIGN_ANNEALING) snprintf(setting, sizeof setting, "120 x %d moves a row", q.options.iterations[1]);
+                if (m == SOFTASSIGN_ANNEALING)
+                    snprintf(setting, sizeof setting, "120 x %d moves a row", q.options.iterations[1]);
                 start = bench_clock();
                 run_solver(&q);
                 seconds = bench_clock() - start;
                 if (seconds < 0.2) seconds = bench_time(run_solver, &q, 5);
-                bench_row("%s\t%s\t%s\t%.4g\t%.3g\t%.3g\t%.3g\t%d", size, method_names[m], setting, seconds * 1e3, seconds / lapjv,
-                          excess(&q) > 1e-7 ? excess(&q) : 1e-7, q.report.gap > 1e-16 ? q.report.gap : 1e-16, m == SOFTASSIGN_AUTO);
+                bench_row("%s\t%s\t%s\t%.4g\t%.3g\t%.3g\t%.3g\t%d", size, method_names[m], setting, seconds * 1e3,
+                          seconds / lapjv, excess(&q) > 1e-7 ? excess(&q) : 1e-7,
+                          q.report.gap > 1e-16 ? q.report.gap : 1e-16, m == SOFTASSIGN_AUTO);
             }
         close_instance(&q);
     }
@@ -316,9 +332,10 @@ static void table_3_1(void)
                 cost[m] = q.report.cost;
                 if (published[k][m] < best) best = published[k][m];
             }
-            bench_row("%s\t%d\t%d\t%.0f\t%.0f\t%.0f\t%.0f\t%.0f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f", photos[f], q.p.rows, q.p.columns, repeats,
-                      cost[0], cost[1], cost[2], q.optimum, cost[0] / q.optimum, cost[1] / q.optimum, cost[2] / q.optimum,
-                      published[k][0] / best, published[k][1] / best, published[k][2] / best);
+            bench_row("%s\t%d\t%d\t%.0f\t%.0f\t%.0f\t%.0f\t%.0f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f", photos[f],
+                      q.p.rows, q.p.columns, repeats, cost[0], cost[1], cost[2], q.optimum, cost[0] / q.optimum,
+                      cost[1] / q.optimum, cost[2] / q.optimum, published[k][0] / best, published[k][1] / best,
+                      published[k][2] / best);
             close_instance(&q);
         }
 }
@@ -327,9 +344,11 @@ static void table_3_1(void)
 
 static void table_3_2(void)
 {
-    static const int sizes[][2] = {{100, 100}, {100, 500}, {400, 1500}, {512, 2048}, {900, 3000}, {1024, 4096}, {1200, 5000}, {1600, 6000}, {1800, 7000}, {2048, 8192}};
-    static const double thesis[][3] = {{.024, .022, .022}, {.114, .062, .023}, {1.506, .780, .035}, {2.572, 1.479, .052}, {6.485, 3.912, .114},
-                                       {10.01, 5.963, .171}, {14.29, 8.532, .239}, {22.73, 13.85, .374}, {29.82, 17.78, .487}, {39.77, 23.62, .643}};
+    static const int sizes[][2] = {{100, 100},   {100, 500},   {400, 1500},  {512, 2048},  {900, 3000},
+                                   {1024, 4096}, {1200, 5000}, {1600, 6000}, {1800, 7000}, {2048, 8192}};
+    static const double thesis[][3] = {
+        {.024, .022, .022},   {.114, .062, .023},   {1.506, .780, .035},  {2.572, 1.479, .052}, {6.485, 3.912, .114},
+        {10.01, 5.963, .171}, {14.29, 8.532, .239}, {22.73, 13.85, .374}, {29.82, 17.78, .487}, {39.77, 23.62, .643}};
     size_t k;
     int w;
     bench_table("Table 3.2 re-made: seconds for one cooling iteration of 10 x 10 (SOFTASSIGN_PUBLISHED, float)",
@@ -385,8 +404,9 @@ static void table_lists(void)
                 set_method(&q, (softassign_method)m);
                 q.options.neighbours = lengths[l];
                 seconds = bench_time(run_solver, &q, k || bench_quick() ? 1 : 3);
-                bench_row("%d\t%s\t%d\t%.4g\t%.0f\t%.0f\t%.3g\t%.3g\t%d", q.p.rows, method_names[m], lengths[l], seconds * 1e3, (double)q.report.lists_built,
-                          (double)q.report.rows_expanded, (double)q.report.distances_computed / ((double)q.p.rows * q.p.columns),
+                bench_row("%d\t%s\t%d\t%.4g\t%.0f\t%.0f\t%.3g\t%.3g\t%d", q.p.rows, method_names[m], lengths[l],
+                          seconds * 1e3, (double)q.report.lists_built, (double)q.report.rows_expanded,
+                          (double)q.report.distances_computed / ((double)q.p.rows * q.p.columns),
                           (double)q.report.bytes / 1e6, lengths[l] == softassign_defaults().neighbours);
             }
         close_instance(&q);
@@ -440,7 +460,8 @@ static void table_large(void)
 
 /* ---- video ---- */
 
-/* Cells of a window of 3/4 of the photo that moves by `step` of a cell a frame; made-up data shifts features instead. */
+/* Cells of a window of 3/4 of the photo that moves by `step` of a cell a frame; made-up data shifts features
+   instead. */
 static void pan(float *out, const image *picture, const float *made, double step, int frame)
 {
     int i;
@@ -492,7 +513,8 @@ static void table_video(void)
             pan(q.patches, picture, made, steps[m], frame);
             for (i = 0; i < 900; i++)
                 for (j = 0; j < 8192; j++)
-                    q.cost[(size_t)i * 8192 + (size_t)j] = softassign__distance(q.patches + i * FEATURES, all_tiles + j * FEATURES, FEATURES);
+                    q.cost[(size_t)i * 8192 + (size_t)j] =
+                        softassign__distance(q.patches + i * FEATURES, all_tiles + j * FEATURES, FEATURES);
             q.p.previous = frame ? previous : NULL;
             start = bench_clock();
             softassign_next_frame(warm);
@@ -571,7 +593,8 @@ static void table_published(void)
         for (o = 0; o < 5; o++)
             for (evolves = 0; evolves < 2; evolves++)
                 for (wide = 0; wide < 3; wide++) { /* float, double, and Gold's update in float */
-                    if (bench_quick() && ((bench_smoke() && o < 3) || wide || evolves || a != 1 || o % 2 == 0)) continue;
+                    if (bench_quick() && ((bench_smoke() && o < 3) || wide || evolves || a != 1 || o % 2 == 0))
+                        continue;
                     gold = wide == 2;
                     set_method(&q, SOFTASSIGN_PUBLISHED);
                     q.options.alpha = alphas[a];
@@ -588,13 +611,16 @@ static void table_published(void)
 
 int main(int argc, char **argv)
 {
-    static void (*const tables[])(void) = {table_peers, table_dense, table_error_time, table_3_1, table_3_2, table_lists, table_large, table_video,
+    static void (*const tables[])(void) = {table_peers,        table_dense,    table_error_time, table_3_1,
+                                           table_3_2,          table_lists,    table_large,      table_video,
                                            table_temperatures, table_published};
-    static const char *const names[] = {"peers", "dense", "error", "3_1", "3_2", "lists", "large", "video", "temperatures", "published"};
+    static const char *const names[] = {"peers", "dense", "error", "3_1",          "3_2",
+                                        "lists", "large", "video", "temperatures", "published"};
     size_t k;
     bench_start("softassign.h");
     load_tiles();
-    printf("# input: %s\n", real_data ? "photographs and tiles" : "made here, for want of ../shared/data or libstb-dev");
+    printf("# input: %s\n",
+           real_data ? "photographs and tiles" : "made here, for want of ../shared/data or libstb-dev");
     for (k = 0; k < 10; k++)
         if (argc < 2 || strcmp(argv[1], names[k]) == 0) tables[k]();
     free(all_tiles);

@@ -1,7 +1,7 @@
 /* Error against run time of ssao_sat.h, and of what others use, against a ray tracer.
 
-   FIT=1 in the environment fits the parameters of the comparators first (minutes) and prints them as a table; FIT=only does no more. The ray-traced pictures are
-   kept in build/, so that only the first run draws them. */
+   FIT=1 in the environment fits the parameters of the comparators first (minutes) and prints them as a table; FIT=only
+   does no more. The ray-traced pictures are kept in build/, so that only the first run draws them. */
 #define SAT_IMPLEMENTATION
 #define SSAO_SAT_IMPLEMENTATION
 #include "ssao_sat.h"
@@ -111,14 +111,17 @@ static float *occlusions[REF_SCENES * REF_RADII];
 /* Occlusion before the tone curve of the method, all radii. */
 static void occlude(const method *m, int scenes)
 {
-    const ssao_sat__fit *fit = &ssao_sat__fits[m->options.method == SSAO_SAT_PLANE && m->options.plane_boxes == 1 ? 5 : (int)m->options.method];
+    const ssao_sat__fit *fit =
+        &ssao_sat__fits[m->options.method == SSAO_SAT_PLANE && m->options.plane_boxes == 1 ? 5
+                                                                                           : (int)m->options.method];
     int scene, r;
     size_t i;
     for (scene = 0; scene < scenes; scene++)
         for (r = 0; r < REF_RADII; r++) {
             float *o = occlusions[scene * REF_RADII + r];
             apply(m, &pictures[scene], (double)pictures[scene].radius[r]);
-            for (i = 0; i < pixels; i++) o[i] = m->theirs >= 0 ? out[i] : (1 - powf(out[i], 1 / fit->power)) / fit->gain;
+            for (i = 0; i < pixels; i++)
+                o[i] = m->theirs >= 0 ? out[i] : (1 - powf(out[i], 1 / fit->power)) / fit->gain;
         }
 }
 
@@ -134,7 +137,12 @@ static void tabulate(error_table *t, int image)
             for (i = 0; i < pixels; i += 13) {
                 float v = ref_clamp(1 - gain_of(g) * o[i], 0, 1), e;
                 if (!(p->z[i] < 1e18f)) continue;
-                v = k == 0 ? sqrtf(v) : k == 1 ? v : k == 2 ? v * sqrtf(v) : k == 3 ? v * v : k == 4 ? v * v * v : v * v * v * v;
+                v = k == 0   ? sqrtf(v)
+                    : k == 1 ? v
+                    : k == 2 ? v * sqrtf(v)
+                    : k == 3 ? v * v
+                    : k == 4 ? v * v * v
+                             : v * v * v * v;
                 e = v - truth[i];
                 sum += (double)(e * e);
                 n++;
@@ -160,7 +168,8 @@ static double best_tone(const error_table *t, int left_out, int *gain, int *powe
 
 static void fit_comparators(void)
 {
-    static const float first[3][2] = {{1, 1.4f}, {1.4f, 2}, {1.4f, 2}}, second[3][3] = {{0.01f, 0.05f, 0.1f}, {0.05f, 0.15f, 0.25f}, {0, 0.15f, 0.3f}};
+    static const float first[3][2] = {{1, 1.4f}, {1.4f, 2}, {1.4f, 2}},
+                       second[3][3] = {{0.01f, 0.05f, 0.1f}, {0.05f, 0.15f, 0.25f}, {0, 0.15f, 0.3f}};
     static error_table t[IMAGES];
     int i, a, b, k, g, p;
     bench_table("Fit of the comparators", "method\tradius\tsecond\tgain\tpower\trmse");
@@ -191,7 +200,8 @@ static void fit_comparators(void)
 
 typedef struct score { double rmse, ssim, held_out, other[REF_SCENES - FITTED], seconds[16]; } score;
 
-/* The same three radii of the scenes that no method was fitted to, and each fitted scene with gain and power from the other two. */
+/* The same three radii of the scenes that no method was fitted to, and each fitted scene with gain and power from the
+   other two. */
 static void measure_errors(const method *m, score *s)
 {
     static error_table t[IMAGES];
@@ -225,7 +235,8 @@ static void measure_times(score *scores, int rounds)
     for (r = 0; r < rounds; r++)
         for (m = 0; m < ALL; m++)
             for (scores[m].seconds[r] = 0, i = 0; i < IMAGES; i++)
-                scores[m].seconds[r] += apply(&methods[m], &pictures[i / REF_RADII], (double)pictures[0].radius[i % REF_RADII]);
+                scores[m].seconds[r] +=
+                    apply(&methods[m], &pictures[i / REF_RADII], (double)pictures[0].radius[i % REF_RADII]);
 }
 
 static double ratio(const score *a, const score *b, int rounds)
@@ -250,9 +261,11 @@ static void error_against_time(void)
                "the same parameters on a scene with other objects that nothing was fitted to; rmse_grass: grass and poles; rmse_hall: a hall of 40 m. "
                "The comparators are plain scalar C, the slabs four lanes wide: see SAT_NO_SIMD for slabs without.");
     for (m = 0; m < ALL; m++)
-        bench_row("%s\t%.2f\t%.4f\t%.3f\t%.4f\t%.4f\t%.4f\t%.4f\t%.1f\t%.3f\t%.3f\t%.3f\t%d", methods[m].name, ratio(&scores[m], &scores[0], rounds), scores[m].rmse,
-                  scores[m].ssim, scores[m].held_out, scores[m].other[0], scores[m].other[1], scores[m].other[2], scores[m].seconds[0] / IMAGES * 1e3,
-                  ratio(&scores[m], &scores[OURS + REF_GTAO_HALF], rounds), ratio(&scores[m], &scores[OURS + REF_SSAO], rounds),
+        bench_row("%s\t%.2f\t%.4f\t%.3f\t%.4f\t%.4f\t%.4f\t%.4f\t%.1f\t%.3f\t%.3f\t%.3f\t%d", methods[m].name,
+                  ratio(&scores[m], &scores[0], rounds), scores[m].rmse, scores[m].ssim, scores[m].held_out,
+                  scores[m].other[0], scores[m].other[1], scores[m].other[2], scores[m].seconds[0] / IMAGES * 1e3,
+                  ratio(&scores[m], &scores[OURS + REF_GTAO_HALF], rounds),
+                  ratio(&scores[m], &scores[OURS + REF_SSAO], rounds),
                   ratio(&scores[m], &scores[OURS + REF_HBAO_HALF], rounds), methods[m].is_default);
 }
 
@@ -276,10 +289,12 @@ static void radius_table(void)
     }
 }
 
-/* Slomp 2012, figure 5.16 and table 5.1: every method at sizes up to 2048; half-resolution variants as in the thesis. */
+/* Slomp 2012, figure 5.16 and table 5.1: every method at sizes up to 2048; half-resolution variants as in the
+   thesis. */
 static void resolution_table(void)
 {
-    static const char *const names[4] = {"traditional", "horizon-based", "refined (5.3.5)", "slabs"}, *const published[4] = {"1.71", "2.44", "1", ""};
+    static const char *const names[4] = {"traditional", "horizon-based", "refined (5.3.5)", "slabs"},
+                             *const published[4] = {"1.71", "2.44", "1", ""};
     int size, top = bench_quick() ? 512 : 2048, first = bench_smoke() ? 128 : 256, m, half_size = 0;
     double half[4] = {0, 0, 0, 0};
     bench_table("Figure 5.16 re-made: time against resolution, scene 0, R = 0.25", "method\tsize\tms\tto_minimalist_ratio");
@@ -353,8 +368,10 @@ static void leave_out_table(void)
             ssao_sat_apply(a.ao, other, 0, &a.in, &stats);
             ssao_sat_apply(b.ao, out, 0, &b.in, NULL);
             for (i = 0; i < pixels; i++) worst = fmax(worst, fabs((double)(out[i] - other[i])));
-            bench_row("%d\t%g\t%.1f\t%.2f\t%.1e\t%.1f", scene, o.radius, 100.0 * (double)stats.flat / (double)stats.pixels, t.ratio, worst,
-                      100.0 * (double)stats.slabs_skipped / (double)(stats.slabs_skipped + stats.slabs_visited + !stats.slabs_visited));
+            bench_row("%d\t%g\t%.1f\t%.2f\t%.1e\t%.1f", scene, o.radius,
+                      100.0 * (double)stats.flat / (double)stats.pixels, t.ratio, worst,
+                      100.0 * (double)stats.slabs_skipped /
+                          (double)(stats.slabs_skipped + stats.slabs_visited + !stats.slabs_visited));
             ssao_sat_destroy(a.ao);
             ssao_sat_destroy(b.ao);
         }
@@ -400,7 +417,8 @@ static void bent_table(void)
 }
 #endif
 
-/* How much the picture changes while the camera glides: mean |difference| of successive frames where depth hardly changes. */
+/* How much the picture changes while the camera glides: mean |difference| of successive frames where depth hardly
+   changes. */
 static void motion_table(void)
 {
     enum { FRAMES = 6 };
@@ -416,7 +434,8 @@ static void motion_table(void)
         for (f = 0; f < FRAMES; f++) {
             ref_picture p = ref_draw(&s, side, side, 0, 0, ref_make(0.0015f * (float)f, 0.0007f * (float)f, 0), 2);
             apply(&methods[which[i]], &p, 0.25);
-            if (methods[which[i]].theirs >= 0) ref_tone(out, pixels, methods[which[i]].fit.gain, methods[which[i]].fit.power);
+            if (methods[which[i]].theirs >= 0)
+                ref_tone(out, pixels, methods[which[i]].fit.gain, methods[which[i]].fit.power);
             for (k = 0; k < pixels && f > 0; k++) {
                 if (!(p.z[k] < 1e18f) || !(fabsf(p.z[k] - last_z[k]) < 0.005f * p.z[k])) continue;
                 change[i] += fabs((double)(out[k] - last[k]));
@@ -434,7 +453,8 @@ static void motion_table(void)
     free(last_z);
 }
 
-/* Largest error of means of 1/z over 17 x 17 pixels, in depth steps R / z^2, by table format, where R covers a pixel. */
+/* Largest error of means of 1/z over 17 x 17 pixels, in depth steps R / z^2, by table format, where R covers a
+   pixel. */
 static double format_error(const float *z, int size, int kind)
 {
     float *result = (float *)malloc((size_t)size * (size_t)size * 4);
@@ -479,7 +499,9 @@ static void format_table(void)
         for (kind = 0; kind < 3; kind++) {
             size_t n = (size_t)size * (size_t)size, i;
             float *z = (float *)malloc(n * 4);
-            for (i = 0; i < n; i++) z[i] = pictures[0].z[(i / (size_t)size) % (size_t)side * (size_t)side + (i % (size_t)size) % (size_t)side];
+            for (i = 0; i < n; i++)
+                z[i] =
+                    pictures[0].z[(i / (size_t)size) % (size_t)side * (size_t)side + (i % (size_t)size) % (size_t)side];
             bench_row("%s\t%d\t%.2e", names[kind], size, format_error(z, size, kind));
             free(z);
         }
@@ -490,7 +512,9 @@ static void format_table(void)
             float *z = (float *)malloc(512 * 512 * 4);
             uint64_t state = 7;
             int i;
-            for (i = 0; i < 512 * 512; i++) z[i] = powf(10, (float)decades * ((float)(i / 512) / 511 * 0.9f + 0.1f * (float)support_uniform(&state)));
+            for (i = 0; i < 512 * 512; i++)
+                z[i] =
+                    powf(10, (float)decades * ((float)(i / 512) / 511 * 0.9f + 0.1f * (float)support_uniform(&state)));
             bench_row("%s\t%d\t%.2e", names[kind], decades, format_error(z, 512, kind));
             free(z);
         }

@@ -41,7 +41,9 @@ static void draw_room(image *out, int width, int height)
             if (u > 0.6 && v < 0.5) light = 40 + 30 * sin(12 * v);
             if (u < 0.3 && v > 0.6) light = 0.01 * (1 + (x / 3 + y / 3) % 2 * 2);
             light *= 1 + 0.04 * ((double)bench_noise(&seed) - 0.5);
-            for (int c = 0; c < 3; ++c) out->pixels[3 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c] = (float)(light * (1 + 0.4 * sin(5 * u + 2 * c + 3 * v)));
+            for (int c = 0; c < 3; ++c)
+                out->pixels[3 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c] =
+                    (float)(light * (1 + 0.4 * sin(5 * u + 2 * c + 3 * v)));
         }
 }
 
@@ -83,7 +85,8 @@ static void shrink(scene *s)
     for (int y = 0; y < small_one.height; ++y)
         for (int x = 0; x < small_one.width; ++x)
             memcpy(small_one.pixels + 3 * ((size_t)y * (size_t)small_one.width + (size_t)x),
-                   s->picture.pixels + 3 * ((size_t)(8 * y) * (size_t)s->picture.width + (size_t)(8 * x)), 3 * sizeof(float));
+                   s->picture.pixels + 3 * ((size_t)(8 * y) * (size_t)s->picture.width + (size_t)(8 * x)),
+                   3 * sizeof(float));
     image_free(&s->picture);
     s->picture = small_one;
     settle(s, s->name);
@@ -100,7 +103,10 @@ static work make_work(const scene *s, const tonemap_options *options)
     w.options = *options;
     w.out = (unsigned char *)malloc(s->n * 3);
     memset(&w.stats, 0, sizeof w.stats);
-    if (tonemap_create(&w.map, s->picture.width, s->picture.height, options) != SAT_OK) { puts("tonemap_create failed"); exit(1); }
+    if (tonemap_create(&w.map, s->picture.width, s->picture.height, options) != SAT_OK) {
+        puts("tonemap_create failed");
+        exit(1);
+    }
     tonemap_apply_u8(w.map, w.out, (ptrdiff_t)s->picture.width * 3, &s->view, 0, &w.stats);
     return w;
 }
@@ -138,7 +144,8 @@ static double *luminance_codes(const scene *s, const tonemap_options *options, t
     float *plane = (float *)malloc(s->n * sizeof(float)), *linear = (float *)malloc(s->n * sizeof(float));
     double *codes = metrics_alloc(s->n);
     tonemap *map;
-    for (size_t i = 0; i < s->n; ++i) plane[i] = sat__luminance(s->picture.pixels[3 * i], s->picture.pixels[3 * i + 1], s->picture.pixels[3 * i + 2]);
+    for (size_t i = 0; i < s->n; ++i)
+        plane[i] = sat__luminance(s->picture.pixels[3 * i], s->picture.pixels[3 * i + 1], s->picture.pixels[3 * i + 2]);
     grey.view = sat_image_f32(plane, s->picture.width, s->picture.height, 1);
     tonemap_create(&map, s->picture.width, s->picture.height, options);
     tonemap_apply_f32(map, linear, (ptrdiff_t)s->picture.width * 4, &grey.view, 0, stats);
@@ -155,7 +162,8 @@ static double child_seconds(void)
 {
     struct rusage u;
     getrusage(RUSAGE_CHILDREN, &u);
-    return (double)u.ru_utime.tv_sec + (double)u.ru_stime.tv_sec + 1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
+    return (double)u.ru_utime.tv_sec + (double)u.ru_stime.tv_sec +
+           1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
 }
 
 static double own_seconds(void)
@@ -341,7 +349,8 @@ static double *pfs_codes(scene *s)
     if (!shell(command) || !image_load(&out, temporary("out.exr"))) return NULL;
     codes = metrics_alloc(s->n);
     for (size_t i = 0; i < s->n; ++i)
-        codes[i] = metrics_code((double)sat__luminance(out.pixels[3 * i], out.pixels[3 * i + 1], out.pixels[3 * i + 2]));
+        codes[i] =
+            metrics_code((double)sat__luminance(out.pixels[3 * i], out.pixels[3 * i + 1], out.pixels[3 * i + 2]));
     image_free(&out);
     return codes;
 }
@@ -365,7 +374,8 @@ static void accuracy(scene *scenes, int count)
             return ratio;
         };
         double base_time = bench_time(run_work, &base, bench_rounds(7));
-        const char *names[5] = {"tonemap.h local", "tonemap.h local, soft scales", "tonemap.h global", "exact boxes", "pfstmo_reinhard02 -s --phi 8"};
+        const char *names[5] = {"tonemap.h local", "tonemap.h local, soft scales", "tonemap.h global", "exact boxes",
+                                "pfstmo_reinhard02 -s --phi 8"};
         codes[0] = luminance_codes(s, &o, &stats);
         times[0] = 1;
         o.soft = 1;
@@ -397,7 +407,8 @@ static void accuracy(scene *scenes, int count)
 /* One picture with its luminance squeezed or stretched to so many decades: the box sums against exact ones. */
 static void luminance_range(const scene *s)
 {
-    bench_table("Luminance range: our sums against exact boxes, 8-bit codes", "decades\trms_codes\tlargest_codes\tover_5_codes");
+    bench_table("Luminance range: our sums against exact boxes, 8-bit codes",
+                "decades\trms_codes\tlargest_codes\tover_5_codes");
     bench_plot("Error against the range of luminance; x=decades; y=rms_codes; style=linespoints");
     bench_note(s->name);
     tonemap_options o = tonemap_defaults();
@@ -408,7 +419,8 @@ static void luminance_range(const scene *s)
         scene f;
         tonemap_stats stats;
         image_create(&f.picture, s->picture.width, s->picture.height, 3);
-        for (size_t i = 0; i < s->n * 3; ++i) f.picture.pixels[i] = powf(fmaxf(s->picture.pixels[i], 0), (float)(decades / own));
+        for (size_t i = 0; i < s->n * 3; ++i)
+            f.picture.pixels[i] = powf(fmaxf(s->picture.pixels[i], 0), (float)(decades / own));
         settle(&f, s->name);
         double *codes = luminance_codes(&f, &o, &stats), *exact = gaussian_codes(&f, stats.adapted, 0);
         metrics_codes m = metrics_compare_codes(codes, exact, f.n);
@@ -426,7 +438,12 @@ static void pareto(const scene *s)
     tonemap_options o = tonemap_defaults();
     work base = make_work(s, &o);
     double *full = codes_of(s, &o, NULL);
-    auto add = [&](const char *kind, double value) { rows[count].kind = kind; rows[count].value = value; rows[count++].o = o; o = tonemap_defaults(); };
+    auto add = [&](const char *kind, double value) {
+        rows[count].kind = kind;
+        rows[count].value = value;
+        rows[count++].o = o;
+        o = tonemap_defaults();
+    };
     for (int k = 1; k <= 8; ++k) o.scales = k, add("scales", k);
     for (double t = 0.5; t <= 8; t *= 2) o.tolerance_codes = t, add("tolerance_codes", t);
     for (double t = 0.05; t < 2; t *= 2) o.selective = t, add("selective", t);
@@ -444,7 +461,8 @@ static void pareto(const scene *s)
         bench_times t = bench_ratio(run_work, &w, run_work, &base, bench_rounds(7));
         for (size_t k = 0; k < s->n; ++k) a[k] = codes[3 * k + 1], b[k] = full[3 * k + 1];
         bench_row("%s\t%g\t%.3f\t%.4f\t%.2f\t%.5f\t%.3f\t%d", rows[i].kind, rows[i].value, t.ratio, m.rms, m.largest,
-                  metrics_ssim(a, b, s->picture.width, s->picture.height), (double)stats.skipped / (double)s->n, strcmp(rows[i].kind, "scales") == 0 && rows[i].value == 8);
+                  metrics_ssim(a, b, s->picture.width, s->picture.height), (double)stats.skipped / (double)s->n,
+                  strcmp(rows[i].kind, "scales") == 0 && rows[i].value == 8);
         free_work(&w);
         free(codes);
         free(a);
@@ -499,7 +517,8 @@ static void mesopic(scene *scenes, int count)
         reference_luminance(luminance, s->picture.pixels, s->n);
         for (size_t k = 0; k < s->n; ++k) {
             double rgb[3], lr = 0.18 * luminance[k] / stats.adapted;
-            reference_colour(rgb, s->picture.pixels + 3 * k, lr / (1 + lr), reference_rho(10 * luminance[k] / stats.adapted), 0);
+            reference_colour(rgb, s->picture.pixels + 3 * k, lr / (1 + lr),
+                             reference_rho(10 * luminance[k] / stats.adapted), 0);
             for (size_t c = 0; c < 3; ++c) lab[3 * k + c] = metrics_code(rgb[c]);
         }
         metrics_codes m = metrics_compare_codes(codes, lab, s->n * 3);
@@ -523,7 +542,8 @@ static void ashikhmin(scene *scenes, int count)
         tonemap_options o = tonemap_defaults();
         tonemap_stats stats;
         o.operation = TONEMAP_ASHIKHMIN;
-        double *codes = luminance_codes(s, &o, &stats), *la = metrics_alloc(s->n), *l = metrics_alloc(s->n), *g = metrics_alloc(s->n), low, high, unit;
+        double *codes = luminance_codes(s, &o, &stats), *la = metrics_alloc(s->n), *l = metrics_alloc(s->n),
+               *g = metrics_alloc(s->n), low, high, unit;
         work w = make_work(s, &o);
         low = exp2(w.map->state[TONEMAP__LOW]);
         high = exp2(w.map->state[TONEMAP__HIGH]);
@@ -549,7 +569,8 @@ static void ashikhmin(scene *scenes, int count)
             for (y = 0; y < (size_t)s->picture.height; ++y)
                 for (x = 0; x < (size_t)s->picture.width; ++x) {
                     size_t width = (size_t)s->picture.width, cx = centre % width, cy = centre / width;
-                    if ((x > cx ? x - cx : cx - x) <= 17 && (y > cy ? y - cy : cy - y) <= 17) with[y * width + x] = codes[y * width + x];
+                    if ((x > cx ? x - cx : cx - x) <= 17 && (y > cy ? y - cy : cy - y) <= 17)
+                        with[y * width + x] = codes[y * width + x];
                 }
             f = metrics_compare_codes(with, codes, s->n);
             free(with);
@@ -573,7 +594,8 @@ static void flicker(scene *scenes, int count)
         noisy.picture.pixels = (float *)malloc(scenes[i].n * 12);
         for (size_t k = 0; k < scenes[i].n; ++k) {
             float factor = 1 + 0.01f * (bench_noise(&seed) - 0.5f);
-            for (size_t c = 0; c < 3; ++c) noisy.picture.pixels[3 * k + c] = scenes[i].picture.pixels[3 * k + c] * factor;
+            for (size_t c = 0; c < 3; ++c)
+                noisy.picture.pixels[3 * k + c] = scenes[i].picture.pixels[3 * k + c] * factor;
         }
         settle(&noisy, scenes[i].name);
         for (int k = 0; k < 4; ++k) {
@@ -591,7 +613,8 @@ static void flicker(scene *scenes, int count)
     }
 }
 
-/* A step from dark to bright in the middle of 200 columns: how far the codes leave their plateaus, and over how many pixels. */
+/* A step from dark to bright in the middle of 200 columns: how far the codes leave their plateaus, and over how many
+   pixels. */
 static void halos(void)
 {
     enum { W = 200, H = 90 };
@@ -600,7 +623,8 @@ static void halos(void)
     bench_note("largest distance from the code far from the edge; width: pixels that are more than 2 codes off");
     for (double contrast = 10; contrast <= 1.1e6; contrast *= 10)
         for (int k = 0; k < 5; ++k) {
-            const char *names[5] = {"local", "local, soft scales", "local, epsilon 0.025", "local, epsilon 0.0025", "exact Gaussian"};
+            const char *names[5] = {"local", "local, soft scales", "local, epsilon 0.025", "local, epsilon 0.0025",
+                                    "exact Gaussian"};
             scene s;
             tonemap_options o = tonemap_defaults();
             tonemap_stats stats;
@@ -641,9 +665,11 @@ static double frames_per_second(const scene *s, const tonemap_options *o)
 
 static void michael_sizes(const scene *s)
 {
-    static const int sizes[][2] = {{320, 240}, {640, 480}, {800, 600}, {1024, 768}, {512, 512}, {1024, 1024}, {2048, 2048}};
+    static const int sizes[][2] = {{320, 240}, {640, 480},   {800, 600},  {1024, 768},
+                                   {512, 512}, {1024, 1024}, {2048, 2048}};
     static const int published8[4][4] = {{141, 145, 145, 145}, {78, 79, 82, 82}, {55, 58, 59, 59}, {37, 38, 40, 40}};
-    static const int published9[7][3] = {{226, 83, 141}, {111, 28, 78}, {80, 19, 55}, {55, 12, 37}, {1719, 360, 503}, {584, 115, 190}, {195, 33, 64}};
+    static const int published9[7][3] = {{226, 83, 141},   {111, 28, 78},   {80, 19, 55}, {55, 12, 37},
+                                         {1719, 360, 503}, {584, 115, 190}, {195, 33, 64}};
     static const double ratio9[7] = {1.68, 2.79, 2.89, 3.08, 1.40, 1.65, 2.00};
     tonemap_options global = tonemap_defaults(), local = global, selective;
     int count = bench_quick() ? 3 : 7;
@@ -673,7 +699,8 @@ static void michael_sizes(const scene *s)
         enlarge(&f, s, sizes[i][0], sizes[i][1]);
         selective = local;
         selective.selective = 0.1;
-        double g = frames_per_second(&f, &global), l = frames_per_second(&f, &local), st = frames_per_second(&f, &selective);
+        double g = frames_per_second(&f, &global), l = frames_per_second(&f, &local),
+               st = frames_per_second(&f, &selective);
         bench_row("%d x %d\t%.1f\t%.1f\t%.1f\t%.2f\t%d\t%d\t%d\t%.2f", sizes[i][0], sizes[i][1], g, l, st, st / l, published9[i][0], published9[i][1],
                   published9[i][2], ratio9[i]);
         image_free(&f.picture);
@@ -687,7 +714,8 @@ static void michael_pictures(scene *scenes, int count)
     bench_note("flip and scielab: of STM against LTM, in place of VDP; gain = frames a second / (100 flip), eq 20 and 21; decades: 99 % over 1 % quantile; published: Ashikhmin's operator, 8800 GTX");
     for (int i = 0; i < count; ++i)
         for (int kind = 0; kind < 2; ++kind) {
-            static const char *const published[3][3] = {{"memorial", "2.48", "0.9876"}, {"Desk", "1.63", "0.9925"}, {"belgium", "2.14", "0.9853"}};
+            static const char *const published[3][3] = {
+                {"memorial", "2.48", "0.9876"}, {"Desk", "1.63", "0.9925"}, {"belgium", "2.14", "0.9853"}};
             int known = -1;
             for (int k = 0; k < 3 && kind == 0; ++k)
                 if (strcmp(published[k][0], scenes[i].name) == 0) known = k;
@@ -700,17 +728,20 @@ static void michael_pictures(scene *scenes, int count)
             global.operation = kind ? TONEMAP_PHOTOGRAPHIC_GLOBAL : TONEMAP_ASHIKHMIN_GLOBAL;
             selective.selective = 0.1;
             work l = make_work(s, &local), g = make_work(s, &global), t = make_work(s, &selective);
-            bench_times tg = bench_ratio(run_work, &g, run_work, &l, bench_rounds(7)), ts = bench_ratio(run_work, &t, run_work, &l, bench_rounds(7));
-            double *cl = codes_of(s, &local, NULL), *cg = codes_of(s, &global, NULL), *cs = codes_of(s, &selective, &stats);
+            bench_times tg = bench_ratio(run_work, &g, run_work, &l, bench_rounds(7)),
+                        ts = bench_ratio(run_work, &t, run_work, &l, bench_rounds(7));
+            double *cl = codes_of(s, &local, NULL), *cg = codes_of(s, &global, NULL),
+                   *cs = codes_of(s, &selective, &stats);
             double *a = metrics_alloc(s->n), *b = metrics_alloc(s->n), flip, flip_global;
             for (size_t k = 0; k < s->n; ++k) a[k] = cs[3 * k + 1], b[k] = cl[3 * k + 1];
             flip = metrics_flip(cs, cl, width, height, 67);
             flip_global = metrics_flip(cg, cl, width, height, 67);
-            bench_row("%s\t%d x %d\t%.1f\t%s\t%.1f\t%.1f\t%.1f\t%.2f\t%.3f\t%.4f\t%.4f\t%.3f\t%.1f\t%.1f\t%s\t%s", s->name, width, height,
-                      log10(l.stats.high / l.stats.low), kind ? "photographic" : "Ashikhmin", 1 / tg.work, 1 / ts.peer, 1 / ts.work, 1 / ts.ratio,
-                      (double)stats.searched / (double)s->n, metrics_ssim(a, b, width, height), flip, metrics_scielab(cs, cl, width, height, 23),
-                      0.01 / (tg.work * flip_global), 0.01 / (ts.work * flip),
-                      known < 0 ? "" : published[known][1], known < 0 ? "" : published[known][2]);
+            bench_row("%s\t%d x %d\t%.1f\t%s\t%.1f\t%.1f\t%.1f\t%.2f\t%.3f\t%.4f\t%.4f\t%.3f\t%.1f\t%.1f\t%s\t%s",
+                      s->name, width, height, log10(l.stats.high / l.stats.low), kind ? "photographic" : "Ashikhmin",
+                      1 / tg.work, 1 / ts.peer, 1 / ts.work, 1 / ts.ratio, (double)stats.searched / (double)s->n,
+                      metrics_ssim(a, b, width, height), flip, metrics_scielab(cs, cl, width, height, 23),
+                      0.01 / (tg.work * flip_global), 0.01 / (ts.work * flip), known < 0 ? "" : published[known][1],
+                      known < 0 ? "" : published[known][2]);
             free_work(&l);
             free_work(&g);
             free_work(&t);
@@ -732,12 +763,15 @@ static void run_measure(void *user)
 
 static void slomp(const scene *s)
 {
-    static const int sizes[][2] = {{256, 256}, {512, 512}, {720, 480}, {800, 600}, {1024, 768}, {1280, 720}, {1024, 1024}, {1280, 1024},
-                                   {1680, 1050}, {1920, 1080}, {1920, 1200}, {2048, 1280}, {2048, 1536}, {2560, 1440}, {2048, 2048}};
-    static const double published[15][5] = { /* RL, TM.N, TM.MU, TM.MV, FT */
-        {0.345, 0.141, 0.152, 0.153, 1.565}, {0.414, 0.337, 0.380, 0.382, 1.715}, {0.452, 0.420, 0.477, 0.481, 1.695}, {0.482, 0.499, 0.482, 0.493, 1.833},
-        {0.555, 0.873, 0.972, 0.985, 2.436}, {0.633, 0.963, 1.110, 1.125, 2.725}, {0.684, 1.120, 1.279, 1.318, 2.912}, {0.715, 1.335, 1.543, 1.565, 3.444},
-        {0.911, 1.738, 2.061, 2.090, 4.395}, {0.957, 2.075, 2.409, 2.439, 4.957}, {0.987, 2.258, 2.625, 2.655, 5.377}, {1.041, 2.560, 2.966, 3.028, 5.921},
+    static const int sizes[][2] = {{256, 256},   {512, 512},   {720, 480},   {800, 600},   {1024, 768},
+                                   {1280, 720},  {1024, 1024}, {1280, 1024}, {1680, 1050}, {1920, 1080},
+                                   {1920, 1200}, {2048, 1280}, {2048, 1536}, {2560, 1440}, {2048, 2048}};
+    static const double published[15][5] = {
+        /* RL, TM.N, TM.MU, TM.MV, FT */
+        {0.345, 0.141, 0.152, 0.153, 1.565}, {0.414, 0.337, 0.380, 0.382, 1.715}, {0.452, 0.420, 0.477, 0.481, 1.695},
+        {0.482, 0.499, 0.482, 0.493, 1.833}, {0.555, 0.873, 0.972, 0.985, 2.436}, {0.633, 0.963, 1.110, 1.125, 2.725},
+        {0.684, 1.120, 1.279, 1.318, 2.912}, {0.715, 1.335, 1.543, 1.565, 3.444}, {0.911, 1.738, 2.061, 2.090, 4.395},
+        {0.957, 2.075, 2.409, 2.439, 4.957}, {0.987, 2.258, 2.625, 2.655, 5.377}, {1.041, 2.560, 2.966, 3.028, 5.921},
         {1.108, 3.061, 3.543, 3.585, 6.886}, {1.329, 3.595, 4.131, 4.169, 8.035}, {1.366, 4.088, 4.704, 4.759, 8.830}};
     int count = bench_quick() ? 4 : 15;
     bench_table("Slomp 2012, table A.1, on one core: milliseconds", "width\theight\tRL\tTM.N\tTM.MU\tTM.MV\tFT\tMV_overhead\tpublished_RL\tpublished_TM.N\tpublished_TM.MU\tpublished_TM.MV\tpublished_FT");
@@ -758,10 +792,12 @@ static void slomp(const scene *s)
         m.job.map = n.map;
         m.job.hdr = &f.view;
         t[0] = bench_time(run_measure, &m, bench_rounds(7));
-        bench_times tu = bench_ratio(run_work, &u, run_work, &n, bench_rounds(7)), tv = bench_ratio(run_work, &v, run_work, &n, bench_rounds(7));
-        bench_row("%d\t%d\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f", sizes[i][0], sizes[i][1], 1e3 * t[0], 1e3 * (tu.peer - t[0]), 1e3 * (tu.peer * tu.ratio - t[0]),
-                  1e3 * (tv.peer * tv.ratio - t[0]), 1e3 * tv.peer * tv.ratio, tv.ratio - 1, published[i][0], published[i][1], published[i][2],
-                  published[i][3], published[i][4]);
+        bench_times tu = bench_ratio(run_work, &u, run_work, &n, bench_rounds(7)),
+                    tv = bench_ratio(run_work, &v, run_work, &n, bench_rounds(7));
+        bench_row("%d\t%d\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f\t%.3f", sizes[i][0], sizes[i][1],
+                  1e3 * t[0], 1e3 * (tu.peer - t[0]), 1e3 * (tu.peer * tu.ratio - t[0]),
+                  1e3 * (tv.peer * tv.ratio - t[0]), 1e3 * tv.peer * tv.ratio, tv.ratio - 1, published[i][0],
+                  published[i][1], published[i][2], published[i][3], published[i][4]);
         free_work(&n);
         free_work(&u);
         free_work(&v);
@@ -780,8 +816,10 @@ static int wanted_table(int argc, char **argv, const char *name)
 
 int main(int argc, char **argv)
 {
-    static const char *const files[7][2] = {{"StillLife", "hdr/StillLife.exr"}, {"Desk", "hdr/Desk.exr"}, {"memorial", "hdr/memorial.exr"},
-                                            {"belgium", "hdr/belgium.exr"}, {"night", "env/night.exr"}, {"interior", "env/interior.exr"}, {"GoldenGate", "hdr/GoldenGate.exr"}};
+    static const char *const files[7][2] = {{"StillLife", "hdr/StillLife.exr"},  {"Desk", "hdr/Desk.exr"},
+                                            {"memorial", "hdr/memorial.exr"},    {"belgium", "hdr/belgium.exr"},
+                                            {"night", "env/night.exr"},          {"interior", "env/interior.exr"},
+                                            {"GoldenGate", "hdr/GoldenGate.exr"}};
     scene scenes[7];
     int count = 0, wanted = bench_quick() ? 2 : 6;
     bench_start("tonemap.h");

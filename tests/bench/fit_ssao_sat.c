@@ -1,13 +1,13 @@
-/* Fits a kernel for SSAO_SAT_SLABS, polynomials in sine and distance for each ring, to ray-traced pictures and prints it as C,
-   beside the error of the kernel that ssao_sat.h has.
+/* Fits a kernel for SSAO_SAT_SLABS, polynomials in sine and distance for each ring, to ray-traced pictures and prints
+   it as C, beside the error of the kernel that ssao_sat.h has.
 
-   Build as a bench, run with the side of the pictures, rays a pixel, one of how many pixels, ridge, rings, bias (512 256 17 1e-3);
-   build/ keeps the pictures. Scenes 0 to 2 are fitted, each also left out once (the error there is one nothing was fitted to); the
-   others are only measured.
+   Build as a bench, run with the side of the pictures, rays a pixel, one of how many pixels, ridge, rings, bias (512
+   256 17 1e-3); build/ keeps the pictures. Scenes 0 to 2 are fitted, each also left out once (the error there is one
+   nothing was fitted to); the others are only measured.
 
    The model: accessibility = (1 - x)^3, x = face(n.v) fade sum over rings, cells and slabs of
-   coverage (1 - d^2 / range^2) sum c[ring][i][j] s^(i + 1) d^j, s the sine over the tangent plane less the bias, d the distance in
-   radii. Least squares by Levenberg and Marquardt, ridge on the effect that a coefficient has. */
+   coverage (1 - d^2 / range^2) sum c[ring][i][j] s^(i + 1) d^j, s the sine over the tangent plane less the bias, d the
+   distance in radii. Least squares by Levenberg and Marquardt, ridge on the effect that a coefficient has. */
 #define SAT_IMPLEMENTATION
 #define SSAO_SAT_IMPLEMENTATION
 #include "ssao_sat.h"
@@ -25,13 +25,17 @@ static float bias;
 static int rings;
 
 /* What one slab holds in one cell, added to the terms of the ring. */
-static void add_cell(float *x, const ssao_sat *s, const ssao_sat__point *p, int k, const ssao_sat__cells *c, int i, int j, const float *weight)
+static void add_cell(float *x, const ssao_sat *s, const ssao_sat__point *p, int k, const ssao_sat__cells *c, int i,
+                     int j, const float *weight)
 {
     const uint32_t *table = s->table + 4 * (size_t)k * s->table_plane;
     const size_t at = ssao_sat__at(s, p->y) + (size_t)p->x;
-    float word[4], d[3], own[3], scale = s->camera.orthographic ? 1 : p->z, mean, z, square, sine, distance, share, power;
+    float word[4], d[3], own[3], scale = s->camera.orthographic ? 1 : p->z, mean, z, square, sine, distance, share,
+                                 power;
     int t, a, b;
-    for (t = 0; t < 4; t++) word[t] = (float)(int32_t)ssao_sat__box(s, table + t, 4, c->column[i], c->row[j], c->column[i + 1], c->row[j + 1]);
+    for (t = 0; t < 4; t++)
+        word[t] =
+            (float)(int32_t)ssao_sat__box(s, table + t, 4, c->column[i], c->row[j], c->column[i + 1], c->row[j + 1]);
     if (!(word[0] > 0)) return;
     mean = (s->slabs[k].low * word[0] + s->slabs[k].quantum * word[1]) / word[0];
     z = s->camera.orthographic ? mean : 1 / mean;
@@ -100,11 +104,13 @@ static void add_picture(samples *to, const ref_picture *p, int every)
         o.radius = (double)p->radius[r];
         o.scales = rings;
         in.normals = p->normals;
-        if (ssao_sat_create(&ao, p->width, p->height, &o) != SAT_OK || ssao_sat_apply(ao, out, 0, &in, NULL) != SAT_OK) exit(1);
+        if (ssao_sat_create(&ao, p->width, p->height, &o) != SAT_OK || ssao_sat_apply(ao, out, 0, &in, NULL) != SAT_OK)
+            exit(1);
         for (i = 0, state = 0; i < ao->columns * ao->rows; i++) {
             int x = i % ao->columns, y = i / ao->columns;
             state = (state * 73 + 11) % 8191;
-            if (state % every == 0) add_pixel(to, ao, x, y, p->ao[r][(size_t)(y * ao->step) * (size_t)p->width + (size_t)(x * ao->step)]);
+            if (state % every == 0)
+                add_pixel(to, ao, x, y, p->ao[r][(size_t)(y * ao->step) * (size_t)p->width + (size_t)(x * ao->step)]);
         }
         ssao_sat_destroy(ao);
     }
@@ -189,7 +195,8 @@ static double fit(double *q, int n, int left_out, double ridge)
     int i, round, m = n + 2;
     for (i = 0; i < m; i++) q[i] = i < n ? (i % TERMS == 0 ? 0.3 : 0) : 1;
     squares(q, n, left_out, gradient, matrix);
-    for (i = 0; i < m; i++) size[i] = ridge * (matrix[i][i] + 1e-12); /* a term that hardly shows may be large: ridge on its effect */
+    for (i = 0; i < m; i++) size[i] = ridge * (matrix[i][i] + 1e-12); /* a term that hardly shows may be large: ridge on
+                                                                         its effect */
     for (round = 0; round < 60; round++) {
         double penalty = 0;
         now = squares(q, n, left_out, gradient, matrix);
@@ -256,7 +263,8 @@ static void print_kernel(const double *q)
 
 int main(int count, char **arguments)
 {
-    int side = count > 1 ? atoi(arguments[1]) : 512, rays = count > 2 ? atoi(arguments[2]) : 256, every = count > 3 ? atoi(arguments[3]) : 17, scene, left;
+    int side = count > 1 ? atoi(arguments[1]) : 512, rays = count > 2 ? atoi(arguments[2]) : 256,
+        every = count > 3 ? atoi(arguments[3]) : 17, scene, left;
     double ridge = count > 4 ? atof(arguments[4]) : 1e-4, q[MOST];
     int first = count > 5 ? atoi(arguments[5]) : 1, last = count > 5 ? first : 4;
     ref_picture pictures[REF_SCENES];
@@ -274,7 +282,8 @@ int main(int count, char **arguments)
         }
         fit(q, rings * TERMS, -1, ridge);
         printf("; fitted to all three:");
-        for (scene = 0; scene < REF_SCENES; scene++) printf("%s %.4f", scene == FITTED ? "; nothing fitted:" : "", error_on(q, rings * TERMS, scene));
+        for (scene = 0; scene < REF_SCENES; scene++)
+            printf("%s %.4f", scene == FITTED ? "; nothing fitted:" : "", error_on(q, rings * TERMS, scene));
         printf("; the header as it is:");
         for (scene = 0; scene < REF_SCENES; scene++) printf(" %.4f", error_of_header(scene));
         printf(" */\n");

@@ -1,5 +1,5 @@
-/* Shadows on the GPU: table 3 of Michael 2010 in its shape (illumination only, 512 x 512 pixels, samples 128 x 65 x 30), and
-   what a new light costs. LIGHTSCAN_GL=egl for the GPU; OSMesa otherwise, with fewer pixels and samples. */
+/* Shadows on the GPU: table 3 of Michael 2010 in its shape (illumination only, 512 x 512 pixels, samples 128 x 65 x
+   30), and what a new light costs. LIGHTSCAN_GL=egl for the GPU; OSMesa otherwise, with fewer pixels and samples. */
 
 #define SAT_IMPLEMENTATION
 #define FIV_IMPLEMENTATION
@@ -56,14 +56,19 @@ static int open_occluder(int kind)
     }
     meshes[kind] = m;
     o.threads = support_threads(8);
-    if (!succeeded(fiv_occluder_create(&occluders[kind], m.positions, m.vertices, m.indices, m.triangles, &o, &stats[kind]), "occluder")) return 0;
+    if (!succeeded(
+            fiv_occluder_create(&occluders[kind], m.positions, m.vertices, m.indices, m.triangles, &o, &stats[kind]),
+            "occluder"))
+        return 0;
     return succeeded(fiv_occluder_light(occluders[kind], environment, NULL), "light");
 }
 
-/* Points of a plane, in the order of its pixels; or the vertices of the first mesh, with `alpha`, and normals away from its middle. */
+/* Points of a plane, in the order of its pixels; or the vertices of the first mesh, with `alpha`, and normals away from
+   its middle. */
 static int open_receivers(sat__gl *gl, unsigned textures[2], int on_mesh, float alpha)
 {
-    float *points = (float *)malloc((size_t)size * (size_t)size * 4 * sizeof *points), *normals = (float *)calloc((size_t)size * (size_t)size * 4, sizeof *normals);
+    float *points = (float *)malloc((size_t)size * (size_t)size * 4 * sizeof *points),
+          *normals = (float *)calloc((size_t)size * (size_t)size * 4, sizeof *normals);
     sat__gl_state state;
     sat_result r;
     int i, k;
@@ -73,7 +78,9 @@ static int open_receivers(sat__gl *gl, unsigned textures[2], int on_mesh, float 
         points[4 * i + 2] = 16 * ((float)(i / size) / (float)size - 0.5f);
         normals[4 * i + 1] = 1;
         for (k = 0; on_mesh && k < 3; k++)
-            normals[4 * i + k] = points[4 * i + k] = (meshes[0].positions[3 * ((size_t)i % meshes[0].vertices) + (size_t)k] - stats[0].centre[k]) / stats[0].radius;
+            normals[4 * i + k] = points[4 * i + k] =
+                (meshes[0].positions[3 * ((size_t)i % meshes[0].vertices) + (size_t)k] - stats[0].centre[k]) /
+                stats[0].radius;
         points[4 * i + 3] = alpha;
     }
     sat__gl_begin(gl, &state, 1);
@@ -143,12 +150,15 @@ static int scene_row(const char *name, int count, int kinds, double fps)
         int kind = kinds == 2 ? i % 2 : 0;
         instances[i].occluder = occluders[kind];
         instances[i].scale = 1 / stats[kind].radius;
-        for (k = 0; k < 3; k++) instances[i].position[k] = -stats[kind].centre[k] * instances[i].scale + (k == 1 || count == 1 ? 0 : 14 * (float)support_uniform(&seed) - 7);
+        for (k = 0; k < 3; k++)
+            instances[i].position[k] = -stats[kind].centre[k] * instances[i].scale +
+                                       (k == 1 || count == 1 ? 0 : 14 * (float)support_uniform(&seed) - 7);
         total += meshes[kind].vertices;
     }
     for (k = 0; k < kinds; k++) memory += 1e-6 * (double)stats[k].table_bytes;
     o.max_instances = count;
-    ok = succeeded(fiv_gl_create(&g, context.get_proc, size, size, &o), fiv_gl_message(g)) && open_receivers(&g->gl, textures, 0, 1);
+    ok = succeeded(fiv_gl_create(&g, context.get_proc, size, size, &o), fiv_gl_message(g)) &&
+         open_receivers(&g->gl, textures, 0, 1);
     if (ok) {
         ok = succeeded(fiv_gl_set_scene(g, environment, instances, (size_t)count), fiv_gl_message(g));
         g->gl.Finish();
@@ -166,15 +176,22 @@ static int scene_row(const char *name, int count, int kinds, double fps)
 
 int main(void)
 {
-    static const struct { const char *name; int count, kinds; double fps; } scenes[8] = {
-        {"1 bunny", 1, 1, 112}, {"10 bunnies", 10, 1, 68}, {"5 x (bunny + queen)", 10, 2, 68}, {"10 x (bunny + queen)", 20, 2, 46},
-        {"15 x (bunny + queen)", 30, 2, 35}, {"20 x (bunny + queen)", 40, 2, 29}, {"30 x (bunny + queen)", 60, 2, 22}, {NULL, 0, 0, 0}};
+    static const struct { const char *name; int count, kinds; double fps;
+    } scenes[8] = {{"1 bunny", 1, 1, 112},
+                   {"10 bunnies", 10, 1, 68},
+                   {"5 x (bunny + queen)", 10, 2, 68},
+                   {"10 x (bunny + queen)", 20, 2, 46},
+                   {"15 x (bunny + queen)", 30, 2, 35},
+                   {"20 x (bunny + queen)", 40, 2, 29},
+                   {"30 x (bunny + queen)", 60, 2, 22},
+                   {NULL, 0, 0, 0}};
     int i;
     if (!gl_context_open(&context, 3, 3)) {
         printf("# skipped: %s\n", context.message);
         return 0;
     }
-    software = strstr(gl_context_renderer(&context), "llvmpipe") != NULL || strstr(gl_context_renderer(&context), "softpipe") != NULL;
+    software = strstr(gl_context_renderer(&context), "llvmpipe") != NULL ||
+               strstr(gl_context_renderer(&context), "softpipe") != NULL;
     size = bench_quick() ? 64 : software ? 96 : 512;
     bench_start("fiv.h, OpenGL");
     printf("# %s\n", gl_context_renderer(&context));
@@ -182,7 +199,8 @@ int main(void)
     bench_table("Table 3: scenes of many occluders (published: GeForce 8800 GTS, 512 x 512; trees where this says queens)",
                 "scene\tobjects\tvertices\tmemory_mb\tpublished_fps\tfps\tpass_ms\trelight_upload_ms");
     bench_plot("Frames a second; x=objects; y=fps; log=xy");
-    for (i = 0; scenes[i].name && !(bench_quick() && i > 3); i++) scene_row(scenes[i].name, scenes[i].count, scenes[i].kinds, scenes[i].fps);
+    for (i = 0; scenes[i].name && !(bench_quick() && i > 3); i++)
+        scene_row(scenes[i].name, scenes[i].count, scenes[i].kinds, scenes[i].fps);
     printf("# note: %d x %d pixels; upload: all vectors again, after a new light\n", size, size);
     bench_table("Self-shadows: receivers on the mesh, as on another object's surface and as on its own (eq 13)", "scene\tother_ms\tself_ms\tself_ratio");
     self_row();

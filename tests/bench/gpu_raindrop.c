@@ -56,7 +56,8 @@ static int open_scene(void)
     ok = ok && succeeded(sat__gl_framebuffer(&gpu, &the.framebuffer, &the.texture, 1, 0), gpu.message);
     sat__gl_end(&gpu, &state);
     o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
-    return ok && succeeded(tonemap_gl_create(&the.tone, context.get_proc, size, size, &o), tonemap_gl_message(the.tone));
+    return ok &&
+           succeeded(tonemap_gl_create(&the.tone, context.get_proc, size, size, &o), tonemap_gl_message(the.tone));
 }
 
 static raindrop_rain *published(int count)
@@ -127,7 +128,8 @@ static void table_2_2(void)
             int look, tone;
             o.map = the.map;
             o.quads = quads;
-            if (!succeeded(raindrop_gl_create(&g, context.get_proc, &o), raindrop_gl_message(g)) || !succeeded(raindrop_gl_set_environment(g, the.environment), raindrop_gl_message(g)) ||
+            if (!succeeded(raindrop_gl_create(&g, context.get_proc, &o), raindrop_gl_message(g)) ||
+                !succeeded(raindrop_gl_set_environment(g, the.environment), raindrop_gl_message(g)) ||
                 !succeeded(raindrop_gl_set_rain(g, rain), raindrop_gl_message(g)))
                 exit(1);
             for (look = 0; look < 4; look++)
@@ -199,7 +201,8 @@ static double error_of(raindrop_gl *g, raindrop_rain *rain, int kind, raindrop_l
     for (k = 0; k < pixels; k++) memmove(got + 3 * k, got + 4 * k, 12);
     for (k = 0; k < pixels; k++) memcpy(cpu + 3 * k, grey, 12);
     /* bottom row first, as the GPU has it */
-    raindrop_render(cpu + 3 * (size_t)(size - 1) * (size_t)size, -12 * (ptrdiff_t)size, size, size, NULL, &the.camera, rain, the.environment, &o, NULL);
+    raindrop_render(cpu + 3 * (size_t)(size - 1) * (size_t)size, -12 * (ptrdiff_t)size, size, size, NULL, &the.camera,
+                    rain, the.environment, &o, NULL);
     return reference_rmse(got, cpu, NULL, pixels, 1);
 }
 

@@ -134,7 +134,8 @@ static double median_error(sat_gl *gl, sat_gl_format format, const picture *p, i
     sat__gl_state state;
     int i;
     sat__gl_begin(&gpu, &state, 1);
-    if (!table || sat__gl_read(&gpu, table, sat_gl_table(gl), sat__gl_internal(format), p->width, p->height) != SAT_OK) exit(1);
+    if (!table || sat__gl_read(&gpu, table, sat_gl_table(gl), sat__gl_internal(format), p->width, p->height) != SAT_OK)
+        exit(1);
     sat__gl_end(&gpu, &state);
     for (i = 0; i < 4000; i++) {
         int b[4];
@@ -202,8 +203,9 @@ static double measure_new(sat_gl_format format, int k, int compute, const pictur
 
 static void published_table(int sizes)
 {
-    static const int size[15][2] = {{256, 256}, {512, 512}, {720, 480}, {800, 600}, {1024, 768}, {1280, 720}, {1024, 1024}, {1280, 1024},
-                                    {1680, 1050}, {1920, 1080}, {1920, 1200}, {2048, 1280}, {2048, 1536}, {2560, 1440}, {2048, 2048}};
+    static const int size[15][2] = {{256, 256},   {512, 512},   {720, 480},   {800, 600},   {1024, 768},
+                                    {1280, 720},  {1024, 1024}, {1280, 1024}, {1680, 1050}, {1920, 1080},
+                                    {1920, 1200}, {2048, 1280}, {2048, 1536}, {2560, 1440}, {2048, 2048}};
     static const int ks[4] = {2, 4, 6, 8};
     sat_gl *objects[4][3];
     int i, j;
@@ -220,7 +222,8 @@ static void published_table(int sizes)
     for (i = 0; i < sizes; i++) {
         picture p = make_picture(size[i][0], size[i][1], 0);
         for (j = 0; j < 4; j++) {
-            double error[2], rd = measure(objects[j][0], &p, &error[0], 11), bt = measure(objects[j][1], &p, &error[1], 11);
+            double error[2], rd = measure(objects[j][0], &p, &error[0], 11),
+                             bt = measure(objects[j][1], &p, &error[1], 11);
             double compute = gpu.has_compute ? measure(objects[j][2], &p, NULL, 0) : 0;
             bench_row("%d\t%d\t%d\t%d\t%.3f\t%.3f\t%.2f\t%.3f\t%.2g\t%.2g", i + 1, p.width, p.height, ks[j], rd, bt, rd / bt, compute, error[0], error[1]);
         }
@@ -256,7 +259,8 @@ static void format_table(int side)
     bench_note("median relative errors of 3 x 3 and 41 x 41 box sums; hdr spans 14 decades, which fixed32 (made for [0, 1]) clamps");
     for (format = 0; format < 3; format++) {
         sat_gl *gl = make((sat_gl_format)format, SAT_SCAN_BALANCED_TREE, 4, 0);
-        double e[4], ms = measure(gl, &uniform, &e[0], 3), compute = measure_new((sat_gl_format)format, 64, 1, &uniform);
+        double e[4], ms = measure(gl, &uniform, &e[0], 3),
+                     compute = measure_new((sat_gl_format)format, 64, 1, &uniform);
         e[1] = median_error(gl, (sat_gl_format)format, &uniform, 41);
         measure(gl, &hdr, &e[2], 3);
         e[3] = median_error(gl, (sat_gl_format)format, &hdr, 41);
@@ -301,7 +305,8 @@ int main(void)
         return 0;
     }
     bench_start("sat.h on the GPU");
-    printf("# renderer: %s\n# time: %s\n", gl_context_renderer(&context), gpu.has_timer ? "timer queries" : "clock between two glFinish");
+    printf("# renderer: %s\n# time: %s\n", gl_context_renderer(&context),
+           gpu.has_timer ? "timer queries" : "clock between two glFinish");
     software = !gpu.has_timer || strstr(context.message, "softpipe") || strstr(context.message, "llvmpipe");
     published_table(bench_quick() ? 2 : software ? 4 : 15);
     compute_table(software || bench_quick() ? 512 : 2048);

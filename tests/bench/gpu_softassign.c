@@ -21,8 +21,10 @@ static float *make_features(int count, int levels, uint64_t seed)
     int i, k;
     if (!out) exit(1);
     for (i = 0; i < count; i++) {
-        double r = support_uniform(&seed), level = levels ? 255 * floor(r * levels) / levels : 255 * r, slope = support_gaussian(&seed);
-        for (k = 0; k < FEATURES; k++) out[i * FEATURES + k] = (float)(level + 8 * slope * (k / 3 % 4) + 6 * support_gaussian(&seed));
+        double r = support_uniform(&seed), level = levels ? 255 * floor(r * levels) / levels : 255 * r,
+               slope = support_gaussian(&seed);
+        for (k = 0; k < FEATURES; k++)
+            out[i * FEATURES + k] = (float)(level + 8 * slope * (k / 3 % 4) + 6 * support_gaussian(&seed));
     }
     return out;
 }
@@ -61,9 +63,11 @@ static double seconds_of(void (*work)(const run *r), const run *r, int rounds)
 
 int main(void)
 {
-    static const int sizes[][2] = {{100, 100}, {100, 500}, {400, 1500}, {512, 2048}, {900, 3000}, {1024, 4096}, {1200, 5000}, {1600, 6000}, {1800, 7000}, {2048, 8192}};
-    static const double thesis[][3] = {{.024, .022, .022}, {.114, .062, .023}, {1.506, .780, .035}, {2.572, 1.479, .052}, {6.485, 3.912, .114},
-                                       {10.01, 5.963, .171}, {14.29, 8.532, .239}, {22.73, 13.85, .374}, {29.82, 17.78, .487}, {39.77, 23.62, .643}};
+    static const int sizes[][2] = {{100, 100},   {100, 500},   {400, 1500},  {512, 2048},  {900, 3000},
+                                   {1024, 4096}, {1200, 5000}, {1600, 6000}, {1800, 7000}, {2048, 8192}};
+    static const double thesis[][3] = {
+        {.024, .022, .022},   {.114, .062, .023},   {1.506, .780, .035},  {2.572, 1.479, .052}, {6.485, 3.912, .114},
+        {10.01, 5.963, .171}, {14.29, 8.532, .239}, {22.73, 13.85, .374}, {29.82, 17.78, .487}, {39.77, 23.62, .643}};
     static const int gathers[] = {4, 8, 16, 32};
     float *patches = make_features(2048, 12, 1), *tiles = make_features(8192, 0, 2);
     size_t k, g;
@@ -72,7 +76,8 @@ int main(void)
         return 0;
     }
     if (sat__gl_open(&gpu, context.get_proc) != SAT_OK) return 1;
-    software = strstr(gl_context_renderer(&context), "llvmpipe") || strstr(gl_context_renderer(&context), "softpipe") || bench_quick();
+    software = strstr(gl_context_renderer(&context), "llvmpipe") || strstr(gl_context_renderer(&context), "softpipe") ||
+               bench_quick();
     bench_start("softassign.h on the GPU");
     printf("# renderer: %s\n", gl_context_renderer(&context));
     bench_table("Slomp 2012, table 3.2: seconds for one temperature of 10 stabilisations of 10 Sinkhorn iterations",

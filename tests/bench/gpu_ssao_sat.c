@@ -1,5 +1,5 @@
-/* Ambient occlusion on the GPU: Slomp 2012, table 5.1 and figure 5.16, in their shape. LIGHTSCAN_GL=egl for the GPU, OSMesa otherwise
-   (then with the smaller sizes only). Occlusion passes alone: the thesis timed whole frames. */
+/* Ambient occlusion on the GPU: Slomp 2012, table 5.1 and figure 5.16, in their shape. LIGHTSCAN_GL=egl for the GPU,
+   OSMesa otherwise (then with the smaller sizes only). Occlusion passes alone: the thesis timed whole frames. */
 
 #define SAT_IMPLEMENTATION
 #define SSAO_SAT_IMPLEMENTATION
@@ -14,7 +14,8 @@ static gl_context context;
 static sat__gl gpu;
 static int software;
 
-/* ---- the usual methods as fragment passes: linear depth, half resolution, then a separable blur that keeps edges ---- */
+/* ---- the usual methods as fragment passes: linear depth, half resolution, then a separable blur that keeps edges
+   ---- */
 
 static const char common_text[] =
     "uniform sampler2D depth, normals, occlusion;\n"
@@ -90,10 +91,16 @@ static const char blur_text[] =
 
 enum { TRADITIONAL, HORIZON, BLUR, PROGRAMS };
 enum { METHODS = 7 };
-static const char *const names[METHODS] = {"traditional 16 + 15x15 blur", "horizon-based 16x8 + 15x15 blur", "SAT minimalist",
-                                           "SAT normal-guided", "SAT normal-guided, refined", "SAT plane 2x2", "SAT slabs"};
-static const ssao_sat_method ours[METHODS] = {SSAO_SAT_SLABS, SSAO_SAT_SLABS, SSAO_SAT_MINIMALIST, SSAO_SAT_NORMAL_GUIDED,
-                                              SSAO_SAT_REFINED, SSAO_SAT_PLANE, SSAO_SAT_SLABS};
+static const char *const names[METHODS] = {"traditional 16 + 15x15 blur",
+                                           "horizon-based 16x8 + 15x15 blur",
+                                           "SAT minimalist",
+                                           "SAT normal-guided",
+                                           "SAT normal-guided, refined",
+                                           "SAT plane 2x2",
+                                           "SAT slabs"};
+static const ssao_sat_method ours[METHODS] = {SSAO_SAT_SLABS,         SSAO_SAT_SLABS,   SSAO_SAT_MINIMALIST,
+                                              SSAO_SAT_NORMAL_GUIDED, SSAO_SAT_REFINED, SSAO_SAT_PLANE,
+                                              SSAO_SAT_SLABS};
 
 typedef struct work {
     int method, size;
@@ -207,7 +214,8 @@ static void measure(double *t, int size)
         w.gl = NULL;
         o.method = ours[i];
         o.radius = 0.25;
-        if (i >= 2 && ssao_sat_gl_create(&w.gl, context.get_proc, size, size, &o) != SAT_OK) stop(ssao_sat_gl_message(w.gl));
+        if (i >= 2 && ssao_sat_gl_create(&w.gl, context.get_proc, size, size, &o) != SAT_OK)
+            stop(ssao_sat_gl_message(w.gl));
         t[i] = milliseconds(&w);
         ssao_sat_gl_destroy(w.gl);
     }
@@ -229,7 +237,8 @@ int main(void)
         return 0;
     }
     printf("# renderer: %s\n", gl_context_renderer(&context));
-    software = strstr(gl_context_renderer(&context), "llvmpipe") != NULL || strstr(gl_context_renderer(&context), "softpipe") != NULL;
+    software = strstr(gl_context_renderer(&context), "llvmpipe") != NULL ||
+               strstr(gl_context_renderer(&context), "softpipe") != NULL;
     small = software || bench_quick();
     for (i = 256; i <= (small ? 256 : 2048); i *= 2) sizes[count++] = i;
     if (!small) sizes[count++] = 4096;

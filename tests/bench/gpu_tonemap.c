@@ -1,4 +1,5 @@
-/* Slomp 2012, table A.1, on a GPU: the passes of tonemap.h by size, and its frame rates (Michael 2010, tables 9 to 13). */
+/* Slomp 2012, table A.1, on a GPU: the passes of tonemap.h by size, and its frame rates (Michael 2010, tables 9 to
+   13). */
 
 #define SAT_IMPLEMENTATION
 #define TONEMAP_IMPLEMENTATION
@@ -87,8 +88,9 @@ static unsigned upload(sat__gl *gl, int width, int height)
 
 int main(void)
 {
-    static const int sizes[][2] = {{256, 256}, {512, 512}, {720, 480}, {800, 600}, {1024, 768}, {1280, 720}, {1024, 1024}, {1280, 1024},
-                                   {1680, 1050}, {1920, 1080}, {1920, 1200}, {2048, 1280}, {2048, 1536}, {2560, 1440}, {2048, 2048}};
+    static const int sizes[][2] = {{256, 256},   {512, 512},   {720, 480},   {800, 600},   {1024, 768},
+                                   {1280, 720},  {1024, 1024}, {1280, 1024}, {1680, 1050}, {1920, 1080},
+                                   {1920, 1200}, {2048, 1280}, {2048, 1536}, {2560, 1440}, {2048, 2048}};
     gl_context context;
     sat__gl gl;
     int i, k, slow, count, calls, rounds;
@@ -103,7 +105,8 @@ int main(void)
     count = slow ? 3 : 15;
     rounds = slow ? 3 : 9;
     calls = slow ? 1 : 20;
-    bench_table("Slomp 2012, table A.1: milliseconds on the GPU", "width\theight\tRL\tTM.N\tTM.MU\tTM.MV\tFT\tMV_overhead");
+    bench_table("Slomp 2012, table A.1: milliseconds on the GPU",
+                "width\theight\tRL\tTM.N\tTM.MU\tTM.MV\tFT\tMV_overhead");
     bench_note("RL: relative luminance, log-average and adaptation; TM: rounding, SAT, search, colour and sRGB without (N), with uniform (MU) and local (MV) mesopic filter; FT: the whole frame with MV; MV_overhead: of TM");
     for (i = 0; i < count; ++i) {
         unsigned hdr = upload(&gl, sizes[i][0], sizes[i][1]);
@@ -139,7 +142,8 @@ int main(void)
                 fps[m] = 1 / seconds(&gl, &f, calls, rounds);
                 tonemap_gl_destroy(f.map);
             }
-            bench_row("%d\t%d\t%s\t%.1f\t%.1f\t%.1f\t%.2f", sizes[i][0], sizes[i][1], k ? "photographic" : "Ashikhmin", fps[0], fps[1], fps[2], fps[2] / fps[1]);
+            bench_row("%d\t%d\t%s\t%.1f\t%.1f\t%.1f\t%.2f", sizes[i][0], sizes[i][1], k ? "photographic" : "Ashikhmin",
+                      fps[0], fps[1], fps[2], fps[2] / fps[1]);
             gl.DeleteTextures(1, &hdr);
         }
     sat__gl_close(&gl);
