@@ -3986,8 +3986,10 @@ static double sat__largest_pixel(const sat_table *t, const sat_image *image)
 /* What a fixed-point box sum may reach, in quanta, divided by the pixels of a box. */
 static double sat__fixed_range(const sat_table *t)
 {
-    double area = t->options.max_box_area > 0 ? t->options.max_box_area : (double)t->width * (double)t->height;
-    return (t->options.kind == SAT_KIND_FIXED32 ? 2147483647.0 : 9223372036854774784.0) / area - 0.5;
+    double most = t->options.kind == SAT_KIND_FIXED32 ? 2147483647.0 : 9223372036854774784.0;
+    double table = (double)t->width * (double)t->height, area = t->options.max_box_area;
+    if (!(area > 0) || (area > table && most / area < 1.5)) area = table; /* no box is larger than the table */
+    return most / area - 0.5;
 }
 
 /* Settles the largest value a pixel may have and the quantum. Limits keep every float sum finite. */
@@ -5701,11 +5703,12 @@ static double sat__gl_largest(const sat_gl *g)
 static sat_result sat__gl_settle(sat_gl *g, int width, int height)
 {
     const sat_gl_options *o = &g->options;
-    double largest = sat__gl_largest(g), range;
+    double table = (double)width * (double)height, area = o->max_box_area, largest = sat__gl_largest(g), range;
     g->quantum = 0;
     if (o->format == SAT_GL_FIXED32) {
         largest = o->max_value < 3.4028234663852886e38 ? o->max_value : 3.4028234663852886e38;
-        range = 2147483647.0 / (o->max_box_area > 0 ? o->max_box_area : (double)width * (double)height) - 0.5;
+        if (!(area > 0) || (area > table && 2147483647.0 / area < 1.5)) area = table;
+        range = 2147483647.0 / area - 0.5;
         g->quantum = o->unsigned_input && !(o->quantum > 0) ? 1 : o->quantum;
         if (!o->unsigned_input && range < 1)
             return sat__gl_fail(&g->gl, SAT_ERR_LIMIT, "max_box_area leaves a pixel less than one quantum", NULL);

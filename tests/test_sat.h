@@ -1314,6 +1314,50 @@ static int moments_refused(const void *options, char *text)
     return r == SAT_ERR_ARGUMENT;
 }
 
+/* What a table of these options must answer for 16 x 16 pixels that none of them changes: each box within its bound. */
+static void corner_of_options(const sat_options *o, const float *pixels, int channels)
+{
+    sat_image image = sat_image_f32(pixels, 16, 16, channels);
+    char text[200];
+    sat_table *t = NULL;
+    int explained, i, box[4] = {3, 2, 12, 15};
+    sat_explain(text, sizeof text, 16, 16, channels, o);
+    explained = text[0] != 0;
+    sat_result r = sat_create(&t, 16, 16, channels, o);
+    if (!EXPECT_EQ(r != SAT_OK, explained)) puts(text);
+    if (r != SAT_OK) return;
+    EXPECT_EQ(sat_build(t, &image), SAT_OK);
+    for (i = 0; i < channels; i++) {
+        double sum = 0, bound = sat_error_bound(t, i, 9, 13), limit = o->max_value > 0 ? o->max_value : 1e300;
+        int x, y;
+        for (y = box[1]; y < box[3]; y++)
+            for (x = box[0]; x < box[2]; x++) sum += fmin((double)pixels[(16 * y + x) * channels + i], limit);
+        EXPECT_NEAR(sat_mean(t, i, box[0], box[1], box[2], box[3]), sum / 117, bound + 1e-12);
+    }
+    sat_destroy(t);
+}
+
+/* First, last and default of every option, in pairs, for every kind: create and explain agree, and boxes are right. */
+TEST(corners_of_the_options_in_pairs)
+{
+    float pixels[16 * 16 * 3];
+    int n = SAT__COUNT(sat__table_fields), kind, i, j, a, b;
+    for (i = 0; i < 16 * 16 * 3; i++) pixels[i] = 0.25f * (float)(i * 37 % 101);
+    for (kind = 0; kind < 5; kind++)
+        for (i = 0; i < n; i++)
+            for (j = 0; j < i; j++)
+                for (a = 0; a < 3; a++)
+                    for (b = 0; b < 3; b++) {
+                        const sat__field *f = &sat__table_fields[i], *g = &sat__table_fields[j];
+                        sat_options o = sat_defaults();
+                        if (strchr("at", f->type) || strchr("at", g->type)) continue;
+                        o.kind = (sat_kind)kind;
+                        sat__field_set(f, &o, a == 0 ? f->low : a == 1 ? f->high : f->initial);
+                        sat__field_set(g, &o, b == 0 ? g->low : b == 1 ? g->high : g->initial);
+                        corner_of_options(&o, pixels, 1 + (i + j + a + b) % 3);
+                    }
+}
+
 TEST(every_refusal_names_its_field)
 {
     int unknown = 4;
