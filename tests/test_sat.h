@@ -1317,7 +1317,7 @@ static int moments_refused(const void *options, char *text)
 /* What a table of these options must answer for 16 x 16 pixels that none of them changes: each box within its bound. */
 static void corner_of_options(const sat_options *o, const float *pixels, int channels)
 {
-    sat_image image = sat_image_f32(pixels, 16, 16, channels);
+    sat_image view = sat_image_f32(pixels, 16, 16, channels);
     char text[200];
     sat_table *t = NULL;
     int explained, i, box[4] = {3, 2, 12, 15};
@@ -1326,7 +1326,7 @@ static void corner_of_options(const sat_options *o, const float *pixels, int cha
     sat_result r = sat_create(&t, 16, 16, channels, o);
     if (!EXPECT_EQ(r != SAT_OK, explained)) puts(text);
     if (r != SAT_OK) return;
-    EXPECT_EQ(sat_build(t, &image), SAT_OK);
+    EXPECT_EQ(sat_build(t, &view), SAT_OK);
     for (i = 0; i < channels; i++) {
         double sum = 0, bound = sat_error_bound(t, i, 9, 13), limit = o->max_value > 0 ? o->max_value : 1e300;
         int x, y;
