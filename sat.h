@@ -5700,7 +5700,7 @@ static double sat__gl_largest(const sat_gl *g)
 
 /* The largest pixel and the quantum for this size, as SAT_KIND_FLOAT and SAT_KIND_FIXED32 choose them: every
    box that may be asked for must fit into 31 bits. */
-static sat_result sat__gl_settle(sat_gl *g, int width, int height)
+static void sat__gl_settle(sat_gl *g, int width, int height)
 {
     const sat_gl_options *o = &g->options;
     double table = (double)width * (double)height, area = o->max_box_area, largest = sat__gl_largest(g), range;
@@ -5710,8 +5710,6 @@ static sat_result sat__gl_settle(sat_gl *g, int width, int height)
         if (!(area > 0) || (area > table && 2147483647.0 / area < 1.5)) area = table;
         range = 2147483647.0 / area - 0.5;
         g->quantum = o->unsigned_input && !(o->quantum > 0) ? 1 : o->quantum;
-        if (!o->unsigned_input && range < 1)
-            return sat__gl_fail(&g->gl, SAT_ERR_LIMIT, "max_box_area leaves a pixel less than one quantum", NULL);
         if (!(g->quantum > 0)) {
             int exponent;
             double fraction = frexp(largest / range, &exponent);
@@ -5721,7 +5719,6 @@ static sat_result sat__gl_settle(sat_gl *g, int width, int height)
         if (range * g->quantum < largest) largest = range * g->quantum;
     }
     g->limit = (float)largest;
-    return SAT_OK;
 }
 
 /* Makes what is missing for a build of this size: nothing when the last one had it. */
@@ -5734,8 +5731,7 @@ static sat_result sat__gl_fit(sat_gl *g, int width, int height, int own_table)
         return result;
     }
     sat__gl_free_textures(g);
-    result = sat__gl_settle(g, width, height);
-    if (result != SAT_OK) return result;
+    sat__gl_settle(g, width, height);
     g->width = width;
     g->height = height;
     if (own_table) result = sat__gl_make_target(&g->gl, &g->table, internal, width, height);
