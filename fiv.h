@@ -136,7 +136,7 @@ enum {
 };
 
 typedef struct fiv_environment_options {
-    int face;              /* 32; 8..64; texels along an edge of the light's cube and of every mask */
+    int resolution;        /* 32; 8..64; texels along an edge of the light's cube and of every mask */
     float delta_ratio;     /* 400; 0..1e38; a patch this many times brighter than the mean, and half a texel wide,
                               becomes a directional light; 0: none does */
     int max_lights;        /* 8; 0..FIV_MAX_LIGHTS; the strongest ones are kept, the rest stays in the cube */
@@ -145,7 +145,8 @@ typedef struct fiv_environment_options {
     sat_threads threads;     /* serial; used by create and update; same bits for any worker count */
 } fiv_environment_options;
 FIV_DEF fiv_environment_options fiv_environment_defaults(void);
-/* One sentence on what create would refuse about these options ("face is 99; 8..64"), "" when nothing; returns text. */
+/* One sentence on what create would refuse about these options ("resolution is 99; 8..64"), "" when nothing; returns
+   text. */
 FIV_DEF const char *fiv_explain_environment(char *text, size_t size, const fiv_environment_options *options);
 
 typedef struct fiv_environment_stats {
@@ -169,14 +170,14 @@ FIV_DEF fiv_environment_stats fiv_environment_get_stats(const fiv_environment *e
 FIV_DEF void fiv_environment_destroy(fiv_environment *environment); /* NULL is fine */
 
 /* I_tot (eq 6) of a surface with this normal, without any occluder; W/m2. The normal is normalised; 0 gives 0. */
-FIV_DEF void fiv_environment_irradiance(const fiv_environment *environment, float rgb[3], const float normal[3]);
+FIV_DEF void fiv_environment_irradiance(float rgb[3], const fiv_environment *environment, const float normal[3]);
 /* The vector of the whole environment (eq 10): x, y, z of red, then of green, then of blue. */
-FIV_DEF void fiv_environment_vector(const fiv_environment *environment, float fiv[9]);
+FIV_DEF void fiv_environment_vector(float fiv[9], const fiv_environment *environment);
 /* The M directional lights that the environment is made of (eq 6): first the split-off ones, then one a cube texel.
    Fills at most `capacity` directions and powers (3 floats each: unit vector, radiance times solid angle; none where
    one of them is NULL) and returns M. */
-FIV_DEF size_t fiv_environment_lights(const fiv_environment *environment, float *directions, float *powers,
-                                      size_t capacity);
+FIV_DEF size_t fiv_environment_lights(float *directions, float *powers, size_t capacity,
+                                      const fiv_environment *environment);
 
 /* ------------------------------------------------------------------------------------------------
    Occluders: what casts shadows
@@ -194,7 +195,7 @@ typedef struct fiv_occluder_options {
     int theta, phi, rho;           /* 32, 17, 15; 4..4096 (even), 3..2049, 2..256: azimuths, polar angles with both
                                       poles, shells at logarithmic distances */
     float first_shell, last_shell; /* 0.3, 6; bounding radii; 0 < first < last <= 1000 */
-    int face;                      /* 32; 8..64: that of the environments that will light it */
+    int resolution;                /* 32; 8..64: that of the environments that will light it */
     fiv_storage storage;           /* FIV_STORAGE_FLOAT */
     int keep_masks;                /* 1; 0: each fiv_occluder_light rasterises all masks anew; no FIV_MASK, no save */
     int lazy;                      /* 0; 1 (without keep_masks): only what fiv_occluder_prepare asks for is computed */
@@ -242,7 +243,7 @@ FIV_DEF void fiv_occluder_destroy(fiv_occluder *occluder); /* NULL is fine */
 FIV_DEF size_t fiv_occluder_save_size(const fiv_occluder *occluder);
 /* Masks and geometry, not the light. size is at least fiv_occluder_save_size; the bytes depend on the arguments of
    create alone. */
-FIV_DEF sat_result fiv_occluder_save(const fiv_occluder *occluder, void *memory, size_t size);
+FIV_DEF sat_result fiv_occluder_save(void *memory, size_t size, const fiv_occluder *occluder);
 /* Takes nothing on trust: SAT_ERR_DATA for anything but a complete save of this version. `options` gives storage,
    max_lights, allocator and threads; the rest comes from the save. Light it before use. */
 FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, size_t size,
@@ -315,8 +316,8 @@ FIV_DEF sat_result fiv_self_irradiance(float *rgb, const float *points, const fl
 FIV_DEF sat_result fiv_occluder_invalidate(fiv_occluder *occluder, const float *positions);
 /* Computes the stale samples that these receivers touch through the instances of this occluder. *computed (may be NULL)
    says how many. Needs a preceding fiv_occluder_light. No allocation. */
-FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *occluder, const fiv_instance *instances, size_t instance_count,
-                                        const float *points, size_t count, size_t *computed);
+FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *occluder, size_t *computed, const fiv_instance *instances,
+                                        size_t instance_count, const float *points, size_t count);
 
 /* The version the implementation was compiled with: compare with FIV_VERSION. */
 FIV_DEF int fiv_version(void);
@@ -363,6 +364,7 @@ FIV_DEF sat_result fiv_gl_move(fiv_gl *gl, const fiv_instance *instances, size_t
 FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *gl, unsigned points, unsigned normals);
 /* The result, RGBA32F; belongs to the object. */
 FIV_DEF unsigned fiv_gl_texture(const fiv_gl *gl);
+/* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 FIV_DEF const char *fiv_gl_message(const fiv_gl *gl);
 FIV_DEF void fiv_gl_destroy(fiv_gl *gl); /* NULL is fine */
 
@@ -569,7 +571,7 @@ struct fiv_environment {
 };
 
 static const sat__field fiv__environment_fields[] = {
-    SAT__FIELD(fiv_environment_options, 'i', face, 32, 8, 64, ' '),
+    SAT__FIELD(fiv_environment_options, 'i', resolution, 32, 8, 64, ' '),
     SAT__FIELD(fiv_environment_options, 'f', delta_ratio, 400, 0, 1e38, ' '),
     SAT__FIELD(fiv_environment_options, 'i', max_lights, 8, 0, FIV_MAX_LIGHTS, ' '),
     SAT__FIELD(fiv_environment_options, 'f', max_radiance, 1e10, 1e-30, 1e38, ' '),
@@ -1067,8 +1069,8 @@ FIV_DEF sat_result fiv_environment_create(fiv_environment **out, const sat_image
     memset(&e, 0, sizeof e);
     if (!sat__resolve_allocator(&e.allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     e.threads = o.threads;
-    e.face = o.face;
-    e.patch = 2 * o.face;
+    e.face = o.resolution;
+    e.patch = 2 * o.resolution;
     e.delta_ratio = o.delta_ratio;
     e.max_lights = o.max_lights;
     e.max_radiance = o.max_radiance;
@@ -1084,7 +1086,7 @@ FIV_DEF sat_result fiv_environment_create(fiv_environment **out, const sat_image
     made = (fiv_environment *)sat__carve(&arena, 1, sizeof e);
     fiv__environment_layout(&e, &arena);
     *made = e;
-    for (i = 0; i < o.face * o.face; i++) made->angles[i] = fiv__texel_angle(i % o.face, i / o.face, o.face);
+    for (i = 0; i < e.face * e.face; i++) made->angles[i] = fiv__texel_angle(i % e.face, i / e.face, e.face);
     result = fiv_environment_update(made, equirect_rgb, NULL);
     FIV_ASSERT(result == SAT_OK);
     *out = made;
@@ -1148,7 +1150,7 @@ static void fiv__diffuse(float rgb[3], const fiv_environment *e, const float uni
     }
 }
 
-FIV_DEF void fiv_environment_irradiance(const fiv_environment *e, float rgb[3], const float normal[3])
+FIV_DEF void fiv_environment_irradiance(float rgb[3], const fiv_environment *e, const float normal[3])
 {
     float n[3], d[3];
     int i, c;
@@ -1166,7 +1168,7 @@ FIV_DEF void fiv_environment_irradiance(const fiv_environment *e, float rgb[3], 
     }
 }
 
-FIV_DEF void fiv_environment_vector(const fiv_environment *e, float fiv[9])
+FIV_DEF void fiv_environment_vector(float fiv[9], const fiv_environment *e)
 {
     int i, c, k;
     if (!fiv) return;
@@ -1179,7 +1181,7 @@ FIV_DEF void fiv_environment_vector(const fiv_environment *e, float fiv[9])
     }
 }
 
-FIV_DEF size_t fiv_environment_lights(const fiv_environment *e, float *directions, float *powers, size_t capacity)
+FIV_DEF size_t fiv_environment_lights(float *directions, float *powers, size_t capacity, const fiv_environment *e)
 {
     size_t i, c, texels, split;
     if (!e) return 0;
@@ -2106,7 +2108,7 @@ FIV_DEF fiv_occluder_options fiv_occluder_defaults(void)
     o.rho = 15;
     o.first_shell = 0.3f;
     o.last_shell = 6;
-    o.face = 32;
+    o.resolution = 32;
     o.keep_masks = 1;
     o.max_lights = FIV_MAX_LIGHTS;
     return o;
@@ -2117,7 +2119,8 @@ static int fiv__occluder_options_are_valid(const fiv_occluder_options *o)
     if (o->theta < 4 || o->theta > 4096 || o->theta & 1 || o->phi < 3 || o->phi > 2049 || o->rho < 2 || o->rho > 256)
         return 0;
     if (!(o->first_shell > 1e-6f) || !(o->last_shell <= 1000) || !(o->first_shell < o->last_shell)) return 0;
-    if (o->face < 8 || o->face > FIV__MAX_FACE || o->max_lights < 0 || o->max_lights > FIV_MAX_LIGHTS) return 0;
+    if (o->resolution < 8 || o->resolution > FIV__MAX_FACE) return 0;
+    if (o->max_lights < 0 || o->max_lights > FIV_MAX_LIGHTS) return 0;
     if (o->storage != FIV_STORAGE_FLOAT && o->storage != FIV_STORAGE_HALF_OCTAHEDRAL) return 0;
 #ifdef FIV_NO_MASKS
     if (o->keep_masks) return 0;
@@ -2141,7 +2144,7 @@ static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
     for (k = 0; k < g->rho; k++)
         g->shell[k] = (float)((double)g->first * pow((double)g->last / (double)g->first, (double)k / (g->rho - 1)));
     o->half_floats = g->octahedral;
-    o->face = options->face;
+    o->face = options->resolution;
     o->keep_masks = options->keep_masks != 0;
     o->keep_mesh = options->keep_mesh != 0;
     o->lazy = options->lazy != 0;
@@ -3537,8 +3540,8 @@ FIV_DEF sat_result fiv_self_irradiance(float *rgb, const float *points, const fl
 
 /* ---- lazy occluders */
 
-FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *o, const fiv_instance *instances, size_t instance_count,
-                                        const float *points, size_t count, size_t *computed)
+FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *o, size_t *computed, const fiv_instance *instances,
+                                        size_t instance_count, const float *points, size_t count)
 {
     fiv__cell cell;
     size_t i, j, made;
@@ -3606,7 +3609,7 @@ FIV_DEF size_t fiv_occluder_save_size(const fiv_occluder *o)
     return o && o->keep_masks ? fiv__save_size(o->stats.samples, o->first[o->stats.samples]) : 0;
 }
 
-FIV_DEF sat_result fiv_occluder_save(const fiv_occluder *o, void *memory, size_t size)
+FIV_DEF sat_result fiv_occluder_save(void *memory, size_t size, const fiv_occluder *o)
 {
     fiv__save s;
     unsigned char *p = (unsigned char *)memory;
@@ -3671,7 +3674,7 @@ static int fiv__read_header(fiv_occluder *from, fiv__save *s, const unsigned cha
     o.theta = s->octahedral ? (s->theta > 0 && s->theta <= 2049 ? 2 * (s->theta - 1) : 0) : s->theta;
     o.phi = s->octahedral ? 3 : s->phi;
     o.rho = s->rho;
-    o.face = s->face;
+    o.resolution = s->face;
     o.first_shell = s->first;
     o.last_shell = s->last;
     if (!fiv__occluder_options_are_valid(&o) || !sat__is_finite(s->radius) || s->radius < 0) return 0;

@@ -70,7 +70,7 @@
    - Terminal velocity: Stokes' law and Best 1950 blended, rms 3.5 % from Gunn and Kinzer 1949. Rain rate: within 15 %
      of the asked one, 1..100 mm/h (Marshall and Palmer's own sizes carry 1.13 mm/h where they are asked for 1).
    - Environment: NaN counts as 0, infinity as the largest finite value, negative light as 0; all are counted. One texel
-     of 1e8 stays what it is: mips and footprints spread it, or `clamp` cuts it.
+     of 1e8 stays what it is: mips and footprints spread it, or `max_radiance` cuts it.
    - The same bits for any number of workers; SIMD differs from plain C in the last digits. The GPU's picture is within
      an RMSE of 5e-4 of the CPU's (tone-mapped luminance, quads, both unsorted; llvmpipe: 4e-5, with the longest streaks
      2e-4), its drops within 3e-4 m over tens of steps.
@@ -142,27 +142,27 @@ RAINDROP_DEF int raindrop_version(void);
 /* What leaves a drop. Directions are unit vectors. A pencil of rays `w` radii
    wide leaves as a cone of about footprint * w radians. */
 typedef struct raindrop_ray {
-    float reflect[3], refract[3]; /* mirrored at the front; through the drop with two refractions */
+    float reflected[3], refracted[3]; /* mirrored at the front; through the drop with two refractions */
     float fresnel;                /* F, the reflected share of the power, unpolarised */
     float transmit;               /* share that passes both surfaces: the mean of (1-F)^2 over both polarisations */
-    float footprint_reflect, footprint_refract;
+    float footprint_reflected, footprint_refracted;
 } raindrop_ray;
 
 /* direction d: unit vector. centre_offset p: from the centre to the point of the ray nearest to it, |p| = b <= 1.
    one_minus_b2: 1 - b^2, asked for because the caller often knows it better than 1 - |p|^2 does (raindrop_sprite_ray
    makes all three). n > 0: index of the drop over that of its surroundings; where the ray is totally reflected (a
-   bubble's rim) F is 1 and `refract` repeats `reflect`. */
+   bubble's rim) F is 1 and `refracted` repeats `reflected`. */
 RAINDROP_DEF void raindrop_trace(raindrop_ray *out, const float direction[3], const float centre_offset[3],
                                  float one_minus_b2, float n);
 
 /* The same for `count` rays, as arrays; any output may be NULL. */
 typedef struct raindrop_ray_inputs { const float *direction[3], *centre_offset[3], *one_minus_b2; } raindrop_ray_inputs;
 typedef struct raindrop_ray_outputs {
-    float *reflect[3], *refract[3], *fresnel, *transmit, *footprint_reflect, *footprint_refract;
+    float *reflected[3], *refracted[3], *fresnel, *transmit, *footprint_reflected, *footprint_refracted;
 } raindrop_ray_outputs;
 RAINDROP_DEF void raindrop_trace_n(const raindrop_ray_outputs *out, const raindrop_ray_inputs *in, int count, float n);
 
-/* Order k >= 0: k internal reflections between the two refractions; k = 0 is `refract`, 1 the rainbow, 2 the second.
+/* Order k >= 0: k internal reflections between the two refractions; k = 0 is `refracted`, 1 the rainbow, 2 the second.
    *weight is the order's share of the power, *rest its share with all later ones: rest(0) + F = 1. */
 typedef struct raindrop_order { float direction[3], weight, rest, footprint; } raindrop_order;
 RAINDROP_DEF void raindrop_trace_order(raindrop_order *out, const float direction[3], const float centre_offset[3],
@@ -184,20 +184,25 @@ RAINDROP_DEF int raindrop_trace_spheroid(raindrop_ray *out, const float directio
 
 #ifndef RAINDROP_NO_MAP
 /* Level i is base >> i texels wide and shows the drop from sqrt(1 + 4^i) radii (table 2.1). 32 bytes a texel:
-   44.7 MB for a base of 1024. A texel is reflect xyz, F, refract xyz, alpha; all 0 outside the drop. */
+   44.7 MB for a base of 1024. A texel is reflected xyz, F, refracted xyz, alpha; all 0 outside the drop. */
 typedef struct raindrop_map raindrop_map;
-/* base_resolution: a power of two, 1..4096. alpha_samples: 1..4096, 32 as published; random, from a fixed seed. */
-RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, int base_resolution, int alpha_samples, float n,
-                                            const sat_allocator *allocator);
+typedef struct raindrop_map_options {
+    int resolution;          /* 1024; 1..4096, a power of two: width of level 0 */
+    int alpha_samples;       /* 32; 1..4096; rays a texel for alpha, random, from a fixed seed */
+    float n;                 /* 1.33; index of the drops */
+    sat_allocator allocator; /* malloc; used by create and destroy only */
+} raindrop_map_options;
+RAINDROP_DEF raindrop_map_options raindrop_map_defaults(void);
+RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, const raindrop_map_options *options);
 RAINDROP_DEF int raindrop_map_levels(const raindrop_map *map);
-/* Rows from the bottom (t = -1) up, 8 floats a texel; NULL outside 0..levels-1. */
-RAINDROP_DEF const float *raindrop_map_level(const raindrop_map *map, int level, int *resolution);
+/* Rows from the bottom (t = -1) up, 8 floats a texel; NULL outside 0..levels-1. resolution may be NULL. */
+RAINDROP_DEF const float *raindrop_map_level(int *resolution, const raindrop_map *map, int level);
 /* The same as half floats, 8 a texel, written to the caller's memory. */
 RAINDROP_DEF sat_result raindrop_map_level_half(uint16_t *out, const raindrop_map *map, int level);
 RAINDROP_DEF double raindrop_map_distance(int level); /* radii from the eye to the centre, table 2.1 */
 /* Trilinear lookup at (s, t) in [-1, 1]^2 for a drop at `distance` radii: 8 floats. */
 RAINDROP_DEF void raindrop_map_sample(float out[8], const raindrop_map *map, float s, float t, float distance);
-RAINDROP_DEF void raindrop_map_destroy(raindrop_map *map);
+RAINDROP_DEF void raindrop_map_destroy(raindrop_map *map); /* NULL is fine */
 #else
 typedef struct raindrop_map raindrop_map;
 #endif
@@ -225,7 +230,7 @@ typedef struct raindrop_environment_options {
     float n;                      /* 1.33; index of the drops */
     float scale;                  /* 1; 1/255.f for 8-bit input */
     int decode_srgb;              /* 0; 1: scaled values are sRGB, for LDR pictures */
-    float clamp;                  /* 0: none; otherwise brighter values become this one, and are counted */
+    float max_radiance;           /* 0: none; otherwise brighter values become this one, and are counted */
     float sun_direction[3];       /* 0, 1, 0; towards the sun, which lights the bows */
     float sun_irradiance[3];      /* 1, 1, 1 */
     float bow_optical_depth;      /* 0: no bows; 0..10: share of the sun's light that the rain in view scatters */
@@ -236,7 +241,7 @@ RAINDROP_DEF raindrop_environment_options raindrop_environment_defaults(void);
 
 typedef struct raindrop_environment_stats {
     size_t nan, infinite, negative, clamped; /* channel values replaced: by 0, by the largest finite one, by 0, by
-                                                `clamp` */
+                                                `max_radiance` */
     float largest;                           /* after that */
     size_t bytes;
 } raindrop_environment_stats;
@@ -246,7 +251,7 @@ typedef struct raindrop_environment raindrop_environment;
 RAINDROP_DEF sat_result raindrop_environment_create(raindrop_environment **out, const sat_image *image,
                                                     const raindrop_environment_options *options,
                                                     raindrop_environment_stats *stats);
-RAINDROP_DEF void raindrop_environment_destroy(raindrop_environment *environment);
+RAINDROP_DEF void raindrop_environment_destroy(raindrop_environment *environment); /* NULL is fine */
 /* Radiance from a direction (any length but 0), averaged over a cone of `footprint` radians. */
 RAINDROP_DEF void raindrop_environment_sample(float rgb[3], const raindrop_environment *environment,
                                               const float direction[3], float footprint);
@@ -311,15 +316,15 @@ RAINDROP_DEF raindrop_rain_options raindrop_rain_defaults(void);
 /* 100 bytes a drop, one allocation. Holds the scratch memory of raindrop_render too: one render at a time a rain. */
 typedef struct raindrop_rain raindrop_rain;
 RAINDROP_DEF sat_result raindrop_rain_create(raindrop_rain **out, const raindrop_rain_options *options);
-RAINDROP_DEF void raindrop_rain_destroy(raindrop_rain *rain);
-RAINDROP_DEF const raindrop_drop *raindrop_rain_drops(const raindrop_rain *rain, int *count);
+RAINDROP_DEF void raindrop_rain_destroy(raindrop_rain *rain); /* NULL is fine */
+RAINDROP_DEF const raindrop_drop *raindrop_rain_drops(int *count, const raindrop_rain *rain); /* count may be NULL */
 /* Replaces the drops by at most as many of your own, which never wrap: particles of another simulation. */
 RAINDROP_DEF sat_result raindrop_rain_set_drops(raindrop_rain *rain, const raindrop_drop *drops, int count);
 #ifndef RAINDROP_NO_RAIN
-/* Any dt >= 0; 0 pauses. Drops that leave the box below come back on top with the size of another drop (Marshall-Palmer
-   weighted by speed, as rain arrives at a plane); those that leave sideways come back on the other side. Needs no
-   time for drag while all drops have reached their terminal velocity. */
-RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt_seconds);
+/* Any dt >= 0, in seconds; 0 pauses. Drops that leave the box below come back on top with the size of another drop
+   (Marshall-Palmer weighted by speed, as rain arrives at a plane); those that leave sideways come back on the other
+   side. Needs no time for drag while all drops have reached their terminal velocity. */
+RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt);
 RAINDROP_DEF sat_result raindrop_rain_set_wind(raindrop_rain *rain, const float wind[3]);
 RAINDROP_DEF sat_result raindrop_rain_set_centre(raindrop_rain *rain, const float centre[3]); /* at the next advance */
 #endif
@@ -333,7 +338,9 @@ typedef struct raindrop_camera {
     float right[3], up[3], back[3];  /* x, y, z: orthonormal, looks along -back */
     float velocity[3];               /* 0, 0, 0: streaks are relative to it */
     float fov_y;                     /* pi/2; full vertical angle in radians, 0.001..3 */
-    float near_distance;             /* 0.01: drops that reach nearer are left out */
+    float depth_near;                /* 0.01: drops that reach nearer are left out */
+    float depth_far;                 /* 0; raindrop_gl_render: > depth_near: the depth test is on, against a depth
+                                        buffer of the usual perspective with these two planes */
     float exposure;                  /* 0 s: still drops; otherwise streaks around the drops' positions */
     float aperture;                  /* 0 m: all in focus; otherwise diameter of a thin lens */
     float focus_distance;            /* 3 m; along the viewing axis */
@@ -369,7 +376,7 @@ typedef struct raindrop_render_stats {
     size_t drawn_near, drawn_far; /* by rays (or sprites); by one lookup */
     size_t invalid;               /* radius not above 0, or something not finite */
     size_t inside;                /* the eye is in the drop */
-    size_t behind, near_plane;    /* behind the camera; in front but nearer than near_distance */
+    size_t behind, near_plane;    /* behind the camera; in front but nearer than depth_near */
     size_t outside;               /* of the picture */
     size_t hidden;                /* wholly behind the scene's depth */
     size_t below_threshold;
@@ -422,7 +429,8 @@ typedef struct raindrop_gl raindrop_gl;
 /* On an OpenGL error *out only answers raindrop_gl_message, and is to be destroyed; on the others it is NULL. */
 RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *get_proc,
                                            const raindrop_gl_options *options);
-RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *gl);
+RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *gl); /* NULL is fine */
+/* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl);
 
 /* Copies; needed before render. Radiance above 65000 makes it floats instead of half floats, which ES cannot filter. */
@@ -430,7 +438,7 @@ RAINDROP_DEF sat_result raindrop_gl_set_environment(raindrop_gl *gl, const raind
 RAINDROP_DEF sat_result raindrop_gl_set_rain(raindrop_gl *gl, const raindrop_rain *rain);
 #ifndef RAINDROP_NO_RAIN
 /* raindrop_rain_advance by transform feedback: the same step, in floats, and the same random numbers. */
-RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *gl, double dt_seconds);
+RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *gl, double dt);
 RAINDROP_DEF sat_result raindrop_gl_set_wind(raindrop_gl *gl, const float wind[3]);
 #endif
 /* The drops back from the GPU, which waits for it; count as in the rain. */
@@ -439,10 +447,9 @@ RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *d
 /* Blends the drops over the bound framebuffer's viewport (0, 0, width, height), which should hold floats: row 0 is the
    bottom one, as OpenGL has it. Unsorted, as published; else as raindrop_render. The first picture with a
    shutter or a lens, of flattened drops, or with internal reflections compiles a program that knows them; the others do
-   not pay. depth_near > 0: the depth test is on, against a depth buffer of the usual perspective with these planes;
-   depth is not written. */
+   not pay. The depth buffer is tested against where camera.depth_far says so, and never written. */
 RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, int width, int height, const raindrop_camera *camera,
-                                           const raindrop_render_options *options, float depth_near, float depth_far);
+                                           const raindrop_render_options *options);
 
 /* GLSL (3.30 or ES 3.00) for shaders of your own: raindrop_ray raindrop_trace(d, p, one_minus_b2, n) as on the CPU. */
 RAINDROP_DEF const char *raindrop_gl_glsl(void);
@@ -600,7 +607,7 @@ static inline raindrop__v raindrop__dot_v(const raindrop__v a[3], const raindrop
    with ci = cos i = sqrt(1 - b^2) and cr = cos r it needs no angle:
 
        sin(i-r) = b (cr - ci/n) = b sd,      cos(i-r) = ci cr + b^2/n = cd
-       refract  = (1 - 2 b^2 sd^2) d - 2 sd cd p,      reflect = (2b^2 - 1) d + 2 ci p
+       refracted = (1 - 2 b^2 sd^2) d - 2 sd cd p,      reflected = (2b^2 - 1) d + 2 ci p
 
    where 1 - 2 b^2 sd^2 is cos 2(i-r), written so that n = 1 gives d itself. The exit has the entry's Fresnel factors.
 
@@ -646,18 +653,18 @@ RAINDROP_DEF void raindrop_trace(raindrop_ray *out, const float direction[3], co
 {
     raindrop__optics o = raindrop__refract(one_minus_b2, n);
     if (!out || !direction || !centre_offset) return;
-    raindrop__combine(out->reflect, 2 * o.b2 - 1, direction, 2 * o.ci, centre_offset);
-    if (o.total) raindrop__set(out->refract, out->reflect[0], out->reflect[1], out->reflect[2]);
-    else raindrop__combine(out->refract, 1 - 2 * o.b2 * o.sd * o.sd, direction, -2 * o.sd * o.cd, centre_offset);
+    raindrop__combine(out->reflected, 2 * o.b2 - 1, direction, 2 * o.ci, centre_offset);
+    if (o.total) raindrop__set(out->refracted, out->reflected[0], out->reflected[1], out->reflected[2]);
+    else raindrop__combine(out->refracted, 1 - 2 * o.b2 * o.sd * o.sd, direction, -2 * o.sd * o.cd, centre_offset);
     out->fresnel = 0.5f * (o.fs + o.fp);
     out->transmit = 0.5f * ((1 - o.fs) * (1 - o.fs) + (1 - o.fp) * (1 - o.fp));
-    out->footprint_reflect = 2;
-    out->footprint_refract = o.total ? 2 : 2 * sqrtf(fabsf((o.per_ci - o.per_n_cr) * o.sd * o.cd));
+    out->footprint_reflected = 2;
+    out->footprint_refracted = o.total ? 2 : 2 * sqrtf(fabsf((o.per_ci - o.per_n_cr) * o.sd * o.cd));
 }
 
 /* The same for RAINDROP__LANES rays, without branches: a totally reflected lane takes its values by selection. */
 typedef struct raindrop__rays {
-    raindrop__v reflect[3], refract[3], fresnel, transmit, footprint_reflect, footprint_refract;
+    raindrop__v reflected[3], refracted[3], fresnel, transmit, footprint_reflected, footprint_refracted;
 } raindrop__rays;
 
 /* GCC at -O2 leaves a function of this size and its vectors in memory: 1.4 to 1.8 times as long. */
@@ -706,17 +713,17 @@ RAINDROP__INLINE void raindrop__trace_v(raindrop__rays *out, const raindrop__v d
     raindrop__v ts = raindrop__sub(one, fs), tp = raindrop__sub(one, fp);
     along = raindrop__if_less(below, total_below, mirror, along);
     across = raindrop__if_less(below, total_below, outward, across);
-    out->reflect[0] = raindrop__sum(mirror, d[0], outward, p[0]);
-    out->reflect[1] = raindrop__sum(mirror, d[1], outward, p[1]);
-    out->reflect[2] = raindrop__sum(mirror, d[2], outward, p[2]);
-    out->refract[0] = raindrop__sum(along, d[0], across, p[0]);
-    out->refract[1] = raindrop__sum(along, d[1], across, p[1]);
-    out->refract[2] = raindrop__sum(along, d[2], across, p[2]);
+    out->reflected[0] = raindrop__sum(mirror, d[0], outward, p[0]);
+    out->reflected[1] = raindrop__sum(mirror, d[1], outward, p[1]);
+    out->reflected[2] = raindrop__sum(mirror, d[2], outward, p[2]);
+    out->refracted[0] = raindrop__sum(along, d[0], across, p[0]);
+    out->refracted[1] = raindrop__sum(along, d[1], across, p[1]);
+    out->refracted[2] = raindrop__sum(along, d[2], across, p[2]);
     out->fresnel = raindrop__mul(raindrop__splat(0.5f), raindrop__add(fs, fp));
     out->transmit = raindrop__mul(raindrop__splat(0.5f), raindrop__add(raindrop__mul(ts, ts), raindrop__mul(tp, tp)));
-    out->footprint_reflect = two;
-    out->footprint_refract = raindrop__mul(two, raindrop__sqrt(raindrop__abs(widening)));
-    out->footprint_refract = raindrop__if_less(below, total_below, two, out->footprint_refract);
+    out->footprint_reflected = two;
+    out->footprint_refracted = raindrop__mul(two, raindrop__sqrt(raindrop__abs(widening)));
+    out->footprint_refracted = raindrop__if_less(below, total_below, two, out->footprint_refracted);
 }
 
 static inline void raindrop__keep(float *out, int at, raindrop__v v)
@@ -736,16 +743,16 @@ RAINDROP__INLINE void raindrop__trace_block(const raindrop_ray_outputs *out, con
     p[1] = raindrop__load(in->centre_offset[1] + at);
     p[2] = raindrop__load(in->centre_offset[2] + at);
     raindrop__trace_v(&rays, d, p, raindrop__load(in->one_minus_b2 + at), n);
-    raindrop__keep(out->reflect[0], at, rays.reflect[0]);
-    raindrop__keep(out->reflect[1], at, rays.reflect[1]);
-    raindrop__keep(out->reflect[2], at, rays.reflect[2]);
-    raindrop__keep(out->refract[0], at, rays.refract[0]);
-    raindrop__keep(out->refract[1], at, rays.refract[1]);
-    raindrop__keep(out->refract[2], at, rays.refract[2]);
+    raindrop__keep(out->reflected[0], at, rays.reflected[0]);
+    raindrop__keep(out->reflected[1], at, rays.reflected[1]);
+    raindrop__keep(out->reflected[2], at, rays.reflected[2]);
+    raindrop__keep(out->refracted[0], at, rays.refracted[0]);
+    raindrop__keep(out->refracted[1], at, rays.refracted[1]);
+    raindrop__keep(out->refracted[2], at, rays.refracted[2]);
     raindrop__keep(out->fresnel, at, rays.fresnel);
     raindrop__keep(out->transmit, at, rays.transmit);
-    raindrop__keep(out->footprint_reflect, at, rays.footprint_reflect);
-    raindrop__keep(out->footprint_refract, at, rays.footprint_refract);
+    raindrop__keep(out->footprint_reflected, at, rays.footprint_reflected);
+    raindrop__keep(out->footprint_refracted, at, rays.footprint_refracted);
 }
 
 /* One ray of the arrays by itself: what is left after the last whole block. */
@@ -760,13 +767,13 @@ static inline void raindrop__trace_one(const raindrop_ray_outputs *out, const ra
     }
     raindrop_trace(&ray, d, p, in->one_minus_b2[at], n);
     for (i = 0; i < 3; i++) {
-        if (out->reflect[i]) out->reflect[i][at] = ray.reflect[i];
-        if (out->refract[i]) out->refract[i][at] = ray.refract[i];
+        if (out->reflected[i]) out->reflected[i][at] = ray.reflected[i];
+        if (out->refracted[i]) out->refracted[i][at] = ray.refracted[i];
     }
     if (out->fresnel) out->fresnel[at] = ray.fresnel;
     if (out->transmit) out->transmit[at] = ray.transmit;
-    if (out->footprint_reflect) out->footprint_reflect[at] = ray.footprint_reflect;
-    if (out->footprint_refract) out->footprint_refract[at] = ray.footprint_refract;
+    if (out->footprint_reflected) out->footprint_reflected[at] = ray.footprint_reflected;
+    if (out->footprint_refracted) out->footprint_refracted[at] = ray.footprint_refracted;
 }
 
 RAINDROP_DEF void raindrop_trace_n(const raindrop_ray_outputs *out, const raindrop_ray_inputs *in, int count, float n)
@@ -845,7 +852,7 @@ static inline void raindrop__surface(raindrop_ray *out, float ci, float cr, floa
     float turn = (cr - ci / n) * (ci * cr + (1 - ci * ci) / n);
     out->fresnel = 0.5f * (a * a + c * c);
     out->transmit = 0.5f * ((1 - a * a) * (1 - a * a) + (1 - c * c) * (1 - c * c));
-    out->footprint_refract = 2 * sqrtf(fabsf((1 / (ci + RAINDROP__RIM) - 1 / (n * cr + RAINDROP__RIM)) * turn));
+    out->footprint_refracted = 2 * sqrtf(fabsf((1 / (ci + RAINDROP__RIM) - 1 / (n * cr + RAINDROP__RIM)) * turn));
 }
 
 RAINDROP_DEF int raindrop_trace_spheroid(raindrop_ray *out, const float direction[3], const float centre_offset[3],
@@ -865,13 +872,13 @@ RAINDROP_DEF int raindrop_trace_spheroid(raindrop_ray *out, const float directio
     raindrop__set(normal, hit[0], hit[1] * stretch, hit[2]);
     raindrop__normalise(normal);
     ci = -raindrop__dot(direction, normal);
-    raindrop__combine(out->reflect, 1, direction, 2 * ci, normal);
-    out->footprint_reflect = 2;
+    raindrop__combine(out->reflected, 1, direction, 2 * ci, normal);
+    out->footprint_reflected = 2;
     if (!raindrop__snell(inner, direction, normal, n)) {
-        raindrop__set(out->refract, out->reflect[0], out->reflect[1], out->reflect[2]);
+        raindrop__set(out->refracted, out->reflected[0], out->reflected[1], out->reflected[2]);
         out->fresnel = 1;
         out->transmit = 0;
-        out->footprint_refract = 2;
+        out->footprint_refracted = 2;
         return 1;
     }
     raindrop__surface(out, ci, -raindrop__dot(inner, normal), n);
@@ -886,7 +893,7 @@ RAINDROP_DEF int raindrop_trace_spheroid(raindrop_ray *out, const float directio
         out->transmit = 0;
         raindrop__set(leave, inner[0], inner[1], inner[2]);
     }
-    raindrop__set(out->refract, leave[0], leave[1], leave[2]);
+    raindrop__set(out->refracted, leave[0], leave[1], leave[2]);
     return 1;
 }
 
@@ -943,18 +950,27 @@ static inline void raindrop__map_fill(float *texels, int resolution, int level, 
             }
             raindrop_sprite_ray(d, p, &m, s, t, distance);
             raindrop_trace(&ray, d, p, m, n);
-            raindrop__set(texels, ray.reflect[0], ray.reflect[1], ray.reflect[2]);
+            raindrop__set(texels, ray.reflected[0], ray.reflected[1], ray.reflected[2]);
             texels[3] = ray.fresnel;
-            raindrop__set(texels + 4, ray.refract[0], ray.refract[1], ray.refract[2]);
+            raindrop__set(texels + 4, ray.refracted[0], ray.refracted[1], ray.refracted[2]);
             texels[7] = alpha;
         }
     }
 }
 
-RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, int base_resolution, int alpha_samples, float n,
-                                            const sat_allocator *allocator)
+RAINDROP_DEF raindrop_map_options raindrop_map_defaults(void)
 {
-    static const sat_allocator none = {0, 0, 0};
+    raindrop_map_options o;
+    memset(&o, 0, sizeof o);
+    o.resolution = 1024;
+    o.alpha_samples = 32;
+    o.n = RAINDROP_WATER;
+    return o;
+}
+
+RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, const raindrop_map_options *options)
+{
+    raindrop_map_options o = options ? *options : raindrop_map_defaults();
     sat_allocator memory;
     sat__arena arena = {0, 0, 0};
     raindrop_map *map;
@@ -965,11 +981,10 @@ RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, int base_resolut
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (base_resolution < 1 || base_resolution > 4096 || (base_resolution & (base_resolution - 1)))
-        return SAT_ERR_ARGUMENT;
-    if (alpha_samples < 1 || alpha_samples > 4096 || !sat__is_finite(n) || !(n > 0)) return SAT_ERR_ARGUMENT;
-    if (!sat__resolve_allocator(&memory, allocator ? allocator : &none)) return SAT_ERR_ARGUMENT;
-    for (r = base_resolution; r; r >>= 1) count += (size_t)r * (size_t)r;
+    if (o.resolution < 1 || o.resolution > 4096 || (o.resolution & (o.resolution - 1))) return SAT_ERR_ARGUMENT;
+    if (o.alpha_samples < 1 || o.alpha_samples > 4096 || !sat__is_finite(o.n) || !(o.n > 0)) return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(&memory, &o.allocator)) return SAT_ERR_ARGUMENT;
+    for (r = o.resolution; r; r >>= 1) count += (size_t)r * (size_t)r;
     sat__carve(&arena, 1, sizeof *map);
     sat__carve(&arena, count, 8 * sizeof(float));
     if (arena.overflow) return SAT_ERR_SIZE;
@@ -982,11 +997,11 @@ RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, int base_resolut
     arena.used = 0;
     sat__carve(&arena, 1, sizeof *map);
     map->texels = texels = (float *)(void *)sat__carve(&arena, count, 8 * sizeof(float));
-    map->base = base_resolution;
-    map->n = n;
-    for (level = 0, r = base_resolution; r; r >>= 1, level++) {
+    map->base = o.resolution;
+    map->n = o.n;
+    for (level = 0, r = o.resolution; r; r >>= 1, level++) {
         map->level[level] = texels;
-        raindrop__map_fill(texels, r, level, n, alpha_samples);
+        raindrop__map_fill(texels, r, level, o.n, o.alpha_samples);
         texels += (size_t)r * (size_t)r * 8;
     }
     map->levels = level;
@@ -1004,7 +1019,7 @@ RAINDROP_DEF void raindrop_map_destroy(raindrop_map *map)
 
 RAINDROP_DEF int raindrop_map_levels(const raindrop_map *map) { return map ? map->levels : 0; }
 
-RAINDROP_DEF const float *raindrop_map_level(const raindrop_map *map, int level, int *resolution)
+RAINDROP_DEF const float *raindrop_map_level(int *resolution, const raindrop_map *map, int level)
 {
     if (!map || level < 0 || level >= map->levels) return NULL;
     if (resolution) *resolution = map->base >> level;
@@ -1014,7 +1029,7 @@ RAINDROP_DEF const float *raindrop_map_level(const raindrop_map *map, int level,
 RAINDROP_DEF sat_result raindrop_map_level_half(uint16_t *out, const raindrop_map *map, int level)
 {
     int resolution = 0;
-    const float *texels = raindrop_map_level(map, level, &resolution);
+    const float *texels = raindrop_map_level(&resolution, map, level);
     size_t i, count = 8 * (size_t)resolution * (size_t)resolution;
     if (!out || !texels) return SAT_ERR_ARGUMENT;
     for (i = 0; i < count; i++) out[i] = sat__half_from_float(texels[i]);
@@ -1365,7 +1380,7 @@ static inline void raindrop__read_picture(raindrop__picture *picture, const sat_
             }
         }
     }
-    for (i = 0; i < count; i++) picture->rgb[i] = raindrop__repair(picture->rgb[i], largest, o->clamp, stats);
+    for (i = 0; i < count; i++) picture->rgb[i] = raindrop__repair(picture->rgb[i], largest, o->max_radiance, stats);
 }
 
 static inline void raindrop__picture_bilinear(float rgb[3], const raindrop__picture *p, int top, int height, int wrap,
@@ -1469,7 +1484,7 @@ static inline void raindrop__ray_colour(float rgb[3], const raindrop_environment
     float v[4];
     int k, c;
     raindrop_trace(&ray, d, p, one_minus_b2, environment->n);
-    raindrop__sample(v, environment, ray.reflect, ray.footprint_reflect * width);
+    raindrop__sample(v, environment, ray.reflected, ray.footprint_reflected * width);
     for (c = 0; c < 3; c++) rgb[c] = ray.fresnel * v[c];
     for (k = 0; k <= orders; k++) {
         float share;
@@ -1541,7 +1556,8 @@ static inline int raindrop__environment_is_valid(const sat_image *image, const r
     if (!raindrop__is_power_of_two(o->far_resolution, 8, 256) || o->far_samples < 16 || o->far_samples > 65536)
         return 0;
     if (o->far_orders < 0 || o->far_orders > 3 || !sat__is_finite(o->n) || !(o->n > 0.1f) || !(o->n < 10)) return 0;
-    if (!sat__is_finite(o->scale) || !(o->scale > 0) || !sat__is_finite(o->clamp) || o->clamp < 0) return 0;
+    if (!sat__is_finite(o->scale) || !(o->scale > 0)) return 0;
+    if (!sat__is_finite(o->max_radiance) || o->max_radiance < 0) return 0;
     if (!raindrop__finite3(o->sun_direction) || !raindrop__finite3(o->sun_irradiance)) return 0;
     if (!(o->bow_optical_depth >= 0 && o->bow_optical_depth <= 10)) return 0;
     if (o->bow_optical_depth > 0 && !(sun2 > 0.99f && sun2 < 1.01f)) return 0;
@@ -1672,7 +1688,7 @@ RAINDROP_DEF sat_result raindrop_environment_create(raindrop_environment **out, 
     }
     sat__release(&memory, picture.rgb, bytes);
     sat__release(&memory, bow, bow_bytes);
-    local.bytes = e->bytes + (e->table ? sat_get_statistics(e->table).bytes : 0);
+    local.bytes = e->bytes + (e->table ? sat_get_stats(e->table).bytes : 0);
     if (result != SAT_OK) raindrop_environment_destroy(e);
     else *out = e;
     if (stats && result == SAT_OK) *stats = local;
@@ -2123,18 +2139,18 @@ static void raindrop__advance_range(int begin, int end, int worker, void *contex
 
 static inline int raindrop__chunk_count(int drops) { return drops / RAINDROP__CHUNK + (drops % RAINDROP__CHUNK != 0); }
 
-RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt_seconds)
+RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt)
 {
     raindrop__advance_job job;
     int chunk, chunks, moving = 0;
-    if (!rain || !sat__is_finite_double(dt_seconds) || dt_seconds < 0) return SAT_ERR_ARGUMENT;
+    if (!rain || !sat__is_finite_double(dt) || dt < 0) return SAT_ERR_ARGUMENT;
     chunks = raindrop__chunk_count(rain->count);
     job.rain = rain;
-    job.dt = dt_seconds;
-    if (dt_seconds > 0) rain->step++;
+    job.dt = dt;
+    if (dt > 0) rain->step++;
     sat__parallel_for(&rain->options.threads, chunks, raindrop__advance_range, &job);
     for (chunk = 0; chunk < chunks; chunk++) moving |= rain->unsettled[chunk];
-    if (dt_seconds > 0 && !moving) rain->settled = 1;
+    if (dt > 0 && !moving) rain->settled = 1;
     return SAT_OK;
 }
 
@@ -2270,7 +2286,7 @@ RAINDROP_DEF void raindrop_rain_destroy(raindrop_rain *rain)
     }
 }
 
-RAINDROP_DEF const raindrop_drop *raindrop_rain_drops(const raindrop_rain *rain, int *count)
+RAINDROP_DEF const raindrop_drop *raindrop_rain_drops(int *count, const raindrop_rain *rain)
 {
     if (count) *count = rain ? rain->count : 0;
     return rain ? rain->drops : NULL;
@@ -2300,7 +2316,7 @@ RAINDROP_DEF raindrop_camera raindrop_camera_defaults(void)
     memset(&camera, 0, sizeof camera);
     camera.right[0] = camera.up[1] = camera.back[2] = 1;
     camera.fov_y = (float)(RAINDROP__PI / 2);
-    camera.near_distance = 0.01f;
+    camera.depth_near = 0.01f;
     camera.focus_distance = 3;
     return camera;
 }
@@ -2508,7 +2524,7 @@ static inline raindrop__fate raindrop__reject(const raindrop__frame *frame, cons
         return RAINDROP__INVALID;
     if (placed->distance2 <= 1.0001f * r * r) return RAINDROP__INSIDE;
     if (placed->z <= 0) return RAINDROP__BEHIND;
-    if (!(placed->z - r > frame->camera.near_distance) || !(placed->z > 1.0001f * r)) return RAINDROP__NEAR_PLANE;
+    if (!(placed->z - r > frame->camera.depth_near) || !(placed->z > 1.0001f * r)) return RAINDROP__NEAR_PLANE;
     reach = r + reach * placed->z / frame->focal;
     if (fabsf(placed->x) * frame->focal - placed->z * frame->half_width > reach * frame->side_x)
         return RAINDROP__OUTSIDE;
@@ -2650,7 +2666,7 @@ typedef struct raindrop__batch {
                                                                    radii */
     float alpha[RAINDROP__BATCH];
     float direction[3][RAINDROP__BATCH], closest[3][RAINDROP__BATCH], one_minus_b2[RAINDROP__BATCH];
-    float reflect[3][RAINDROP__BATCH], refract[3][RAINDROP__BATCH], fresnel[RAINDROP__BATCH], pass[RAINDROP__BATCH];
+    float reflected[3][RAINDROP__BATCH], refracted[3][RAINDROP__BATCH], fresnel[RAINDROP__BATCH], pass[RAINDROP__BATCH];
     float reflect_cone[RAINDROP__BATCH], refract_cone[RAINDROP__BATCH]; /* footprints in radians */
 } raindrop__batch;
 
@@ -2719,17 +2735,17 @@ static inline void raindrop__batch_trace(raindrop__batch *batch)
         }
         raindrop__trace_v(&rays, d, p, raindrop__load(batch->one_minus_b2 + at), n);
         for (i = 0; i < 3; i++) {
-            raindrop__store(batch->reflect[i] + at, rays.reflect[i]);
-            raindrop__store(batch->refract[i] + at, rays.refract[i]);
+            raindrop__store(batch->reflected[i] + at, rays.reflected[i]);
+            raindrop__store(batch->refracted[i] + at, rays.refracted[i]);
         }
         raindrop__store(batch->fresnel + at, rays.fresnel);
         raindrop__store(batch->pass + at,
                         exit_fresnel ? rays.transmit : raindrop__sub(raindrop__splat(1), rays.fresnel));
         raindrop__store(batch->reflect_cone + at,
-                        raindrop__mul(blur, raindrop__add(raindrop__mul(rays.footprint_reflect, width), pixel)));
+                        raindrop__mul(blur, raindrop__add(raindrop__mul(rays.footprint_reflected, width), pixel)));
         raindrop__store(
             batch->refract_cone + at,
-            raindrop__mul(blur, raindrop__abs(raindrop__sub(raindrop__mul(rays.footprint_refract, width), pixel))));
+            raindrop__mul(blur, raindrop__abs(raindrop__sub(raindrop__mul(rays.footprint_refracted, width), pixel))));
     }
 }
 
@@ -2767,8 +2783,8 @@ static inline void raindrop__batch_lookup(float (*colour)[4], raindrop__batch *b
     int i, c;
     if (!environment->table) {
         for (i = 0; i < batch->count; i += RAINDROP__LANES) {
-            raindrop__batch_fold(u[0], v[0], texels[0], batch->reflect, batch->reflect_cone, i, half);
-            raindrop__batch_fold(u[1], v[1], texels[1], batch->refract, batch->refract_cone, i, half);
+            raindrop__batch_fold(u[0], v[0], texels[0], batch->reflected, batch->reflect_cone, i, half);
+            raindrop__batch_fold(u[1], v[1], texels[1], batch->refracted, batch->refract_cone, i, half);
         }
     }
     for (i = 0; i < batch->count; i++) {
@@ -2778,9 +2794,9 @@ static inline void raindrop__batch_lookup(float (*colour)[4], raindrop__batch *b
         }
         if (environment->table) {
             float d[3];
-            raindrop__set(d, batch->reflect[0][i], batch->reflect[1][i], batch->reflect[2][i]);
+            raindrop__set(d, batch->reflected[0][i], batch->reflected[1][i], batch->reflected[2][i]);
             raindrop__sample_table(mirrored, environment, d, batch->reflect_cone[i]);
-            raindrop__set(d, batch->refract[0][i], batch->refract[1][i], batch->refract[2][i]);
+            raindrop__set(d, batch->refracted[0][i], batch->refracted[1][i], batch->refracted[2][i]);
             raindrop__sample_table(through, environment, d, batch->refract_cone[i]);
         } else {
             float at[2];
@@ -2823,9 +2839,10 @@ static inline void raindrop__flat_colour(float colour[4], raindrop__batch *batch
     int c;
     if (batch->samples == 1 && !(batch->blur > 1)) batch->alpha[i] = cover;
     if (!raindrop_trace_spheroid(&ray, d, p, batch->flatness, environment->n)) return;
-    raindrop__sample(v, environment, ray.reflect, batch->blur * (ray.footprint_reflect * batch->width + pixel));
+    raindrop__sample(v, environment, ray.reflected, batch->blur * (ray.footprint_reflected * batch->width + pixel));
     for (c = 0; c < 3; c++) colour[c] = ray.fresnel * v[c];
-    raindrop__sample(v, environment, ray.refract, batch->blur * fabsf(ray.footprint_refract * batch->width - pixel));
+    raindrop__sample(v, environment, ray.refracted,
+                     batch->blur * fabsf(ray.footprint_refracted * batch->width - pixel));
     for (c = 0; c < 3; c++) colour[c] += (batch->frame->options.exit_fresnel ? ray.transmit : 1 - ray.fresnel) * v[c];
 }
 
@@ -2840,7 +2857,7 @@ static inline void raindrop__add_orders(float colour[4], const raindrop__batch *
     raindrop_ray ray;
     int k, c;
     raindrop_trace(&ray, d, p, one_minus_b2, environment->n);
-    raindrop__sample(v, environment, ray.reflect, batch->blur * (ray.footprint_reflect * batch->width + pixel));
+    raindrop__sample(v, environment, ray.reflected, batch->blur * (ray.footprint_reflected * batch->width + pixel));
     for (c = 0; c < 3; c++) colour[c] += ray.fresnel * v[c];
     for (k = 0; k <= batch->orders; k++) {
         float share;
@@ -3160,16 +3177,16 @@ static inline int raindrop__push_map(raindrop__batch *batch, int at, float s, fl
     if (!(texel[7] > 1.0f / 255)) return 0;
     raindrop__rotate(turned, frame[0], frame[1], frame[2], texel);
     raindrop__normalise(turned); /* interpolated vectors are shorter than 1 */
-    for (i = 0; i < 3; i++) batch->reflect[i][at] = turned[i];
+    for (i = 0; i < 3; i++) batch->reflected[i][at] = turned[i];
     raindrop__rotate(turned, frame[0], frame[1], frame[2], texel + 4);
     raindrop__normalise(turned);
-    for (i = 0; i < 3; i++) batch->refract[i][at] = turned[i];
+    for (i = 0; i < 3; i++) batch->refracted[i][at] = turned[i];
     batch->alpha[at] = texel[7];
     batch->fresnel[at] = texel[3];
     batch->pass[at] = 1 - texel[3];
     raindrop__surface(&ray, sqrtf(1 - b2), sqrtf(n * n - b2) / n, n);
     batch->reflect_cone[at] = 2 * batch->width + pixel;
-    batch->refract_cone[at] = fabsf(ray.footprint_refract * batch->width - pixel);
+    batch->refract_cone[at] = fabsf(ray.footprint_refracted * batch->width - pixel);
     return 1;
 }
 #endif
@@ -3301,7 +3318,9 @@ static inline int raindrop__camera_is_valid(const raindrop_camera *c)
                  fabsf(raindrop__dot(c->back, c->right));
     if (!raindrop__finite3(c->position) || !raindrop__finite3(c->velocity)) return 0;
     if (!(fabsf(rr - 1) < 0.01f && fabsf(uu - 1) < 0.01f && fabsf(bb - 1) < 0.01f && skew < 0.01f)) return 0;
-    if (!(c->fov_y >= 0.001f && c->fov_y <= 3) || !(c->near_distance >= 0) || !sat__is_finite(c->near_distance))
+    if (!(c->fov_y >= 0.001f && c->fov_y <= 3) || !(c->depth_near >= 0) || !sat__is_finite(c->depth_near))
+        return 0;
+    if (c->depth_far != 0 && (!(c->depth_near > 0 && c->depth_far > c->depth_near) || !sat__is_finite(c->depth_far)))
         return 0;
     if (!(c->exposure >= 0 && c->aperture >= 0) || !sat__is_finite(c->exposure) || !sat__is_finite(c->aperture))
         return 0;
@@ -3311,14 +3330,18 @@ static inline int raindrop__camera_is_valid(const raindrop_camera *c)
     return c->focus_distance > 0 && sat__is_finite(c->focus_distance);
 }
 
-static inline int raindrop__render_is_valid(const raindrop__frame *frame, const raindrop_environment *environment)
+/* the picture that is drawn to; resolves a stride of 0 */
+static inline int raindrop__picture_is_valid(raindrop__frame *frame)
+{
+    if (frame->width > 32768 || frame->height > 32768) return 0;
+    return sat__rows_are_valid(frame->rgb, &frame->stride, frame->width, frame->height, 3 * sizeof(float),
+                               sizeof(float));
+}
+
+static inline int raindrop__render_is_valid(raindrop__frame *frame, const raindrop_environment *environment)
 {
     const raindrop_render_options *o = &frame->options;
-    ptrdiff_t row = (ptrdiff_t)frame->width * 3 * (ptrdiff_t)sizeof(float);
-    if (!frame->rgb || !frame->rain || !environment || frame->width < 1 || frame->height < 1 || frame->width > 32768 ||
-        frame->height > 32768)
-        return 0;
-    if ((frame->stride < row && frame->stride > -row) || frame->stride % (ptrdiff_t)sizeof(float)) return 0;
+    if (!frame->rain || !environment || !raindrop__picture_is_valid(frame)) return 0;
     if (!raindrop__camera_is_valid(&frame->camera) || (unsigned)o->look > RAINDROP_LOOK_AUTO) return 0;
     if (!(o->far_radius >= 0 && o->far_radius <= 64) || !(o->coverage_threshold >= 0 && o->coverage_threshold <= 1))
         return 0;
@@ -3420,7 +3443,6 @@ RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride
                                                     const raindrop_environment *environment, const sat_threads *threads)
 {
     raindrop__frame frame;
-    ptrdiff_t row = (ptrdiff_t)width * 3 * (ptrdiff_t)sizeof(float);
     memset(&frame, 0, sizeof frame);
     frame.camera = camera ? *camera : raindrop_camera_defaults();
     frame.environment = environment;
@@ -3428,9 +3450,7 @@ RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride
     frame.stride = stride;
     frame.width = width;
     frame.height = height;
-    if (!rgb || !environment || width < 1 || height < 1 || width > 32768 || height > 32768) return SAT_ERR_ARGUMENT;
-    if ((stride < row && stride > -row) || stride % (ptrdiff_t)sizeof(float) ||
-        !raindrop__camera_is_valid(&frame.camera))
+    if (!environment || !raindrop__picture_is_valid(&frame) || !raindrop__camera_is_valid(&frame.camera))
         return SAT_ERR_ARGUMENT;
     if (threads && !sat__threads_are_valid(threads)) return SAT_ERR_ARGUMENT;
     raindrop__set_frame(&frame);
@@ -4228,18 +4248,18 @@ static inline void raindrop__gl_set_advance(raindrop_gl *g, double dt)
     sat__gl_set_uint(gl, g->advance, "stream", g->step * 512u);
 }
 
-RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt_seconds)
+RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt)
 {
     sat__gl_state state;
     sat__gl *gl;
-    if (!g || !g->drops[0] || !sat__is_finite_double(dt_seconds) || dt_seconds < 0) return SAT_ERR_ARGUMENT;
-    if (!(dt_seconds > 0) || !g->count) return SAT_OK;
+    if (!g || !g->drops[0] || !sat__is_finite_double(dt) || dt < 0) return SAT_ERR_ARGUMENT;
+    if (!(dt > 0) || !g->count) return SAT_OK;
     gl = &g->gl;
     g->step++;
     sat__gl_begin(gl, &state, 1);
     gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, g->target);
     gl->UseProgram(g->advance);
-    raindrop__gl_set_advance(g, dt_seconds);
+    raindrop__gl_set_advance(g, dt);
     gl->BindBuffer(SAT__GL_ARRAY_BUFFER, 0);
     gl->BindVertexArray(g->arrays[g->front]);
     if (g->options.quads) {
@@ -4261,8 +4281,7 @@ RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt_seconds)
 
 /* ---- picture */
 
-static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const raindrop__frame *frame,
-                                         float depth_near, float depth_far)
+static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const raindrop__frame *frame)
 {
     sat__gl *gl = &g->gl;
     const raindrop_camera *camera = &frame->camera;
@@ -4274,12 +4293,12 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
     v[0] = frame->half_width;
     v[1] = frame->half_height;
     v[2] = frame->focal;
-    v[3] = camera->near_distance;
+    v[3] = camera->depth_near;
     sat__gl_set_float4(gl, program, "view", v);
     v[0] = frame->options.far_radius;
     v[1] = frame->options.coverage_threshold;
-    v[2] = depth_near;
-    v[3] = depth_far;
+    v[2] = camera->depth_far > 0 ? camera->depth_near : 0;
+    v[3] = camera->depth_far;
     sat__gl_set_float4(gl, program, "limits", v);
     memcpy(v, camera->velocity, sizeof camera->velocity);
     v[3] = camera->exposure;
@@ -4297,7 +4316,7 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
 }
 
 RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height, const raindrop_camera *camera,
-                                           const raindrop_render_options *options, float depth_near, float depth_far)
+                                           const raindrop_render_options *options)
 {
     raindrop__frame frame;
     sat__gl_state state;
@@ -4316,7 +4335,6 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
         return SAT_ERR_ARGUMENT;
     if (frame.options.orders < 0 || frame.options.orders > 3 || !(frame.options.orders_radius >= 0))
         return SAT_ERR_ARGUMENT;
-    if (!(depth_near >= 0) || (depth_near > 0 && !(depth_far > depth_near))) return SAT_ERR_ARGUMENT;
     if (frame.options.look == RAINDROP_LOOK_MAP && !g->options.map) return SAT_ERR_ARGUMENT;
     if (!g->count) return SAT_OK;
     if (!raindrop__is_sprite(&frame) && (frame.camera.exposure > 0 || frame.camera.aperture > 0))
@@ -4330,11 +4348,11 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     sat__gl_begin(gl, &state, 4);
     gl->UseProgram(program);
     gl->Viewport(0, 0, width, height);
-    raindrop__gl_set_draw(g, program, &frame, depth_near, depth_far);
+    raindrop__gl_set_draw(g, program, &frame);
     gl->Enable(SAT__GL_BLEND);
     gl->BlendEquationSeparate(0x8006, 0x8006); /* GL_FUNC_ADD */
     gl->BlendFuncSeparate(SAT__GL_SRC_ALPHA, SAT__GL_ONE_MINUS_SRC_ALPHA, SAT__GL_ZERO, SAT__GL_ONE);
-    if (depth_near > 0) {
+    if (frame.camera.depth_far > 0) {
         gl->Enable(SAT__GL_DEPTH_TEST);
         gl->DepthFunc(SAT__GL_LEQUAL);
     }

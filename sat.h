@@ -167,9 +167,9 @@ typedef struct sat_threads {
     void *user;
 } sat_threads;
 
-/* An image is a view: `channels` interleaved values a pixel, rows `stride` bytes apart (negative:
-   bottom row first in memory, `pixels` then points at the top row). Integers keep their value
-   (255 is 255.0); a caller who wants 0..1 scales the result. */
+/* An image is a view: `channels` interleaved values a pixel, rows `stride` bytes apart (0: packed, here and for every
+   stride of the six headers; negative: bottom row first in memory, `pixels` then points at the top row). Integers keep
+   their value (255 is 255.0); a caller who wants 0..1 scales the result. */
 typedef enum sat_format { SAT_F32, SAT_U8, SAT_U16, SAT_F16 } sat_format;
 typedef struct sat_image {
     const void *pixels;
@@ -283,12 +283,12 @@ SAT_DEF const char *sat_explain(char *text, size_t size, int width, int height, 
 typedef struct sat_table sat_table;
 
 /* What the last build or update met. FIXED kinds keep the quantum that the first build settled. */
-typedef struct sat_statistics {
+typedef struct sat_stats {
     size_t nan, infinite, clamped; /* channel values replaced: NaN, infinite, too large */
     double quantum;                /* FIXED kinds: the step that pixels are rounded to; else 0 */
     size_t bytes;                  /* memory the table holds */
-} sat_statistics;
-SAT_DEF sat_statistics sat_get_statistics(const sat_table *table);
+} sat_stats;
+SAT_DEF sat_stats sat_get_stats(const sat_table *table);
 
 /* A table of zeros; exactly one allocation. 1 <= channels <= 4. */
 SAT_DEF sat_result sat_create(sat_table **out, int width, int height, int channels, const sat_options *options);
@@ -354,7 +354,7 @@ SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, 
 /* Takes the next row (an image of height 1) and writes at most one filtered row to out_row (width x channels floats);
    *rows_out says whether it did. After the last row call it with row == NULL until *rows_out is 0. */
 SAT_DEF sat_result sat_stream_push(sat_stream *stream, float *out_row, int *rows_out, const sat_image *row);
-SAT_DEF void sat_stream_destroy(sat_stream *stream);
+SAT_DEF void sat_stream_destroy(sat_stream *stream); /* NULL is fine */
 
 /* ------------------------------------------------------------------------------------------------
    Moments: variance and covariance over any box, right where the variance is small beside the mean
@@ -446,7 +446,7 @@ typedef struct sat_gl sat_gl;
 /* On an OpenGL error *out only answers sat_gl_message, and is to be destroyed; on the others it is NULL. */
 SAT_DEF sat_result sat_gl_create(sat_gl **out, sat_gl_get_proc *get_proc, const sat_gl_options *options);
 SAT_DEF void sat_gl_destroy(sat_gl *gl); /* NULL is fine */
-/* What the last SAT_ERR_GL_... was about; never NULL. */
+/* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 SAT_DEF const char *sat_gl_message(const sat_gl *gl);
 
 /* Inclusive sums of the first width x height texels of a 2D texture, level 0: texel (x, y) of the table is the sum over
@@ -909,24 +909,40 @@ static inline size_t sat__format_size(sat_format format)
     return format == SAT_U8 ? 1 : format == SAT_F32 ? 4 : 2;
 }
 
-/* A view the other functions may read: 1 to 4 channels, a known format, rows that do not overlap
-   and are aligned for their element. */
+/* Rows of width values of `size` bytes, *stride bytes apart. Resolves a stride of 0, packed; returns 0 where rows
+   overlap or `element`, what they are made of, is not aligned. */
+static inline int sat__rows_are_valid(const void *pixels, ptrdiff_t *stride, int width, int height, size_t size,
+                                      size_t element)
+{
+    size_t row, step;
+    if (!pixels || (uintptr_t)pixels % element || width < 1 || height < 1) return 0;
+    if (!sat__multiply_size(&row, (size_t)width, size)) return 0;
+    if (*stride == 0) *stride = (ptrdiff_t)row;
+    step = *stride < 0 ? (size_t)0 - (size_t)*stride : (size_t)*stride;
+    return step % element == 0 && (height == 1 || step >= row);
+}
+
+static inline ptrdiff_t sat__image_stride(const sat_image *image)
+{
+    if (image->stride) return image->stride;
+    return (ptrdiff_t)((size_t)image->width * (size_t)image->channels * sat__format_size(image->format));
+}
+
+/* A view the other functions may read: 1 to 4 channels, a known format, rows as above. */
 static inline int sat__image_is_valid(const sat_image *image)
 {
-    size_t row, element, step;
-    if (!image || !image->pixels || image->width < 1 || image->height < 1) return 0;
-    if (image->channels < 1 || image->channels > 4) return 0;
-    if ((unsigned)image->format > (unsigned)SAT_F16) return 0;
+    ptrdiff_t stride;
+    size_t element;
+    if (!image || image->channels < 1 || image->channels > 4 || (unsigned)image->format > (unsigned)SAT_F16) return 0;
+    stride = image->stride;
     element = sat__format_size(image->format);
-    if (!sat__multiply_size(&row, (size_t)image->width * (size_t)image->channels, element)) return 0;
-    step = image->stride < 0 ? (size_t)0 - (size_t)image->stride : (size_t)image->stride;
-    if ((image->height > 1 && step < row) || step % element || (uintptr_t)image->pixels % element) return 0;
-    return 1;
+    return sat__rows_are_valid(image->pixels, &stride, image->width, image->height, (size_t)image->channels * element,
+                               element);
 }
 
 static inline const void *sat__image_row(const sat_image *image, int y)
 {
-    return (const unsigned char *)image->pixels + (ptrdiff_t)y * image->stride;
+    return (const unsigned char *)image->pixels + (ptrdiff_t)y * sat__image_stride(image);
 }
 
 /* out[i] = channel `channel` of pixel x0 + i of row y, as float. */
@@ -2385,6 +2401,7 @@ SAT_DEF double sat_reduce_f32(const float *in, size_t n, ptrdiff_t stride, int k
     size_t i;
     if (!in) return 0;
     if (k < 2 || k > 64) k = 4;
+    if (stride == 0) stride = sizeof(float);
     for (i = 0; i < n; i++) {
         double value = (double)*(const float *)(const void *)((const unsigned char *)in + (ptrdiff_t)i * stride);
         for (l = 0;; l++) {
@@ -3671,7 +3688,7 @@ static void sat__settle_band(const sat_table *t, const sat_image *image, int cha
             if (tx < direct) e = sat__gauge_extent(&gauge[tx - panel]);
             if (tx < direct && e.sum <= 3.4028235e38f && e.largest <= sat__giant_limit(t) && e.largest <= e.sum / 16) {
                 from.p = (const float *)sat__image_row(image, y0) + ((size_t)tx << t->shift);
-                from.step = image->stride / (ptrdiff_t)sizeof(float);
+                from.step = sat__image_stride(image) / (ptrdiff_t)sizeof(float);
                 t->tiles[index].spikes = 0;
             } else {
                 int n = sat__gather(t, image, channel, y0, tx << t->shift, p);
@@ -4144,9 +4161,9 @@ SAT_DEF sat_result sat_update(sat_table *table, const sat_image *image, int x0, 
     return sat__rebuild(table, image, y0 >> table->shift, ((y1 - 1) >> table->shift) + 1);
 }
 
-SAT_DEF sat_statistics sat_get_statistics(const sat_table *table)
+SAT_DEF sat_stats sat_get_stats(const sat_table *table)
 {
-    sat_statistics s;
+    sat_stats s;
     int channel;
     memset(&s, 0, sizeof s);
     if (!table) return s;
@@ -4556,18 +4573,16 @@ static void sat__filter_variable_rows(int begin, int end, int worker, void *cont
     }
 }
 
-static int sat__stride_is_valid(const sat_table *t, ptrdiff_t stride, int channels)
+/* floats of the table's size */
+static int sat__plane_is_valid(const float *pixels, ptrdiff_t *stride, const sat_table *t, int channels)
 {
-    size_t step = stride < 0 ? (size_t)0 - (size_t)stride : (size_t)stride, row;
-    if (!sat__multiply_size(&row, (size_t)t->width, (size_t)channels * sizeof(float))) return 0;
-    return step % sizeof(float) == 0 && (t->height == 1 || step >= row);
+    return sat__rows_are_valid(pixels, stride, t->width, t->height, (size_t)channels * sizeof(float), sizeof(float));
 }
 
 SAT_DEF sat_result sat_box_filter(float *out, ptrdiff_t out_stride, const sat_table *table, int radius)
 {
     sat__filter f;
-    if (!out || !table || radius < 0 || !sat__stride_is_valid(table, out_stride, table->channels))
-        return SAT_ERR_ARGUMENT;
+    if (!table || radius < 0 || !sat__plane_is_valid(out, &out_stride, table, table->channels)) return SAT_ERR_ARGUMENT;
     memset(&f, 0, sizeof f);
     f.table = table;
     f.out = (unsigned char *)out;
@@ -4581,8 +4596,8 @@ SAT_DEF sat_result sat_box_filter_variable(float *out, ptrdiff_t out_stride, con
                                            const float *radius, ptrdiff_t radius_stride)
 {
     sat__filter f;
-    if (!out || !table || !radius || !sat__stride_is_valid(table, out_stride, table->channels)) return SAT_ERR_ARGUMENT;
-    if (!sat__stride_is_valid(table, radius_stride, 1)) return SAT_ERR_ARGUMENT;
+    if (!table || !sat__plane_is_valid(out, &out_stride, table, table->channels)) return SAT_ERR_ARGUMENT;
+    if (!sat__plane_is_valid(radius, &radius_stride, table, 1)) return SAT_ERR_ARGUMENT;
     memset(&f, 0, sizeof f);
     f.table = table;
     f.out = (unsigned char *)out;
@@ -5055,10 +5070,10 @@ SAT_DEF sat_result sat_moments_filter(float *out, float *mean, ptrdiff_t out_str
                                       int channel, int other, int radius)
 {
     sat__moments_filter f;
-    size_t step = out_stride < 0 ? (size_t)0 - (size_t)out_stride : (size_t)out_stride;
-    if (!out || !moments || radius < 0 || !sat__moment_pair_is_valid(moments, channel, other)) return SAT_ERR_ARGUMENT;
-    if (step % sizeof(float) || (moments->height > 1 && step / sizeof(float) < (size_t)moments->width))
+    if (!moments || radius < 0 || !sat__moment_pair_is_valid(moments, channel, other)) return SAT_ERR_ARGUMENT;
+    if (!sat__rows_are_valid(out, &out_stride, moments->width, moments->height, sizeof(float), sizeof(float)))
         return SAT_ERR_ARGUMENT;
+    if ((uintptr_t)mean % sizeof(float)) return SAT_ERR_ARGUMENT;
     memset(&f, 0, sizeof f);
     f.moments = moments;
     f.out = (unsigned char *)out;

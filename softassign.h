@@ -51,7 +51,7 @@
      A solve with AUTO copies a given matrix of up to 64 million cells. softassign_solve allocates once (ENTROPIC and
      PUBLISHED twice) and releases; a solver allocates in create only. Lists take 12 x neighbours bytes a row: 3.2 MB in
      all for 900 x 8192, 27 MB for 8192 x 65536 (the matrix: 30, 2147 MB). One solver, one thread at a time; different
-     solvers at once. sat_threads speeds up lists, sweeps and checks. Errors name a row or a column in the report and
+     solvers at once. sat_threads speeds up lists, sweeps and checks. Errors name a row or a column in the stats and
      leave column_of_row as it was: NaN and -infinity SAT_ERR_NON_FINITE, too large SAT_ERR_ARGUMENT, more rows than
      places or forbidden pairs that leave no choice SAT_ERR_LIMIT.
 
@@ -60,7 +60,7 @@
      way. lower_bound is below every assignment's cost, rounding included; after EXACT the gap is that rounding, about
      1e-15. The optimum is proven by complementary slackness with differences of twice the width; where doubles do not
      hold what the costs span (1e-45 to 1e30 in one problem), the last paths are searched in fixed point of 320 bits, so
-     that no cost that is not used spoils the proof (report.exact_repair). Softassign stays finite
+     that no cost that is not used spoils the proof (stats.exact_repair). Softassign stays finite
      down to temperatures of 1e-12. Ties: free columns first, then the smaller index.
      Same bits for any number of workers. A compiler that contracts a*b+c may change the last bit of distances.
 
@@ -69,7 +69,7 @@
      c_ij - v_j of a row and a limit for all others. Since prices only fall in the path search, the limit stays true,
      and a list that runs out is not lengthened but made anew at the prices of the moment: short lists are enough.
      Making one costs 16 numbers a column: projections on the main directions bound the distance from below, and the
-     others are never computed (report.distances_computed). Sparse softassign with inequality columns finds the prices,
+     others are never computed (stats.distances_computed). Sparse softassign with inequality columns finds the prices,
      shortest augmenting paths the assignment, and columns that were left with a price below 0 are raised back along a
      reverse path (finish). Given matrices, and all problems up to 100 000 cells, go to a dense solver without lists:
      column reduction (square), augmenting row reduction, shortest paths with vector scans; AUTO leaves it for lists
@@ -137,7 +137,7 @@ typedef enum softassign_method {
                                SOFTASSIGN_EXACT above 100 000 cells */
     SOFTASSIGN_EXACT,       /* the optimum: softassign prices on lists, shortest augmenting paths, finish */
     SOFTASSIGN_FAST,        /* auction on lists; certified to options.gap. Capacities other than 1: SOFTASSIGN_EXACT,
-                               and report.method says so */
+                               and stats.method says so */
     SOFTASSIGN_ENTROPIC,    /* softassign with inequality columns over the whole matrix, rounded by paths */
     SOFTASSIGN_PUBLISHED,   /* Slomp 2012, section 3.6, as printed */
     SOFTASSIGN_GREEDY,      /* Slomp 2012, section 3.4.2 */
@@ -154,8 +154,8 @@ typedef float softassign_cost_fn(int row, int column, void *user);
    Infinite costs forbid a pair; NaN, -infinity and |cost| > 1e30 are refused, as are features beyond +-1e16. */
 typedef struct softassign_problem {
     int rows, columns;                     /* >= 1 */
-    const float *cost;                     /* cost[row * stride + column], stride in floats */
-    ptrdiff_t stride;
+    const float *cost;                     /* cost[row * stride + column] */
+    ptrdiff_t stride;                      /* in floats, not bytes; 0: packed */
     softassign_cost_fn *cost_fn;
     void *cost_user;
     const float *row_features;             /* rows x feature_count, packed */
@@ -166,7 +166,7 @@ typedef struct softassign_problem {
                                               and FAST of softassign_solve */
     const int *previous;                   /* per row, the column of the last frame or -1; NULL: none. See
                                               options.switching */
-    int maximise;                          /* 1: the largest total; -infinity forbids a pair, report.lower_bound is an
+    int maximise;                          /* 1: the largest total; -infinity forbids a pair, stats.lower_bound is an
                                               upper one */
     float unassigned_cost;                 /* > 0: a row may stay without a column (-1) at this price, and never takes a
                                               dearer one (maximise: at this gain); 0: every row gets a column. These
@@ -175,7 +175,7 @@ typedef struct softassign_problem {
 
 /* What a call found out. gap = (cost - lower_bound) / cost holds at any moment: no assignment costs less than
    lower_bound. */
-typedef struct softassign_report {
+typedef struct softassign_stats {
     double cost;               /* of column_of_row, without the switching bonus */
     double lower_bound;
     double gap;                /* 0 when both are 0; infinite when the cost alone is 0, or no bound is known yet */
@@ -198,10 +198,10 @@ typedef struct softassign_report {
     int exact_repair;          /* 1: doubles could not prove the optimum, and the last paths were searched in exact
                                   arithmetic */
     int duplicate_rows;        /* PUBLISHED: rows whose largest element was another row's column already */
-} softassign_report;
+} softassign_stats;
 
 /* Called now and then with a valid assignment; not 0 stops the solver, which keeps what it has. */
-typedef int softassign_progress_fn(const softassign_report *report, const int *column_of_row, void *user);
+typedef int softassign_progress_fn(const softassign_stats *stats, const int *column_of_row, void *user);
 
 typedef struct softassign_options {
     softassign_method method;  /* SOFTASSIGN_AUTO; SOFTASSIGN_AUTO..SOFTASSIGN_ANTS */
@@ -241,7 +241,7 @@ typedef struct softassign_options {
                                   columns. cost_ij - u_i - v_j bounds what forcing the pair would add. Not with
                                   minimum_use */
     float *soft;               /* NULL; ENTROPIC, PUBLISHED: receives the soft matrix, rows x columns */
-    ptrdiff_t soft_stride;     /* in floats */
+    ptrdiff_t soft_stride;     /* in floats; 0: packed */
     sat_allocator allocator;   /* malloc */
     sat_threads threads;       /* serial; same bits for any worker count */
     softassign_progress_fn *progress;
@@ -257,10 +257,10 @@ SOFTASSIGN_DEF softassign_options softassign_defaults(void);
 /* The same with another method and its schedule. */
 SOFTASSIGN_DEF softassign_options softassign_method_defaults(softassign_method method);
 
-/* column_of_row: rows ints. options and report may be NULL. On SAT_ERR_LIMIT no assignment exists: report->row_error
+/* column_of_row: rows ints. options and stats may be NULL. On SAT_ERR_LIMIT no assignment exists: stats->row_error
    names a row that found no column, and column_of_row is untouched as after any error. */
 SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_problem *problem,
-                                           const softassign_options *options, softassign_report *report);
+                                           const softassign_options *options, softassign_stats *stats);
 
 /* Means of parts_x x parts_y rectangles of every cell of a grid_width x grid_height grid: the features of eq 3.1.
    out: grid_width * grid_height rows of parts_x * parts_y * channels floats. Cells may be smaller than pixels. */
@@ -282,9 +282,9 @@ SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride
 typedef struct softassign softassign;
 SOFTASSIGN_DEF sat_result softassign_create(softassign **out, int rows, int columns, const softassign_options *options);
 /* Works on for about work_budget units (a unit is a row looked at, 1 to 100 microseconds) and writes a valid assignment
-   with its certificate; report->complete says that it is the optimum. The costs must stay as they are until then. */
+   with its certificate; stats->complete says that it is the optimum. The costs must stay as they are until then. */
 SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row, const softassign_problem *problem,
-                                          size_t work_budget, softassign_report *report);
+                                          size_t work_budget, softassign_stats *stats);
 /* The costs have changed: the next step starts anew from the prices found so far. */
 SOFTASSIGN_DEF void softassign_next_frame(softassign *solver);
 SOFTASSIGN_DEF void softassign_destroy(softassign *solver); /* NULL is fine */
@@ -292,7 +292,7 @@ SOFTASSIGN_DEF void softassign_destroy(softassign *solver); /* NULL is fine */
 /* One sentence that names what is refused with SAT_ERR_ARGUMENT, and its range; "" when nothing is. Written into text
    (cut to size, always ended); returns text. The first: options of softassign_solve, softassign_create and
    softassign_gl_create; the second: a problem with the options it is solved with (NULL: the defaults) by
-   softassign_solve. Costs and features are not read; the report names their row. */
+   softassign_solve. Costs and features are not read; the stats names their row. */
 SOFTASSIGN_DEF const char *softassign_explain(char *text, size_t size, const softassign_options *options);
 SOFTASSIGN_DEF const char *softassign_explain_problem(char *text, size_t size, const softassign_problem *problem,
                                                 const softassign_options *options);
@@ -325,7 +325,7 @@ typedef struct softassign_gl softassign_gl;
 SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc,
                                                const softassign_options *options);
 SOFTASSIGN_DEF void softassign_gl_destroy(softassign_gl *gl); /* NULL is fine */
-/* What the last SAT_ERR_GL_... or SAT_ERR_ARGUMENT of set_costs was about; never NULL. */
+/* What the last SAT_ERR_GL_... or SAT_ERR_ARGUMENT of set_costs was about; never NULL, and NULL is fine. */
 SOFTASSIGN_DEF const char *softassign_gl_message(const softassign_gl *gl);
 
 /* The distance matrix: uploaded, or by a pass from features (eq 3.1). Costs must be finite or +infinity, |cost| <=
@@ -333,7 +333,8 @@ SOFTASSIGN_DEF const char *softassign_gl_message(const softassign_gl *gl);
 SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softassign_problem *problem);
 
 /* Slomp 2012, section 3.7: the whole schedule of the options, as SOFTASSIGN_PUBLISHED in float. soft: rows x columns
-   floats, soft_stride apart, or NULL; soft_cost: the lowest sum of Q, or NULL. Waits for one texel a temperature. */
+   floats, rows soft_stride floats apart (0: packed), or NULL; soft_cost: the lowest sum of Q, or NULL. Waits for one
+   texel a temperature. */
 SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft, ptrdiff_t soft_stride,
                                                   double *soft_cost);
 
@@ -468,7 +469,7 @@ struct softassign {
     void *block;
     int rows, columns, max_slots, padded, list, has_lists;
     int dense;             /* costs stand in `matrix` */
-    size_t paths_from;     /* report.work when the paths on the matrix began */
+    size_t paths_from;     /* stats.work when the paths on the matrix began */
     int dense_paths;       /* and paths are searched on it, without lists */
     int unit_capacities;   /* every slot holds one row */
     int all_open;          /* no slot has a capacity of 0 */
@@ -513,7 +514,7 @@ struct softassign {
     int proving, stopped;  /* costs of the bound include the bonus; the progress callback said stop */
     softassign__fixed *exact_price, *exact_distance;
     int schedule[2];
-    softassign_report report;
+    softassign_stats stats;
 };
 
 static inline int softassign__column(const softassign *s, int slot)
@@ -554,10 +555,16 @@ static float softassign__distance(const float *a, const float *b, int n)
     return sqrtf((lanes[0] + lanes[1]) + (lanes[2] + lanes[3]));
 }
 
+/* Row `row` of a given matrix. */
+static inline const float *softassign__cost_row(const softassign_problem *p, int row)
+{
+    return p->cost + (ptrdiff_t)row * (p->stride ? p->stride : p->columns);
+}
+
 /* The cost of a pair as the problem states it. */
 static inline float softassign__pair(const softassign_problem *p, int row, int column)
 {
-    if (p->cost) return p->cost[(ptrdiff_t)row * p->stride + column];
+    if (p->cost) return softassign__cost_row(p, row)[column];
     if (p->cost_fn) return p->cost_fn(row, column, p->cost_user);
     return softassign__distance(p->row_features + (size_t)row * (size_t)p->feature_count,
                                 p->column_features + (size_t)column * (size_t)p->feature_count, p->feature_count);
@@ -950,7 +957,7 @@ static void softassign__list_range(int begin, int end, int worker, void *context
 static void softassign__relist(softassign *s, int row)
 {
     softassign__list_row(s, row, &s->scratch[0]);
-    s->report.lists_built++;
+    s->stats.lists_built++;
 }
 
 /* The smallest cost - price of a row's list. */
@@ -1070,7 +1077,7 @@ static float softassign__price_sweep(softassign *s, float eps)
         price = fill < 1e-36 ? s->price[j] + 82 * (double)eps : s->price[j] - (double)eps * log(fill);
         softassign__set_price(s, j, price < limit ? price : limit);
     }
-    s->report.iterations++;
+    s->stats.iterations++;
     return worst;
 }
 
@@ -1233,7 +1240,7 @@ static void softassign__relax_row(softassign *s, softassign__search *q, int row,
     }
     shift = base - (own_cost - own_price);
     softassign__keys(s, row, w);
-    s->report.rows_expanded++;
+    s->stats.rows_expanded++;
     for (j = 0; j < s->slot_count; j++) {
         int known = s->stamp[j] - 4 * s->epoch;
         double least = (double)w->keys[j] + shift;
@@ -1271,7 +1278,7 @@ static int softassign__augment(softassign *s, int root)
     q.nearest = (double)SOFTASSIGN__INFINITY;
     softassign__new_epoch(s);
     s->heap_size = 0;
-    s->report.paths++;
+    s->stats.paths++;
     if (softassign__list_least(s, root) > s->list_limit[root]) softassign__relist(s, root);
     for (q_at = at; q_at < at + (size_t)s->list_length[root]; q_at++) {
         double price = s->price[s->list_slot[q_at]], value = (double)s->list_cost[q_at] - price;
@@ -1283,10 +1290,10 @@ static int softassign__augment(softassign *s, int root)
     }
     if (!(least < (double)SOFTASSIGN__INFINITY)) return 0;
     softassign__relax_list(s, &q, root, 0);
-    s->report.work++;
+    s->stats.work++;
     while (s->heap_size > 0) {
         int node = softassign__heap_pop(s);
-        s->report.work++;
+        s->stats.work++;
         if (node >= s->slot_count) {
             softassign__open_list(s, &q, node - s->slot_count);
             continue;
@@ -1345,7 +1352,7 @@ static void softassign__relax_column(softassign *s, int from, double base, doubl
         }
     }
     s->scratch[0].distances += (size_t)s->rows;
-    s->report.work += (size_t)s->rows / 16 + 1;
+    s->stats.work += (size_t)s->rows / 16 + 1;
 }
 
 static void softassign__finish(softassign *s, int slot)
@@ -1354,7 +1361,7 @@ static void softassign__finish(softassign *s, int slot)
     int end = slot, closed = 0, i, j;
     softassign__new_epoch(s);
     s->heap_size = 0;
-    s->report.columns_finished++;
+    s->stats.columns_finished++;
     s->stamp[slot] = 4 * s->epoch + SOFTASSIGN__CLOSED;
     s->distance[slot] = 0;
     s->closed[closed++] = slot;
@@ -1539,8 +1546,8 @@ static int softassign__auction(softassign *s, double eps, size_t budget)
         }
         softassign__assign(s, row, slot, s->list_cost[at]);
         softassign__set_price(s, slot, s->price[slot] - (second - best) - eps);
-        s->report.iterations++;
-        s->report.work++;
+        s->stats.iterations++;
+        s->stats.work++;
     }
     return 1;
 }
@@ -1685,7 +1692,7 @@ static int softassign__augment_dense(softassign *s, int root)
     double *d = s->distance, *open_price = s->dense_price, own_cost = 0, own_price = 0, base = 0,
            least = (double)SOFTASSIGN__INFINITY;
     int *pred = s->parent, closed = 0, row = root, j, k, end;
-    s->report.paths++;
+    s->stats.paths++;
     for (j = 0; j < s->slot_count; j++) {
         double value = (double)cost[j] - s->price[j];
         d[j] = (double)SOFTASSIGN__INFINITY;
@@ -1697,7 +1704,7 @@ static int softassign__augment_dense(softassign *s, int root)
         }
     }
     for (;;) {
-        s->report.work++;
+        s->stats.work++;
         end = softassign__relax_dense(cost, s->slot_count, base, own_cost, own_price, open_price, d, pred, s->first_row,
                                       row);
         if (end < 0) return 0;
@@ -1869,9 +1876,9 @@ static void softassign__start_repair(softassign *s)
                 softassign__unassign(s, i);
                 changed = 1;
             }
-        s->report.work += (size_t)s->rows;
+        s->stats.work += (size_t)s->rows;
     }
-    s->report.exact_repair = 1;
+    s->stats.exact_repair = 1;
 }
 
 /* Relaxes all open slots from `row`, whose own value is `own` (of the root: 0) at distance `base`. */
@@ -1919,11 +1926,11 @@ static int softassign__augment_exact(softassign *s, int root)
     softassign__fixed zero = {{0, 0, 0, 0, 0}};
     int closed = 0, j, k, i;
     softassign__new_epoch(s);
-    s->report.paths++;
+    s->stats.paths++;
     softassign__relax_exact(s, root, &zero);
     for (;;) {
         j = softassign__nearest_exact(s);
-        s->report.work++;
+        s->stats.work++;
         if (j < 0) return 0;
         if (softassign__is_free(s, j)) break;
         s->stamp[j] = 4 * s->epoch + SOFTASSIGN__CLOSED;
@@ -1950,13 +1957,13 @@ static sat_result softassign__repair_phase(softassign *s)
     while (s->next < s->rows && s->slot_of_row[s->next] >= 0) s->next++;
     if (s->next < s->rows) {
         if (softassign__augment_exact(s, s->next)) return SAT_OK;
-        s->report.row_error = s->next;
+        s->stats.row_error = s->next;
         return SAT_ERR_LIMIT;
     }
     for (j = 0; j < s->slot_count; j++) {
         double price = softassign__fixed_to(&s->exact_price[j]);
         if (j >= s->columns && softassign__is_free(s, j)) { /* forbidden pairs keep a column below its minimum use */
-            s->report.column_error = softassign__column(s, j);
+            s->stats.column_error = softassign__column(s, j);
             return SAT_ERR_LIMIT;
         }
         softassign__set_price(s, j, price < s->top[j] ? price : s->top[j]);
@@ -2063,18 +2070,18 @@ static double softassign__mean_least(const softassign *s)
 }
 
 /* Lists made before the prices moved, at the top prices, hold for any prices; only those made in between are renewed.
-   One step of a phase; sets the next phase when it is over. SAT_ERR_LIMIT: report.row_error found no column. */
+   One step of a phase; sets the next phase when it is over. SAT_ERR_LIMIT: stats.row_error found no column. */
 static sat_result softassign__list_phase(softassign *s, size_t budget)
 {
     int count = s->rows - s->next, i;
     if ((size_t)count > budget) count = (int)budget;
     sat__parallel_for(&s->options.threads, count, softassign__list_range, s);
     for (i = s->next; i < s->next + count; i++) {
-        s->report.lists_built += s->stale[i];
+        s->stats.lists_built += s->stale[i];
         s->stale[i] = 0;
     }
     s->next += count;
-    s->report.work += (size_t)count;
+    s->stats.work += (size_t)count;
     if (s->next < s->rows) return SAT_OK;
     s->next = 0;
     if (s->phase == SOFTASSIGN__RELIST || s->prices_known) s->phase = SOFTASSIGN__PATHS;
@@ -2091,7 +2098,7 @@ static sat_result softassign__list_phase(softassign *s, size_t budget)
 static sat_result softassign__price_phase(softassign *s)
 {
     float overflow = softassign__price_sweep(s, (float)s->temperature);
-    s->report.work += (size_t)s->rows;
+    s->stats.work += (size_t)s->rows;
     if (overflow >= 0.02f && ++s->schedule[1] < 10) return SAT_OK;
     s->schedule[1] = 0;
     s->temperature *= 0.5;
@@ -2142,10 +2149,10 @@ static sat_result softassign__dense_phase(softassign *s)
             if (s->slot_of_row[i] < 0) s->kept[count++] = i;
         s->left = softassign__reduce_rows(s, s->kept, count);
         s->left = softassign__reduce_rows(s, s->kept, s->left);
-        s->report.work += (size_t)s->rows;
-        s->paths_from = s->report.work;
+        s->stats.work += (size_t)s->rows;
+        s->paths_from = s->stats.work;
     }
-    spent = s->report.work - s->paths_from;
+    spent = s->stats.work - s->paths_from;
     if (large &&
         (spent > 40 * (size_t)s->rows || (s->left > s->rows / 4 && s->next >= 16 && spent > 4 * (size_t)s->next))) {
         softassign__leave_dense(s);
@@ -2153,7 +2160,7 @@ static sat_result softassign__dense_phase(softassign *s)
     }
     if (s->next < s->left) {
         if (!softassign__augment_dense(s, s->kept[s->next])) {
-            s->report.row_error = s->kept[s->next];
+            s->stats.row_error = s->kept[s->next];
             return SAT_ERR_LIMIT;
         }
         s->next++;
@@ -2169,7 +2176,7 @@ static sat_result softassign__path_phase(softassign *s)
 {
     if (s->dense_paths) return softassign__dense_phase(s);
     if (!softassign__augment(s, s->next)) {
-        s->report.row_error = s->next;
+        s->stats.row_error = s->next;
         return SAT_ERR_LIMIT;
     }
     if (++s->next < s->rows) return SAT_OK;
@@ -2203,11 +2210,11 @@ static sat_result softassign__finish_phase(softassign *s)
 
 static sat_result softassign__advance(softassign *s, size_t budget)
 {
-    size_t stop = s->report.work + budget;
+    size_t stop = s->stats.work + budget;
     sat_result result = SAT_OK;
-    while (s->phase != SOFTASSIGN__DONE && s->report.work < stop && result == SAT_OK) {
+    while (s->phase != SOFTASSIGN__DONE && s->stats.work < stop && result == SAT_OK) {
         if (s->phase == SOFTASSIGN__LISTS || s->phase == SOFTASSIGN__RELIST)
-            result = softassign__list_phase(s, stop - s->report.work);
+            result = softassign__list_phase(s, stop - s->stats.work);
         else if (s->phase == SOFTASSIGN__PRICES) result = softassign__price_phase(s);
         else if (s->phase == SOFTASSIGN__PATHS) result = softassign__path_phase(s);
         else if (s->phase == SOFTASSIGN__FINISH) result = softassign__finish_phase(s);
@@ -2339,7 +2346,7 @@ static int softassign__greedy(softassign *s)
         j = softassign__nearest_free(s, i, &cost);
         if (j >= 0) softassign__greedy_take(s, i, j, cost);
         else lost++;
-        s->report.iterations++;
+        s->stats.iterations++;
     }
     return lost;
 }
@@ -2421,7 +2428,7 @@ static int softassign__improve_row(softassign *s, int row)
         partner_cost = back;
     }
     if (to >= 0) softassign__move(s, row, to, to_cost, partner, partner_cost);
-    s->report.iterations++;
+    s->stats.iterations++;
     return to >= 0;
 }
 
@@ -2481,7 +2488,7 @@ static void softassign__anneal(softassign *s, int *best)
                 slot = (int)(softassign__uniform(&seed) * s->slot_count), other;
             float here, back = 0;
             double change;
-            s->report.iterations++;
+            s->stats.iterations++;
             if (slot == s->slot_of_row[row] || s->capacity[slot] == 0) continue;
             here = softassign__cost(s, row, slot);
             s->scratch[0].distances++;
@@ -2559,7 +2566,7 @@ static double softassign__ant(softassign *s, uint64_t *seed, int *order)
         slot = softassign__ant_choice(s, row, seed, &cost);
         softassign__assign(s, row, slot, cost);
     }
-    s->report.iterations++;
+    s->stats.iterations++;
     return softassign__cost_now(s);
 }
 
@@ -2720,7 +2727,7 @@ static double softassign__sweep_once(softassign__sweep *w)
         if (c) softassign__accumulate(w->columns, w->columns + (size_t)c * (size_t)s->columns, 1, s->columns);
     }
     for (j = 0; j < s->columns; j++) bound += (double)s->price_f[j] * s->capacity[j];
-    s->report.iterations++;
+    s->stats.iterations++;
     return bound;
 }
 
@@ -2765,11 +2772,11 @@ static void softassign__entropic(softassign *s, softassign__sweep *w, double *be
     }
     if (o->soft) {
         w->soft = o->soft;
-        w->soft_stride = o->soft_stride;
+        w->soft_stride = o->soft_stride ? o->soft_stride : s->columns;
         (void)softassign__sweep_once(w);
     } else (void)softassign__sweep_once(w);
     for (j = 0; j < s->columns; j++)
-        if ((double)w->columns[j] > s->report.column_sum_max) s->report.column_sum_max = (double)w->columns[j];
+        if ((double)w->columns[j] > s->stats.column_sum_max) s->stats.column_sum_max = (double)w->columns[j];
     for (j = 0; j < s->columns; j++) softassign__set_price(s, j, best_price[j]);
 }
 
@@ -2826,7 +2833,7 @@ static inline double softassign__exp_clamped_f64(double x) { return exp(x < -650
         softassign__published *p = (softassign__published *)context;                                                   \
         const softassign *s = p->s;                                                                                    \
         int i, j, n = s->columns, gold = s->options.gold;                                                              \
-        T alpha = (T)s->options.alpha, scale = (T)(1 / p->largest), inverse = (T)(1 / p->t), factor = (T)(1 / sqrt(p->t)); \
+        T alpha = (T)s->options.alpha, scale = (T)(1 / p->largest), inverse = (T)(1 / p->t), factor = (T)(1 / sqrt(p->t));\
         (void)worker;                                                                                                  \
         for (i = begin; i < end; i++) {                                                                                \
             const float *cost = s->matrix + (size_t)i * (size_t)n;                                                     \
@@ -2851,7 +2858,7 @@ static inline double softassign__exp_clamped_f64(double x) { return exp(x < -650
         int j, n = p->s->columns, last = sat__min_int(n, end * 64);                                                    \
         (void)worker;                                                                                                  \
         for (j = begin * 64; j < last; j++) {                                                                          \
-            double sum = softassign__gather_##suffix((const T *)p->m + j, (size_t)p->s->rows, (size_t)n, p->s->options.gather); \
+            double sum = softassign__gather_##suffix((const T *)p->m + j, (size_t)p->s->rows, (size_t)n, p->s->options.gather);\
             T all = (T)sum + ((T *)p->outlier)[j];                                                                     \
             ((T *)p->column)[j] = all > 0 ? 1 / all : 0;                                                               \
             if (p->evolves) ((T *)p->outlier)[j] *= ((T *)p->column)[j];                                               \
@@ -2899,7 +2906,7 @@ static inline double softassign__exp_clamped_f64(double x) { return exp(x < -650
                 for (turn = 0; turn < o->iterations[2]; turn++) {                                                      \
                     sat__parallel_for(&o->threads, blocks, softassign__sum_columns_##suffix, p);                       \
                     sat__parallel_for(&o->threads, s->rows, softassign__normalise_##suffix, p);                        \
-                    s->report.iterations++;                                                                            \
+                    s->stats.iterations++;                                                                             \
                 }                                                                                                      \
             }                                                                                                          \
             cost = softassign__gather_f64(p->row_cost, (size_t)s->rows, 1, o->gather);                                 \
@@ -2909,14 +2916,15 @@ static inline double softassign__exp_clamped_f64(double x) { return exp(x < -650
             }                                                                                                          \
             if (softassign__progress(s, NULL)) break;                                                                  \
         }                                                                                                              \
-        s->report.soft_cost = lowest;                                                                                  \
+        s->stats.soft_cost = lowest;                                                                                   \
     }                                                                                                                  \
                                                                                                                        \
-    /* Reads S: the largest element of each row to wanted, the report, the caller's copy */                            \
+    /* Reads S: the largest element of each row to wanted, the stats, the caller's copy */                             \
     static void softassign__read_soft_##suffix(softassign__published *p, int *wanted)                                  \
     {                                                                                                                  \
         softassign *s = p->s;                                                                                          \
         int i, j, n = s->columns;                                                                                      \
+        ptrdiff_t soft_stride = s->options.soft_stride ? s->options.soft_stride : n;                                   \
         for (i = 0; i < s->rows; i++) {                                                                                \
             const T *row = (const T *)p->best + (size_t)i * (size_t)n;                                                 \
             T top = 0;                                                                                                 \
@@ -2926,12 +2934,12 @@ static inline double softassign__exp_clamped_f64(double x) { return exp(x < -650
                     top = row[j];                                                                                      \
                     wanted[i] = j;                                                                                     \
                 }                                                                                                      \
-                if (s->options.soft) s->options.soft[(ptrdiff_t)i * s->options.soft_stride + j] = (float)row[j];       \
+                if (s->options.soft) s->options.soft[(ptrdiff_t)i * soft_stride + j] = (float)row[j];                  \
             }                                                                                                          \
         }                                                                                                              \
         for (j = 0; j < n; j++) {                                                                                      \
-            double sum = softassign__gather_##suffix((const T *)p->best + j, (size_t)s->rows, (size_t)n, s->options.gather); \
-            if (sum > s->report.column_sum_max) s->report.column_sum_max = sum;                                        \
+            double sum = softassign__gather_##suffix((const T *)p->best + j, (size_t)s->rows, (size_t)n, s->options.gather);\
+            if (sum > s->stats.column_sum_max) s->stats.column_sum_max = sum;                                          \
         }                                                                                                              \
     }
 
@@ -2945,7 +2953,7 @@ static int softassign__extract(softassign *s, const int *wanted)
     for (i = 0; i < s->rows; i++) {
         j = wanted[i];
         if (j >= 0 && softassign__is_free(s, j)) softassign__greedy_take(s, i, j, softassign__cost(s, i, j));
-        else if (j >= 0) s->report.duplicate_rows++;
+        else if (j >= 0) s->stats.duplicate_rows++;
     }
     for (i = 0; i < s->rows; i++) {
         float cost = 0;
@@ -2968,22 +2976,22 @@ static void softassign__report_slots(softassign *s, const int *seats)
 {
     softassign__sum cost = {0, 0, 0};
     int i, workers = sat__worker_count(&s->options.threads);
-    s->report.switched = 0;
+    s->stats.switched = 0;
     for (i = 0; i < s->rows; i++) {
         int column = softassign__column(s, seats[i]);
         softassign__add(&cost, (double)softassign__pair(&s->problem, i, column));
-        s->report.switched += s->problem.previous && s->problem.previous[i] >= 0 && s->problem.previous[i] != column;
+        s->stats.switched += s->problem.previous && s->problem.previous[i] >= 0 && s->problem.previous[i] != column;
     }
-    s->report.cost = softassign__total(&cost);
-    s->report.lower_bound = s->bound;
+    s->stats.cost = softassign__total(&cost);
+    s->stats.lower_bound = s->bound;
     if (s->phase == SOFTASSIGN__DONE && s->excess >= 0 && s->bonus <= 0) { /* proven by softassign__prove */
-        double proven = s->report.cost - s->excess - fabs(s->report.cost) * 4.5e-16 - cost.magnitude * 1e-28;
-        if (proven > s->bound) s->report.lower_bound = s->bound = proven;
+        double proven = s->stats.cost - s->excess - fabs(s->stats.cost) * 4.5e-16 - cost.magnitude * 1e-28;
+        if (proven > s->bound) s->stats.lower_bound = s->bound = proven;
     }
-    s->report.gap = softassign__gap(s->report.cost, s->bound, cost.magnitude);
-    s->report.bytes = s->bytes;
+    s->stats.gap = softassign__gap(s->stats.cost, s->bound, cost.magnitude);
+    s->stats.bytes = s->bytes;
     for (i = 0; i < workers; i++) {
-        s->report.distances_computed += s->scratch[i].distances;
+        s->stats.distances_computed += s->scratch[i].distances;
         s->scratch[i].distances = 0;
     }
 }
@@ -2995,15 +3003,15 @@ static inline int softassign__shown_column(const softassign *s, int slot)
     return s->problem.unassigned_cost > 0 && column == s->columns - 1 ? -1 : column;
 }
 
-/* The report for the caller: gains where the negative costs were minimised. */
-static softassign_report softassign__outward(const softassign *s)
+/* The stats for the caller: gains where the negative costs were minimised. */
+static softassign_stats softassign__outward(const softassign *s)
 {
-    softassign_report report = s->report;
+    softassign_stats stats = s->stats;
     if (s->problem.maximise) {
-        report.cost = -report.cost;
-        report.lower_bound = -report.lower_bound;
+        stats.cost = -stats.cost;
+        stats.lower_bound = -stats.lower_bound;
     }
-    return report;
+    return stats;
 }
 
 /* The dual prices of the optimum, as options.row_price describes them. */
@@ -3013,7 +3021,7 @@ static void softassign__tell_prices(const softassign *s)
     double sign = s->problem.maximise ? -1 : 1;
     int i, j, columns = s->columns - (s->problem.unassigned_cost > 0),
               nobody = columns < s->columns && s->used[columns] == s->rows;
-    if (s->report.complete && (o->row_price || o->column_price) && s->slot_count == s->columns) {
+    if (s->stats.complete && (o->row_price || o->column_price) && s->slot_count == s->columns) {
         for (j = 0; o->column_price && j < columns; j++) o->column_price[j] = nobody ? 0 : sign * s->price[j];
         for (i = 0; o->row_price && i < s->rows; i++) {
             int slot = s->slot_of_row[i];
@@ -3025,10 +3033,10 @@ static void softassign__tell_prices(const softassign *s)
 /* 1 when the caller wants to stop. slots: NULL while there is no assignment to show. */
 static int softassign__progress(softassign *s, const int *seats)
 {
-    softassign_report shown;
+    softassign_stats shown;
     int i;
     if (!s->options.progress) return 0;
-    if (!seats) return s->stopped = s->options.progress(&s->report, NULL, s->options.progress_user) != 0;
+    if (!seats) return s->stopped = s->options.progress(&s->stats, NULL, s->options.progress_user) != 0;
     softassign__report_slots(s, seats);
     for (i = 0; i < s->rows; i++) s->shown_column[i] = softassign__shown_column(s, seats[i]);
     shown = softassign__outward(s);
@@ -3131,7 +3139,7 @@ static int softassign__explain_costs(sat__text *t, const softassign_problem *p)
     if (!p) sat__text_add(t, "problem is NULL");
     else if (p->rows < 1) sat__text_range(t, "rows", p->rows, 1, 2147483647, ' ');
     else if (p->columns < 1) sat__text_range(t, "columns", p->columns, 1, 2147483647, ' ');
-    else if (p->cost && p->stride < p->columns && p->stride > -(ptrdiff_t)p->columns && p->rows > 1)
+    else if (p->cost && p->stride && p->stride < p->columns && p->stride > -(ptrdiff_t)p->columns && p->rows > 1)
         sat__text_add(t, "stride is shorter than a row of the matrix");
     else if (!p->cost && !p->cost_fn && !p->row_features) sat__text_add(t, "cost, cost_fn and row_features are NULL");
     else if (!p->cost && !p->cost_fn && !p->column_features) sat__text_add(t, "column_features is NULL");
@@ -3203,7 +3211,7 @@ static void softassign__check_range(int begin, int end, int worker, void *contex
         int *wrong = &s->list_length[i], stay = p->previous ? p->previous[i] : -1;
         *wrong = SAT_OK;
         if (p->cost) {
-            const float *cost = p->cost + (ptrdiff_t)i * p->stride;
+            const float *cost = softassign__cost_row(p, i);
             for (j = 0; j < s->columns; j++) {
                 uint32_t size = sat__float_bits(cost[j]) & 0x7fffffffu;
                 largest = size > largest ? size : largest;
@@ -3237,21 +3245,21 @@ static sat_result softassign__check_costs(softassign *s)
     int i, from_features = !p->cost && !p->cost_fn;
     for (k = 0; from_features && k < n * (size_t)s->rows; k++)
         if ((result = softassign__check_feature(p->row_features[k])) != SAT_OK) {
-            s->report.row_error = (int)(k / n);
+            s->stats.row_error = (int)(k / n);
             return result;
         }
     for (k = 0; from_features && k < n * (size_t)s->columns; k++)
         if ((result = softassign__check_feature(p->column_features[k])) != SAT_OK) {
-            s->report.row_error = 0; /* every row meets it */
-            s->report.column_error = (int)(k / n);
+            s->stats.row_error = 0; /* every row meets it */
+            s->stats.column_error = (int)(k / n);
             return result;
         }
     if (from_features && !s->dense) return SAT_OK;
     sat__parallel_for(&s->options.threads, s->rows, softassign__check_range, s);
-    if (!p->cost) s->report.distances_computed += (size_t)s->rows * (size_t)s->columns;
+    if (!p->cost) s->stats.distances_computed += (size_t)s->rows * (size_t)s->columns;
     for (i = 0; i < s->rows; i++)
         if (s->list_length[i] != SAT_OK) {
-            s->report.row_error = i;
+            s->stats.row_error = i;
             return (sat_result)s->list_length[i];
         }
     return SAT_OK;
@@ -3299,7 +3307,7 @@ static sat_result softassign__make_slots(softassign *s)
         int capacity = p->capacity ? p->capacity[j] : s->options.capacity_default,
             least = p->minimum_use ? p->minimum_use[j] : 0;
         if (least > capacity) {
-            s->report.column_error = j;
+            s->stats.column_error = j;
             return SAT_ERR_ARGUMENT;
         }
         room += sat__min_int(capacity, s->rows);
@@ -3315,7 +3323,7 @@ static sat_result softassign__make_slots(softassign *s)
     }
     s->unit_capacities = units;
     if (room >= s->rows && needed <= s->rows) return SAT_OK;
-    s->report.row_error = room < s->rows ? (int)room : s->rows - 1;
+    s->stats.row_error = room < s->rows ? (int)room : s->rows - 1;
     return SAT_ERR_LIMIT;
 }
 
@@ -3342,8 +3350,8 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     int j, from_features = !problem->cost && !problem->cost_fn, known = s->prices_known;
     s->problem = *problem;
     s->phase = SOFTASSIGN__START;
-    memset(&s->report, 0, sizeof s->report);
-    s->report.row_error = s->report.column_error = -1;
+    memset(&s->stats, 0, sizeof s->stats);
+    s->stats.row_error = s->stats.column_error = -1;
     s->bound = -(double)SOFTASSIGN__INFINITY;
     s->excess = -1;
     result = softassign__make_slots(s);
@@ -3499,13 +3507,13 @@ static sat_result softassign__step_slots(softassign *s, size_t budget, int *seat
     if (result != SAT_OK) return result;
     softassign__update_bound(s);
     softassign__report_slots(s, seats);
-    s->report.complete = s->phase == SOFTASSIGN__DONE;
-    s->report.method = s->dense_paths ? SOFTASSIGN_AUTO : SOFTASSIGN_EXACT;
+    s->stats.complete = s->phase == SOFTASSIGN__DONE;
+    s->stats.method = s->dense_paths ? SOFTASSIGN_AUTO : SOFTASSIGN_EXACT;
     return SAT_OK;
 }
 
 SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row, const softassign_problem *problem,
-                                          size_t work_budget, softassign_report *report)
+                                          size_t work_budget, softassign_stats *stats)
 {
     softassign *s = solver;
     sat_result result = SAT_OK;
@@ -3516,7 +3524,7 @@ SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row
     if (s->phase == SOFTASSIGN__START) result = softassign__start(s, problem);
     else s->problem = *problem;
     if (result == SAT_OK) result = softassign__step_slots(s, work_budget, s->shown);
-    if (report) *report = s->report;
+    if (stats) *stats = s->stats;
     if (result != SAT_OK) {
         s->phase = SOFTASSIGN__START;
         s->prices_known = 0;
@@ -3546,7 +3554,7 @@ static sat_result softassign__solve_exact(softassign *s)
     do {
         result = softassign__step_slots(s, budget, s->shown);
         if (result != SAT_OK) return result;
-    } while (!s->report.complete && !softassign__progress(s, s->shown));
+    } while (!s->stats.complete && !softassign__progress(s, s->shown));
     return SAT_OK;
 }
 
@@ -3573,7 +3581,7 @@ static sat_result softassign__solve_fast(softassign *s)
         }
         softassign__certify(s);
         if (!softassign__fill(s, s->shown) || !softassign__progress(s, s->shown)) continue;
-        s->report.method = SOFTASSIGN_FAST; /* stopped: complete stays 0 */
+        s->stats.method = SOFTASSIGN_FAST; /* stopped: complete stays 0 */
         return SAT_OK;
     }
     if (done) {
@@ -3581,9 +3589,9 @@ static sat_result softassign__solve_fast(softassign *s)
         softassign__keep_best(s, s->shown);
         softassign__certify(s);
         softassign__report_slots(s, s->shown);
-        s->report.complete = 1;
-        s->report.method = SOFTASSIGN_FAST;
-        if (s->report.gap <= s->options.gap) return SAT_OK;
+        s->stats.complete = 1;
+        s->stats.method = SOFTASSIGN_FAST;
+        if (s->stats.gap <= s->options.gap) return SAT_OK;
     }
     return softassign__solve_from_prices(s);
 }
@@ -3624,7 +3632,7 @@ static sat_result softassign__place_rest(softassign *s, int lost)
     softassign__list_all(s);
     for (i = 0; i < s->rows; i++)
         if (s->slot_of_row[i] < 0 && !softassign__augment(s, i)) {
-            s->report.row_error = i;
+            s->stats.row_error = i;
             return SAT_ERR_LIMIT;
         }
     softassign__reset_prices(s);
@@ -3690,7 +3698,7 @@ static sat_result softassign__solve_heuristic(softassign *s)
 static sat_result softassign__buy_bound(softassign *s)
 {
     double before = s->bound;
-    softassign_report kept = s->report;
+    softassign_stats kept = s->stats;
     sat_result result = SAT_OK;
     softassign_progress_fn *progress = s->options.progress;
     s->options.progress = NULL;
@@ -3706,8 +3714,8 @@ static sat_result softassign__buy_bound(softassign *s)
     s->options.progress = progress;
     if (before > s->bound) s->bound = before;
     s->excess = -1; /* the proof was about the optimum */
-    kept.distances_computed = s->report.distances_computed;
-    s->report = kept;
+    kept.distances_computed = s->stats.distances_computed;
+    s->stats = kept;
     softassign__reset_assignment(s);
     softassign__take_back(s, s->kept);
     return result;
@@ -3743,9 +3751,9 @@ static void softassign__separate(softassign *s)
         for (i = 0; i < s->rows; i++) changed += softassign__improve_row(s, i);
         if (!changed) break;
     }
-    s->report.conflicts = 0;
-    for (i = 0; i < s->rows; i++) s->report.conflicts += softassign__conflicts(s, i, s->slot_of_row[i], -1);
-    s->report.conflicts /= 2;
+    s->stats.conflicts = 0;
+    for (i = 0; i < s->rows; i++) s->stats.conflicts += softassign__conflicts(s, i, s->slot_of_row[i], -1);
+    s->stats.conflicts /= 2;
 }
 
 /* Scratch of the matrix methods, in one block of its own. */
@@ -3823,8 +3831,8 @@ static sat_result softassign__run(softassign *s, softassign__matrix_work *w)
     if (!has_prices && s->options.certify) result = softassign__buy_bound(s);
 #endif
     if (method > SOFTASSIGN_FAST) {
-        s->report.method = s->options.method;
-        s->report.complete = !s->stopped;
+        s->stats.method = s->options.method;
+        s->stats.complete = !s->stopped;
     }
     if (s->options.min_distance > 0) {
         s->excess = -1; /* what follows is another assignment */
@@ -3862,7 +3870,7 @@ static int softassign__over_used(const softassign_problem *p, const softassign_o
 }
 
 static sat_result softassign__solve_plain(int *column_of_row, const softassign_problem *problem,
-                                          const softassign_options *options, int matrix, softassign_report *report)
+                                          const softassign_options *options, int matrix, softassign_stats *stats)
 {
     softassign__matrix_work work;
     softassign *s;
@@ -3878,7 +3886,7 @@ static sat_result softassign__solve_plain(int *column_of_row, const softassign_p
 #endif
     if (result == SAT_OK) result = softassign__start(s, problem);
     if (result == SAT_OK) result = softassign__run(s, &work);
-    if (report) *report = softassign__outward(s);
+    if (stats) *stats = softassign__outward(s);
     for (i = 0; result == SAT_OK && i < s->rows; i++) column_of_row[i] = softassign__shown_column(s, s->shown[i]);
     if (result == SAT_OK) softassign__tell_prices(s);
     s->bytes -= work.bytes;
@@ -3888,7 +3896,7 @@ static sat_result softassign__solve_plain(int *column_of_row, const softassign_p
 }
 
 static sat_result softassign__solve_wrapped(int *column_of_row, const softassign_problem *problem,
-                                            const softassign_options *options, softassign_report *report)
+                                            const softassign_options *options, softassign_stats *stats)
 {
     softassign_problem stated = *problem, p = *problem;
     sat_allocator allocator;
@@ -3913,29 +3921,29 @@ static sat_result softassign__solve_wrapped(int *column_of_row, const softassign
     }
     p.capacity = capacity;
     if (p.minimum_use) p.minimum_use = capacity + p.columns;
-    result = softassign__solve_plain(column_of_row, &p, options, problem->cost != NULL, report);
+    result = softassign__solve_plain(column_of_row, &p, options, problem->cost != NULL, stats);
     sat__release(&allocator, capacity, size);
     return result;
 }
 
 SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_problem *problem,
-                                           const softassign_options *options, softassign_report *report)
+                                           const softassign_options *options, softassign_stats *stats)
 {
     softassign_options o = options ? *options : softassign_defaults();
     sat__text ignored = sat__text_begin(NULL, 0);
-    if (report) {
-        memset(report, 0, sizeof *report);
-        report->row_error = report->column_error = -1;
+    if (stats) {
+        memset(stats, 0, sizeof *stats);
+        stats->row_error = stats->column_error = -1;
     }
     if (!column_of_row || !softassign__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
     if (!softassign__problem_is_valid(problem)) return SAT_ERR_ARGUMENT;
     if (!softassign__explain_problem(&ignored, problem, &o)) {
-        if (report) report->column_error = softassign__over_used(problem, &o);
+        if (stats) stats->column_error = softassign__over_used(problem, &o);
         return SAT_ERR_ARGUMENT;
     }
     if (problem->maximise || problem->unassigned_cost > 0)
-        return softassign__solve_wrapped(column_of_row, problem, &o, report);
-    return softassign__solve_plain(column_of_row, problem, &o, problem->cost != NULL, report);
+        return softassign__solve_wrapped(column_of_row, problem, &o, stats);
+    return softassign__solve_plain(column_of_row, problem, &o, problem->cost != NULL, stats);
 }
 
 #ifndef SOFTASSIGN_NO_MOSAIC
@@ -4006,8 +4014,7 @@ SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride
                                             int grid_height, const sat_image *target, float blend)
 {
     int across, count, cell, y, k, channels, tint = target && blend > 0;
-    ptrdiff_t row;
-    if (!out || !sat__image_is_valid(tiles) || tiles->format != SAT_U8 || !column_of_row || tile_width < 1 ||
+    if (!sat__image_is_valid(tiles) || tiles->format != SAT_U8 || !column_of_row || tile_width < 1 ||
         tile_height < 1 || grid_width < 1 || grid_height < 1 || grid_width > 2147483647 / grid_height ||
         !(blend >= 0 && blend <= 1))
         return SAT_ERR_ARGUMENT;
@@ -4015,8 +4022,9 @@ SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride
     if (target && (!sat__image_is_valid(target) || target->channels != channels)) return SAT_ERR_MISMATCH;
     across = tiles->width / tile_width;
     count = across * (tiles->height / tile_height);
-    row = (ptrdiff_t)grid_width * tile_width * channels;
-    if (stride < row && stride > -row) return SAT_ERR_ARGUMENT;
+    if (grid_width > 2147483647 / tile_width || grid_height > 2147483647 / tile_height ||
+        !sat__rows_are_valid(out, &stride, grid_width * tile_width, grid_height * tile_height, (size_t)channels, 1))
+        return SAT_ERR_ARGUMENT;
     for (cell = 0; cell < grid_width * grid_height; cell++)
         if (column_of_row[cell] < 0 || column_of_row[cell] >= count) return SAT_ERR_ARGUMENT;
     for (cell = 0; cell < grid_width * grid_height; cell++) {
@@ -4632,8 +4640,8 @@ SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft
     sat_result result;
     double t, lowest = (double)SOFTASSIGN__INFINITY;
     int i;
-    if (!g || !g->rows || (soft && soft_stride < g->columns && soft_stride > -(ptrdiff_t)g->columns))
-        return SAT_ERR_ARGUMENT;
+    if (!g || !g->rows || (soft && !sat__rows_are_valid(soft, &soft_stride, g->columns, g->rows, 1, 1)))
+        return SAT_ERR_ARGUMENT; /* a stride in floats: as if they were bytes */
     sat__gl_begin(&g->gl, &state, 3);
     result = softassign__gl_start_matrix(g);
     softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows, g->texture[SOFTASSIGN__M], 0, 0,

@@ -199,8 +199,8 @@ typedef struct ssao_sat_input {
     const float *normals;      /* view space xyz; NULL: derived from depth */
     ptrdiff_t normal_stride;
     ssao_sat_depth depth_kind; /* SSAO_SAT_DEPTH_LINEAR */
-    float projection[16];      /* column-major; perspective or orthographic, off-centre, flipped, infinite far: all read
-                                  from it */
+    float projection[16];      /* column-major, as OpenGL takes it; perspective or orthographic, off-centre, flipped,
+                                  infinite far: all read from it */
     int clip_zero_to_one;      /* 0: the matrix maps depth to [-1,1] (OpenGL); 1: to [0,1] (Vulkan, Direct3D,
                                   glClipControl) */
     const uint16_t *half_depth;/* binary16 depths instead of `depth`, which is then NULL */
@@ -274,7 +274,7 @@ typedef struct ssao_sat ssao_sat;
 SSAO_SAT_DEF int ssao_sat_version(void);
 SSAO_SAT_DEF ssao_sat_options ssao_sat_defaults(void);
 /* Linear depth and a symmetric perspective of this vertical field of view: fill in buffers and strides. */
-SSAO_SAT_DEF ssao_sat_input ssao_sat_input_linear(const float *depth, int width, int height, double vertical_fov);
+SSAO_SAT_DEF ssao_sat_input ssao_sat_input_linear(const float *depth, int width, int height, double fov_y);
 
 /* Scratch memory for pictures of this size; exactly one allocation. 1 <= width, height <= 32768. NULL options: the
    defaults. */
@@ -348,7 +348,7 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigne
    are uniforms and free. */
 SSAO_SAT_DEF sat_result ssao_sat_gl_set_options(ssao_sat_gl *gl, const ssao_sat_options *options);
 SSAO_SAT_DEF unsigned ssao_sat_gl_texture(const ssao_sat_gl *gl);
-/* What the last SAT_ERR_GL_... was about; never NULL. */
+/* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 SSAO_SAT_DEF const char *ssao_sat_gl_message(const ssao_sat_gl *gl);
 SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl); /* NULL is fine */
 
@@ -642,10 +642,10 @@ SSAO_SAT_DEF ssao_sat_options ssao_sat_defaults(void)
     return o;
 }
 
-SSAO_SAT_DEF ssao_sat_input ssao_sat_input_linear(const float *depth, int width, int height, double vertical_fov)
+SSAO_SAT_DEF ssao_sat_input ssao_sat_input_linear(const float *depth, int width, int height, double fov_y)
 {
     ssao_sat_input in;
-    double f = 1 / tan(0.5 * vertical_fov);
+    double f = 1 / tan(0.5 * fov_y);
     memset(&in, 0, sizeof in);
     in.depth = depth;
     in.width = width;
@@ -2181,16 +2181,6 @@ static void ssao_sat__run(ssao_sat *s, ssao_sat_stats *stats)
    Calls
    ------------------------------------------------------------------------------------------------ */
 
-/* Rows of `bytes` each, `stride` apart (0: packed): resolves the stride; 0 when they overlap or are not aligned. */
-static int ssao_sat__rows_are_valid(const void *pixels, ptrdiff_t *stride, int height, size_t bytes, size_t element)
-{
-    size_t step;
-    if (!pixels || (uintptr_t)pixels % element) return 0;
-    if (*stride == 0) *stride = (ptrdiff_t)bytes;
-    step = *stride < 0 ? (size_t)0 - (size_t)*stride : (size_t)*stride;
-    return (height == 1 || step >= bytes) && step % element == 0;
-}
-
 /* Do two sets of rows share a byte? Interleaved rows of one buffer count as sharing. */
 static int ssao_sat__overlap(const void *a, ptrdiff_t a_stride, size_t a_bytes, const void *b, ptrdiff_t b_stride,
                              size_t b_bytes, int height)
@@ -2220,7 +2210,7 @@ static int ssao_sat__output_is_valid(const ssao_sat *s, const float *out, ptrdif
 {
     const ssao_sat_input *in = &s->input;
     const void *depth = in->depth ? (const void *)in->depth : (const void *)in->half_depth;
-    if (!ssao_sat__rows_are_valid(out, stride, s->height, bytes, 4)) return 0;
+    if (!sat__rows_are_valid(out, stride, s->width, s->height, bytes / (size_t)s->width, 4)) return 0;
     return !ssao_sat__overlap(out, *stride, bytes, depth, in->depth_stride, (size_t)s->width * (in->depth ? 4 : 2),
                               s->height) &&
            !ssao_sat__overlap(out, *stride, bytes, in->normals, in->normal_stride, (size_t)s->width * 12, s->height);
@@ -2305,13 +2295,13 @@ SSAO_SAT_DEF const char *ssao_sat_explain(char *text, size_t size, int width, in
 static const char *ssao_sat__bad_buffer(ssao_sat_input *in)
 {
     if (!in->depth == !in->half_depth) return "depth or half_depth, one of them, is needed";
-    if (in->depth && !ssao_sat__rows_are_valid(in->depth, &in->depth_stride, in->height, (size_t)in->width * 4, 4))
+    if (in->depth && !sat__rows_are_valid(in->depth, &in->depth_stride, in->width, in->height, 4, 4))
         return "depth: not aligned, or depth_stride is less than a row or no multiple of 4";
     if (in->half_depth &&
-        !ssao_sat__rows_are_valid(in->half_depth, &in->depth_stride, in->height, (size_t)in->width * 2, 2))
+        !sat__rows_are_valid(in->half_depth, &in->depth_stride, in->width, in->height, 2, 2))
         return "half_depth: not aligned, or depth_stride is less than a row or odd";
     if (in->normals &&
-        !ssao_sat__rows_are_valid(in->normals, &in->normal_stride, in->height, (size_t)in->width * 12, 4))
+        !sat__rows_are_valid(in->normals, &in->normal_stride, in->width, in->height, 12, 4))
         return "normals: not aligned, or normal_stride is less than a row or no multiple of 4";
     return NULL;
 }

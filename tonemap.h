@@ -216,12 +216,12 @@ TONEMAP_DEF sat_result tonemap_once_u8(unsigned char *out, const float *pixels, 
 /* An operator for pictures of one size; exactly one allocation. Sides up to 2^24. */
 TONEMAP_DEF sat_result tonemap_create(tonemap **out, int width, int height, const tonemap_options *options);
 /* hdr: linear, 1 (grey), 3 (RGB) or 4 (RGB and alpha) channels; out: as many channels, rows out_stride bytes apart.
-   dt_seconds: time since the last picture, >= 0; only adaptation looks at it. stats may be NULL. */
+   dt: seconds since the last picture, >= 0; only adaptation looks at it. stats may be NULL. */
 TONEMAP_DEF sat_result tonemap_apply_u8(tonemap *map, unsigned char *out, ptrdiff_t out_stride, const sat_image *hdr,
-                                        double dt_seconds, tonemap_stats *stats);
+                                        double dt, tonemap_stats *stats);
 /* The same without sRGB encoding: linear display values in [0, 1]. May work in place. */
 TONEMAP_DEF sat_result tonemap_apply_f32(tonemap *map, float *out, ptrdiff_t out_stride, const sat_image *hdr,
-                                         double dt_seconds, tonemap_stats *stats);
+                                         double dt, tonemap_stats *stats);
 /* One sentence that names the first argument of tonemap_create or tonemap_gl_create that is refused, and its range; ""
    when none is. Written into text (cut to size, always ended); returns text. */
 TONEMAP_DEF const char *tonemap_explain(char *text, size_t size, int width, int height, const tonemap_options *options);
@@ -258,7 +258,7 @@ TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_
                                          const tonemap_options *options);
 /* Maps the 2D texture hdr (float RGB or RGBA, of the created size, level 0) to sRGB codes and alpha 1 in the texture
    ldr (RGBA8, of that size), or, when ldr is 0, in tonemap_gl_texture(). */
-TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned hdr, double dt_seconds);
+TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned hdr, double dt);
 TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl);
 /* Other options from the next picture on; the adaptation goes on. Costs nothing: key, white, exposure, the seconds, the
    limits of adaptation, cd_per_unit and lux_per_cd are uniforms. What the shaders are compiled for is SAT_ERR_ARGUMENT,
@@ -266,7 +266,7 @@ TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl);
    other way round, a white that is infinite where it was not. Allocator, threads and tolerance_codes are not looked
    at. */
 TONEMAP_DEF sat_result tonemap_gl_set_options(tonemap_gl *gl, const tonemap_options *options);
-/* What the last SAT_ERR_GL_... was about; never NULL. */
+/* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 TONEMAP_DEF const char *tonemap_gl_message(const tonemap_gl *gl);
 TONEMAP_DEF void tonemap_gl_destroy(tonemap_gl *gl); /* NULL is fine */
 
@@ -917,17 +917,17 @@ static inline int tonemap__measured_state(tonemap *map, double *state)
 }
 
 /* Share of the way that the state goes in a time; all of it without adaptation. */
-static inline double tonemap__share(const tonemap_options *o, int darker, double dt_seconds)
+static inline double tonemap__share(const tonemap_options *o, int darker, double dt)
 {
     double tau = darker && o->darker_seconds > 0 ? o->darker_seconds : o->adapt_seconds;
-    return o->adapt_seconds > 0 ? -expm1(-dt_seconds / tau) : 1;
+    return o->adapt_seconds > 0 ? -expm1(-dt / tau) : 1;
 }
 
 /* Exponential approach with a time constant, exact for any step: two steps of dt / 2 are one of dt. */
-static inline void tonemap__adapt(tonemap *map, const double *measured, double dt_seconds)
+static inline void tonemap__adapt(tonemap *map, const double *measured, double dt)
 {
     const tonemap_options *o = &map->options;
-    double weight = tonemap__share(o, measured[TONEMAP__AVERAGE] < map->state[TONEMAP__AVERAGE], dt_seconds);
+    double weight = tonemap__share(o, measured[TONEMAP__AVERAGE] < map->state[TONEMAP__AVERAGE], dt);
     unsigned used = 1u << TONEMAP__AVERAGE | 1u << TONEMAP__KEY;
     int i;
     if (o->metering == TONEMAP_METERING_PERCENTILES) used |= 1u << TONEMAP__HELD;
@@ -1324,7 +1324,7 @@ static inline uint32_t *tonemap__ring_row(const tonemap *map, const tonemap__wor
     return w->sums + (size_t)(j % (2 * TONEMAP__BOXES + 2)) * (size_t)map->ring_row;
 }
 
-static inline void tonemap__quantize(int32_t *out, const float *luminance, int width, const tonemap__frame *f)
+static inline void tonemap__quantise(int32_t *out, const float *luminance, int width, const tonemap__frame *f)
 {
     int x = 0;
 #ifdef SAT__VECTOR
@@ -1350,7 +1350,7 @@ static inline void tonemap__add_ring_row(const tonemap *map, tonemap__worker *w,
     uint32_t *row = tonemap__ring_row(map, w, j + 1) + TONEMAP__BOXES + 1, sum = 0;
     int32_t *quanta = (int32_t *)(void *)w->edge;
     int x, end = map->ring_row - TONEMAP__BOXES - 1;
-    tonemap__quantize(quanta, map->luminance + (size_t)j * (size_t)map->row, map->width, &map->frame);
+    tonemap__quantise(quanta, map->luminance + (size_t)j * (size_t)map->row, map->width, &map->frame);
     memset(row - TONEMAP__BOXES - 1, 0, (TONEMAP__BOXES + 1) * sizeof *row);
     for (x = 0; x < map->width; x++) {
         sum += (uint32_t)quanta[x];
@@ -2452,7 +2452,7 @@ static inline void tonemap__finish_stats(tonemap *map)
     }
 }
 
-static inline sat_result tonemap__apply(tonemap__job *job, double dt_seconds, tonemap_stats *stats)
+static inline sat_result tonemap__apply(tonemap__job *job, double dt, tonemap_stats *stats)
 {
     tonemap *map = job->map;
     const sat_threads *threads = &map->options.threads;
@@ -2468,7 +2468,7 @@ static inline sat_result tonemap__apply(tonemap__job *job, double dt_seconds, to
         memset(w->bins, 0, TONEMAP__BINS * sizeof *w->bins);
     }
     sat__parallel_for(threads, bands, tonemap__measure_bands, job);
-    if (tonemap__measured_state(map, measured)) tonemap__adapt(map, measured, dt_seconds);
+    if (tonemap__measured_state(map, measured)) tonemap__adapt(map, measured, dt);
     tonemap__prepare_frame(map);
     map->skipping = tonemap__skips(&map->options) && tonemap__plan_skipping(map, job);
     sat__parallel_for(threads, bands, tonemap__map_bands, job);
@@ -2478,21 +2478,20 @@ static inline sat_result tonemap__apply(tonemap__job *job, double dt_seconds, to
     return SAT_OK;
 }
 
-static inline sat_result tonemap__check_call(const tonemap *map, const void *out, ptrdiff_t out_stride, size_t element,
-                                             const sat_image *hdr, double dt_seconds)
+static inline sat_result tonemap__check_call(const tonemap *map, const void *out, ptrdiff_t *out_stride, size_t element,
+                                             const sat_image *hdr, double dt)
 {
-    size_t step = out_stride < 0 ? (size_t)0 - (size_t)out_stride : (size_t)out_stride;
-    if (!map || !out || !sat__image_is_valid(hdr) || hdr->channels == 2) return SAT_ERR_ARGUMENT;
+    if (!map || !sat__image_is_valid(hdr) || hdr->channels == 2) return SAT_ERR_ARGUMENT;
     if (hdr->width != map->width || hdr->height != map->height) return SAT_ERR_MISMATCH;
-    if (map->height > 1 && step < (size_t)hdr->width * (size_t)hdr->channels * element) return SAT_ERR_ARGUMENT;
-    if (step % element || (uintptr_t)out % element) return SAT_ERR_ARGUMENT;
-    return tonemap__in_range(dt_seconds, 0, 1e300) || tonemap__is_infinite(dt_seconds) ? SAT_OK : SAT_ERR_ARGUMENT;
+    if (!sat__rows_are_valid(out, out_stride, hdr->width, hdr->height, (size_t)hdr->channels * element, element))
+        return SAT_ERR_ARGUMENT;
+    return tonemap__in_range(dt, 0, 1e300) || tonemap__is_infinite(dt) ? SAT_OK : SAT_ERR_ARGUMENT;
 }
 
 static inline sat_result tonemap__call(tonemap *map, void *out, ptrdiff_t out_stride, int as_float,
-                                       const sat_image *hdr, double dt_seconds, tonemap_stats *stats)
+                                       const sat_image *hdr, double dt, tonemap_stats *stats)
 {
-    sat_result result = tonemap__check_call(map, out, out_stride, as_float ? sizeof(float) : 1, hdr, dt_seconds);
+    sat_result result = tonemap__check_call(map, out, &out_stride, as_float ? sizeof(float) : 1, hdr, dt);
     tonemap__job job;
     if (result != SAT_OK) return result;
     job.map = map;
@@ -2500,19 +2499,19 @@ static inline sat_result tonemap__call(tonemap *map, void *out, ptrdiff_t out_st
     job.out = (unsigned char *)out;
     job.out_stride = out_stride;
     job.as_float = as_float;
-    return tonemap__apply(&job, dt_seconds, stats);
+    return tonemap__apply(&job, dt, stats);
 }
 
 TONEMAP_DEF sat_result tonemap_apply_u8(tonemap *map, unsigned char *out, ptrdiff_t out_stride, const sat_image *hdr,
-                                        double dt_seconds, tonemap_stats *stats)
+                                        double dt, tonemap_stats *stats)
 {
-    return tonemap__call(map, out, out_stride, 0, hdr, dt_seconds, stats);
+    return tonemap__call(map, out, out_stride, 0, hdr, dt, stats);
 }
 
 TONEMAP_DEF sat_result tonemap_apply_f32(tonemap *map, float *out, ptrdiff_t out_stride, const sat_image *hdr,
-                                         double dt_seconds, tonemap_stats *stats)
+                                         double dt, tonemap_stats *stats)
 {
-    return tonemap__call(map, out, out_stride, 1, hdr, dt_seconds, stats);
+    return tonemap__call(map, out, out_stride, 1, hdr, dt, stats);
 }
 
 TONEMAP_DEF sat_result tonemap_once_u8(unsigned char *out, const float *pixels, int width, int height, int channels,
@@ -2741,7 +2740,7 @@ static const char tonemap__glsl_frame[] =
     "#endif\n"
     "}\n";
 
-static const char tonemap__glsl_quantize[] =
+static const char tonemap__glsl_quantise[] =
     "out uint value;\n"
     "void main() {\n"
     "    float v = clamp(texelFetch(luminance, ivec2(gl_FragCoord.xy), 0).x * tonemap_scale(), 0.0, TONEMAP_CAP);\n"
@@ -2856,7 +2855,7 @@ struct tonemap_gl {
     sat_allocator allocator;
     sat_gl *sat;                /* NULL for the global operators */
     int width, height, levels, current, histogram; /* histogram: 0, or the estimates it serves, see the state shader */
-    unsigned luminance_program, first_program, reduce_program, scatter_program, state_program, quantize_program,
+    unsigned luminance_program, first_program, reduce_program, scatter_program, state_program, quantise_program,
         map_program;
     unsigned luminance, quanta, out, bins, state[2], level[TONEMAP__LEVELS]; /* textures */
     unsigned luminance_target, quanta_target, out_target, bins_target, state_target[2], level_target[TONEMAP__LEVELS];
@@ -2933,8 +2932,8 @@ static inline sat_result tonemap__gl_programs(tonemap_gl *g)
         r = tonemap__gl_program(g, &g->scatter_program, "tonemap: histogram", tonemap__glsl_scatter, NULL, NULL,
                                 tonemap__glsl_count);
     if (r == SAT_OK && g->sat)
-        r = tonemap__gl_program(g, &g->quantize_program, "tonemap: rounding", NULL, tonemap__glsl_frame, NULL,
-                                tonemap__glsl_quantize);
+        r = tonemap__gl_program(g, &g->quantise_program, "tonemap: rounding", NULL, tonemap__glsl_frame, NULL,
+                                tonemap__glsl_quantise);
     if (r == SAT_OK) r = tonemap__gl_program(g, &g->map_program, "tonemap: mapping", NULL, tonemap__glsl_frame, g->sat ? tonemap__glsl_search : NULL, tonemap__glsl_map);
     return r;
 }
@@ -3046,7 +3045,7 @@ TONEMAP_DEF void tonemap_gl_destroy(tonemap_gl *gl)
     sat_gl_destroy(gl->sat);
     if (t->vertex_array) { /* deleting 0 is fine */
         const unsigned programs[7] = {gl->luminance_program, gl->first_program, gl->reduce_program, gl->scatter_program,
-                                      gl->state_program, gl->quantize_program, gl->map_program};
+                                      gl->state_program, gl->quantise_program, gl->map_program};
         int i;
         for (i = 0; i < 7; i++) t->DeleteProgram(programs[i]);
         t->DeleteFramebuffers(TONEMAP__LEVELS, gl->level_target);
@@ -3102,7 +3101,7 @@ static inline void tonemap__gl_count(tonemap_gl *g)
     gl->Disable(SAT__GL_BLEND);
 }
 
-static inline void tonemap__gl_adapt(tonemap_gl *g, double dt_seconds)
+static inline void tonemap__gl_adapt(tonemap_gl *g, double dt)
 {
     sat__gl *gl = &g->gl;
     const tonemap_options *o = &g->options;
@@ -3112,8 +3111,8 @@ static inline void tonemap__gl_adapt(tonemap_gl *g, double dt_seconds)
     sat__gl_set_texture(gl, program, "sums", 0, g->level[g->levels - 1]);
     sat__gl_set_texture(gl, program, "old", 1, g->state[!g->current]);
     sat__gl_set_texture(gl, program, "histogram", 2, g->bins);
-    sat__gl_set_float(gl, program, "weight", (float)tonemap__share(o, 0, dt_seconds));
-    sat__gl_set_float(gl, program, "weight_darker", (float)tonemap__share(o, 1, dt_seconds));
+    sat__gl_set_float(gl, program, "weight", (float)tonemap__share(o, 0, dt));
+    sat__gl_set_float(gl, program, "weight_darker", (float)tonemap__share(o, 1, dt));
     sat__gl_set_float(gl, program, "exposure", (float)o->exposure);
     sat__gl_set_float(gl, program, "lowest", (float)tonemap__limited(-200, o));
     sat__gl_set_float(gl, program, "highest", (float)tonemap__limited(200, o));
@@ -3130,9 +3129,9 @@ static inline sat_result tonemap__gl_map(tonemap_gl *g, unsigned ldr, unsigned h
     unsigned program = g->map_program;
     sat_result result = SAT_OK;
     if (g->sat) {
-        sat__gl_pass(gl, g->quantize_program, g->quanta_target, g->width, g->height);
-        sat__gl_set_texture(gl, g->quantize_program, "luminance", 0, g->luminance);
-        sat__gl_set_texture(gl, g->quantize_program, "state", 1, g->state[g->current]);
+        sat__gl_pass(gl, g->quantise_program, g->quanta_target, g->width, g->height);
+        sat__gl_set_texture(gl, g->quantise_program, "luminance", 0, g->luminance);
+        sat__gl_set_texture(gl, g->quantise_program, "state", 1, g->state[g->current]);
         sat__gl_draw(gl);
         result = sat_gl_build(g->sat, 0, g->quanta, g->width, g->height);
     }
@@ -3150,16 +3149,16 @@ static inline sat_result tonemap__gl_map(tonemap_gl *g, unsigned ldr, unsigned h
     return SAT_OK;
 }
 
-TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned hdr, double dt_seconds)
+TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned hdr, double dt)
 {
     sat__gl_state state;
     sat_result result;
     if (!gl || !gl->map_program || !hdr) return SAT_ERR_ARGUMENT;
-    if (!tonemap__in_range(dt_seconds, 0, 1e300) && !tonemap__is_infinite(dt_seconds)) return SAT_ERR_ARGUMENT;
+    if (!tonemap__in_range(dt, 0, 1e300) && !tonemap__is_infinite(dt)) return SAT_ERR_ARGUMENT;
     sat__gl_begin(&gl->gl, &state, TONEMAP__GL_UNITS);
     tonemap__gl_measure(gl, hdr);
     if (gl->histogram) tonemap__gl_count(gl);
-    tonemap__gl_adapt(gl, dt_seconds);
+    tonemap__gl_adapt(gl, dt);
     result = tonemap__gl_map(gl, ldr, hdr);
     sat__gl_end(&gl->gl, &state);
     return result;

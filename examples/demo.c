@@ -87,7 +87,7 @@ static void print_table(const pipeline *p, const gl_context *context)
 
 static int save_mosaic(pipeline *p, const common_settings *common, const char *path)
 {
-    const softassign_report *r = &p->mosaic_report;
+    const softassign_stats *r = &p->mosaic_report;
     char error[80], rest[200];
     if (!pipeline_mosaic(p)) return common_say(common, p->message);
     snprintf(rest, sizeof rest, "%d tiles of %d, none twice; of the distances %.0f %% never computed", p->mosaic_patches, p->mosaic_tiles,

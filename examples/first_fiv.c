@@ -43,7 +43,7 @@ int main(void)
         fprintf(stderr, "%s\n", sat_result_text(result));
         return 1;
     }
-    fiv_environment_irradiance(environment, open, up); /* where nothing is in the way */
+    fiv_environment_irradiance(open, environment, up); /* where nothing is in the way */
     for (x = 0; x < 3 * SIDE * SIDE; x++) shown[x] = (unsigned char)(230 * sqrtf(fminf(light[x] / open[x % 3], 1)));
     fiv_occluder_destroy(occluder);
     fiv_environment_destroy(environment);

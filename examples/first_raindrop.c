@@ -33,7 +33,7 @@ int main(void)
     options.diameter_mm = 5;
     options.box_size[0] = options.box_size[1] = options.box_size[2] = 3; /* metres around the camera */
     camera.fov_y = 0.8f;
-    camera.near_distance = 0.1f;
+    camera.depth_near = 0.1f;
     camera.exposure = 0;          /* frozen; 0.01 seconds: streaks */
     result = raindrop_environment_create(&environment, &around, NULL, NULL);
     if (!result) result = raindrop_rain_create(&rain, &options);

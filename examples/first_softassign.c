@@ -35,7 +35,7 @@ int main(void)
 {
     sat_image target_view = view(target, SIDE), other_view = view(other, WIDE);
     softassign_problem problem;
-    softassign_report report;
+    softassign_stats report;
     sat_result result;
     int x, y, c;
     for (y = 0; y < SIDE; y++) /* a sun over the sea */

@@ -330,11 +330,11 @@ static void light_by_rays(view *v, const object *objects, const fiv_environment 
                       objects[i].instance.position, objects[i].instance.scale);
     reference_build(&scene);
     t.v = v, t.scene = &scene;
-    t.lights = fiv_environment_lights(e, NULL, NULL, 0);
+    t.lights = fiv_environment_lights(NULL, NULL, 0, e);
     t.directions = (float *)malloc(3 * t.lights * sizeof(float));
     t.powers = (float *)malloc(3 * t.lights * sizeof(float));
     if (!t.directions || !t.powers) fail("no memory");
-    fiv_environment_lights(e, t.directions, t.powers, t.lights);
+    fiv_environment_lights(t.directions, t.powers, t.lights, e);
     if (threads->parallel_for) threads->parallel_for(v->height, trace_rows, &t, threads->user);
     else trace_rows(0, v->height, 0, &t);
     free(t.directions);

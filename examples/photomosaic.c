@@ -226,7 +226,7 @@ static int write_frame(studio *s, const int *columns)
 }
 
 /* The bar shows what is proven: how far the mosaic can be from the best one. */
-static int watch(const softassign_report *report, const int *columns, void *user)
+static int watch(const softassign_stats *report, const int *columns, void *user)
 {
     studio *s = (studio *)user;
     char text[96] = "no mosaic yet";
@@ -238,7 +238,7 @@ static int watch(const softassign_report *report, const int *columns, void *user
     return s->failed;
 }
 
-static void print_report(const studio *s, const softassign_report *r, double seconds)
+static void print_report(const studio *s, const softassign_stats *r, double seconds)
 {
     printf("cost %.6g, no choice costs less than %.6g: gap %.3g %%, %.0f ms\n", r->cost, r->lower_bound, 100 * r->gap, 1e3 * seconds);
     if (r->conflicts) printf("  %d pairs of equal tiles are too close\n", r->conflicts);
@@ -251,7 +251,7 @@ static void print_report(const studio *s, const softassign_report *r, double sec
 static sat_result film(studio *s, int frames)
 {
     softassign *solver = NULL;
-    softassign_report report;
+    softassign_stats report;
     sat_result result;
     sat_image window = s->target;
     int frame;
@@ -281,7 +281,7 @@ static sat_result film(studio *s, int frames)
 static int compare(studio *s, const char *out)
 {
     common_cell cells[2];
-    softassign_report report;
+    softassign_stats report;
     int i, used = 0, ok, width = s->grid[0] * s->tiles.size, height = s->grid[1] * s->tiles.size;
     unsigned char *other = (unsigned char *)malloc((size_t)width * (size_t)height * 3);
     char *seen = (char *)calloc((size_t)s->tiles.count, 1), label[64];
@@ -349,7 +349,7 @@ static void close_studio(studio *s)
 /* Solves, or films, and writes. */
 static int work(studio *s, int pan, int both, const char *out)
 {
-    softassign_report report;
+    softassign_stats report;
     double start = common_clock();
     sat_result result = open_studio(s);
     report.row_error = -1;

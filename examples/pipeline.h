@@ -85,7 +85,7 @@ typedef struct pipeline {
     double seconds[PIPELINE_STAGES];
     unsigned char *mosaic;       /* made by pipeline_mosaic */
     int mosaic_width, mosaic_height, mosaic_patches, mosaic_tiles;
-    softassign_report mosaic_report;
+    softassign_stats mosaic_report;
     double mosaic_seconds;
     char message[400];
 } pipeline;
@@ -425,7 +425,7 @@ static inline raindrop_camera pipeline_rain_camera(const pipeline *p)
     camera.exposure = p->options.shutter;
     camera.aperture = 0.002f;
     camera.focus_distance = 0.4f;
-    camera.near_distance = 0.08f;
+    camera.depth_near = 0.08f;
     return camera;
 }
 

@@ -165,19 +165,20 @@ static inline int pipeline_gl_rain(pipeline_gl *g, float *rgb, const float *dept
 {
     raindrop_gl_options options = raindrop_gl_defaults();
     sat_result result = SAT_OK;
-    const float near = 0.08f, far = 1000;
+    raindrop_camera eye = *camera;
+    eye.depth_far = 1000;
     options.quads = 1;
     if (!g->rain) result = raindrop_gl_create(&g->rain, g->get_proc, &options);
     if (result == SAT_OK && g->environment != environment)
         result = raindrop_gl_set_environment(g->rain, g->environment = environment);
     if (result == SAT_OK && g->drops != rain) result = raindrop_gl_set_rain(g->rain, g->drops = rain);
     if (result == SAT_OK) result = raindrop_gl_advance(g->rain, dt);
-    pipeline_gl_depth(g, depth, near, far);
+    pipeline_gl_depth(g, depth, eye.depth_near, eye.depth_far);
     pipeline_gl_copy(g, rgb, 1, 1);
     sat__gl_upload(&g->gl, g->rainy, SAT__GL_RGBA32F, g->width, g->height, g->rows);
     g->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, g->framebuffer);
     g->gl.Viewport(0, 0, g->width, g->height);
-    if (result == SAT_OK) result = raindrop_gl_render(g->rain, g->width, g->height, camera, NULL, near, far);
+    if (result == SAT_OK) result = raindrop_gl_render(g->rain, g->width, g->height, &eye, NULL);
     if (!pipeline_gl_check(g, result, g->rain ? raindrop_gl_message(g->rain) : "")) return 0;
     result = sat__gl_read(&g->gl, g->rows, g->rainy, SAT__GL_RGBA32F, g->width, g->height);
     pipeline_gl_copy(g, rgb, 0, 1);

@@ -18,7 +18,7 @@
 typedef struct settings {
     const char *env;
     int size[2], look, count, frames, seed, oblate, sheet, closeup;
-    float rate, diameter, box, exposure, aperture, focus, dt, fov, turn, key, near_distance, wind, bow;
+    float rate, diameter, box, exposure, aperture, focus, dt, fov, turn, key, depth_near, wind, bow;
     common_settings common;
 } settings;
 
@@ -177,7 +177,7 @@ static int save_sheet(scene *s, const char *path)
             target[2] = -cosf(angle);
             eye[0] = (float)(-0.02 * rows[row].turn * i);
             s->camera = raindrop_camera_look(eye, target, up, s->set->fov * 0.01745329f);
-            s->camera.near_distance = s->set->near_distance;
+            s->camera.depth_near = s->set->depth_near;
             s->camera.exposure = (float)rows[row].exposure;
             ok = check("background", raindrop_environment_render(s->background.pixels, stride, s->picture.width, s->picture.height, &s->camera, s->environment, &s->set->common.threads));
             cells[4 * row + i].rgb = rgb + (size_t)(4 * row + i) * bytes;
@@ -297,10 +297,12 @@ static int save_closeup(scene *s, const char *path)
 
 static int set_look(scene *s)
 {
+    raindrop_map_options o = raindrop_map_defaults();
+    o.resolution = 512;
     s->render = raindrop_render_defaults();
     s->render.look = (raindrop_look)s->set->look;
     if (s->set->look > 0 && !s->set->closeup) return 1;
-    if (!check("map", raindrop_map_create(&s->map, 512, 32, RAINDROP_WATER, NULL))) return 0;
+    if (!check("map", raindrop_map_create(&s->map, &o))) return 0;
     s->render.map = s->map;
     return 1;
 }
@@ -313,7 +315,7 @@ static int set_camera(scene *s)
     target[1] = 0.05f;
     target[2] = -cosf(set->turn);
     s->camera = raindrop_camera_look(eye, target, up, set->fov * 0.01745329f);
-    s->camera.near_distance = set->near_distance;
+    s->camera.depth_near = set->depth_near;
     s->camera.exposure = set->exposure;
     s->camera.aperture = set->aperture;
     s->camera.focus_distance = set->focus;
@@ -354,7 +356,7 @@ int main(int argc, char **argv)
         {"size", 'z', set.size, 1, 16384, "of the picture"},
         {"fov", 'f', &set.fov, 0.1, 170, "vertical, degrees"},
         {"turn", 'f', &set.turn, -1000, 1000, "radians to the right"},
-        {"near", 'f', &set.near_distance, 0.001, 1000, "metres; nearer drops are left out"},
+        {"near", 'f', &set.depth_near, 0.001, 1000, "metres; nearer drops are left out"},
         {"key", 'f', &set.key, 0, 10, "middle grey of the tone mapping; 0: estimated"},
         {"seed", 'i', &set.seed, 0, 2147483647, "of the drops"},
         {"frames", 'i', &set.frames, 0, 999, "write so many pictures, rain_000.png and so on"},
@@ -374,7 +376,7 @@ int main(int argc, char **argv)
     set.focus = 1;
     set.fov = 60;
     set.key = 0.18f;
-    set.near_distance = 0.05f;
+    set.depth_near = 0.05f;
     common_parse(&set.common, argc, argv, "raindrops", ".png .exr .hdr .pfm", options,
                  (int)(sizeof options / sizeof *options));
     if (set.sheet || set.closeup) set.common.writes = ".png";

@@ -44,7 +44,7 @@ static inline double reference_shadow_error(const pipeline *p, int count)
     double sum = -1;
     int n = 0, o;
     if (directions && powers) {
-        lights = fiv_environment_lights(p->light, directions, powers, capacity);
+        lights = fiv_environment_lights(directions, powers, capacity, p->light);
         for (sum = 0; n < count && at < 40000; ++at) {
             size_t pixel = (size_t)(scene_hash((int)at, 77) * (float)pixels) % pixels;
             const float *point = p->scene.layers[0].points + 3 * pixel,

@@ -113,6 +113,31 @@ check_comments() {
     offences comments "$("$dir/comments" | sed 's/^\([a-z_0-9.]*\)/\1/')"
 }
 
+# One shape in all six, over the prototypes: what a call changes comes first, the object and then the outputs; then what it reads; last
+# options and statistics. Statistics are X_stats, by X_get_stats or a last argument. Strings that callbacks get are nobody's business.
+check_shape() {
+    printf '#include "%s.h"\n' "$lib" >"$dir/shape.c"
+    offences shape "$(${CC:-cc} -std=c99 -E -P $DEFS $GL "$dir/shape.c" | tr '\n' ' ' | sed 's/[;}]/&\n/g; s/  */ /g' | awk -v lib="$lib" '
+        /typedef struct [a-z_0-9]+ [a-z_0-9]+ *;/ { match($0, /struct [a-z_0-9]+/); opaque[substr($0, RSTART + 7, RLENGTH - 7)] = 1 }
+        /^ *extern .*\(.*\) *;/ {
+            s = $0; name = s; sub(/\(.*/, "", name); sub(/.*[ *]/, "", name)
+            if (index(name, lib "_") != 1 || name ~ /__/) next
+            if (name ~ /stat/ && name !~ /_get_stats$/) print name ": statistics come by X_get_stats"
+            sub(/^[^(]*\(/, "", s); sub(/\) *;.*/, "", s); n = split(s, arg, / *, */); read = options = ""
+            for (i = 1; i <= n; ++i) {
+                a = arg[i]; sub(/^ /, "", a)
+                word = a; gsub(/const |struct /, "", word); type = word; sub(/[ *].*/, "", type)
+                if (options != "" && type !~ /_stats$/) print name ": " a " after " options
+                if (a !~ /[*]|\[/ || type ~ /(_fn|_proc)$/ || a ~ /^void \*user$/) continue
+                if (a ~ /^const /) { read = a; if (type ~ /_options$/) options = a; continue }
+                if (read != "" && type !~ /_stats$/) print name ": " a ", which changes, after " read
+                if (type ~ /_stats$/ && i < n) print name ": " a " is not the last"
+                if (opaque[type] && a !~ /\*\*/ && i > 1) print name ": " a ", which changes, is not the first"
+            }
+        }')"
+    offences words "$(code "$lib.h" | grep -owE '[a-z_]*_(statistics|report)|vertical_fov|fov_vertical|[a-z_]*_?quantize[a-z]*|dt_seconds|near_distance|depth_range' | sort -u)"
+}
+
 # The list of contents: a line "CONTENTS" in the comments, then lines "   >> name   what it holds". Each name stands once more, as
 # the mark of its section, in the same order, and no section has more than 700 lines.
 check_contents() {
@@ -151,5 +176,6 @@ check_stack
 check_used
 check_gl
 check_comments
+check_shape
 check_contents
 finish

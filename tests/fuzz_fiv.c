@@ -65,7 +65,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         fuzz_load(&in);
         return 0;
     }
-    eo.face = (int)(take(&in) % 24), oo.face = take(&in) % 8 ? eo.face : (int)take(&in);
+    eo.resolution = (int)(take(&in) % 24), oo.resolution = take(&in) % 8 ? eo.resolution : (int)take(&in);
     eo.delta_ratio = take(&in) % 4 ? 20 : take_float(&in);
     eo.max_radiance = take(&in) % 4 ? 1e10f : take_float(&in);
     oo.theta = (int)(take(&in) % 12), oo.phi = (int)(take(&in) % 8), oo.rho = (int)(take(&in) % 5);
@@ -84,7 +84,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (fiv_environment_create(&e, &image, &eo, NULL) == SAT_OK) {
         fiv_environment_update(e, NULL, rotated ? turn : NULL);
         for (i = 0; i < 4; i++) {
-            fiv_environment_irradiance(e, rgb, normals + 3 * i);
+            fiv_environment_irradiance(rgb, e, normals + 3 * i);
         }
         if (fiv_occluder_create(&o, positions, 12, indices, 14, &oo, NULL) == SAT_OK &&
             fiv_occluder_light(o, e, rotated ? turn : NULL) == SAT_OK) {
@@ -94,7 +94,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                 instances[i].position[2] = take_float(&in);
                 instances[i].scale = take_float(&in);
             }
-            fiv_occluder_prepare(o, instances, 2, points, 4, NULL);
+            fiv_occluder_prepare(o, NULL, instances, 2, points, 4);
             if (fiv_irradiance(rgb, points, normals, 4, e, instances, 2, &io, NULL) == SAT_OK)
                 for (i = 0; i < 12; i++) check(rgb[i]);
             if (fiv_self_irradiance(rgb, points, normals, 4, e, instances, instances + 1, 1, &io, NULL) == SAT_OK)

@@ -61,7 +61,7 @@ static void fuzz_render(const raindrop_environment *environment, raindrop_rain *
         up[i] = fuzz_float(in);
     }
     camera = raindrop_camera_look(eye, target, up, 1.2f);
-    camera.near_distance = fuzz_float(in);
+    camera.depth_near = fuzz_float(in);
     camera.exposure = fuzz_float(in);
     camera.aperture = fuzz_float(in);
     camera.focus_distance = fuzz_float(in);
@@ -101,7 +101,7 @@ int LLVMFuzzerTestOneInput(const unsigned char *bytes, size_t size)
     e.resolution = 16;
     e.far_resolution = 8;
     e.far_samples = 16;
-    e.clamp = 1000;
+    e.max_radiance = 1000;
     e.far_orders = fuzz_int(&in, 0, 4);
     e.n = 1.3f + 0.5f * fuzz_float(&in);
     e.scale = 1 + 0.5f * fuzz_float(&in);

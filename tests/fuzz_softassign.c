@@ -43,7 +43,7 @@ static float take_cost(input *in)
 }
 
 /* What must hold of every answer. */
-static void check(const int *x, const softassign_problem *p, const softassign_options *o, const softassign_report *r)
+static void check(const int *x, const softassign_problem *p, const softassign_options *o, const softassign_stats *r)
 {
     int used[COLUMNS] = {0}, i;
     for (i = 0; i < p->rows; i++) {
@@ -62,7 +62,7 @@ static void check(const int *x, const softassign_problem *p, const softassign_op
 static void walk(const softassign_problem *p, const softassign_options *o, input *in)
 {
     softassign *s = NULL;
-    softassign_report r;
+    softassign_stats r;
     int x[ROWS], steps;
     if (softassign_create(&s, p->rows, p->columns, o) != SAT_OK) return;
     for (steps = 0; steps < 30; steps++) {
@@ -79,7 +79,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
     input in;
     softassign_problem p;
     softassign_options o;
-    softassign_report r;
+    softassign_stats r;
     int x[ROWS], capacity[COLUMNS], least[COLUMNS], previous[ROWS], i;
     in.bytes = bytes;
     in.size = size;

@@ -51,12 +51,14 @@ static int make_objects(void)
     sat_image equirect;
     fiv_occluder_options o = fiv_occluder_defaults();
     raindrop_rain_options r = raindrop_rain_defaults();
+    raindrop_map_options m = raindrop_map_defaults();
     int i, bad = 0;
     for (i = 0; i < 3 * SIDE * SIDE * 2; ++i) pixels[i] = 0.5f + 0.01f * (float)(i % 7);
     some_image = sat_image_f32(pixels, SIDE, SIDE, 3);
     equirect = sat_image_f32(pixels, 2 * SIDE, SIDE, 3);
     o.theta = 8, o.phi = 5, o.rho = 3;
     r.count = 100;
+    m.resolution = 16;
     bad += sat_create(&object_sat_table, SIDE, SIDE, 3, NULL) != SAT_OK;
     bad += sat_build(object_sat_table, &some_image) != SAT_OK;
     bad += sat_stream_create(&object_sat_stream, SIDE, 1, 2, NULL) != SAT_OK;
@@ -65,7 +67,7 @@ static int make_objects(void)
     bad += ssao_sat_create(&object_ssao_sat, SIDE, SIDE, NULL) != SAT_OK;
     bad += fiv_environment_create(&object_fiv_environment, &equirect, NULL, NULL) != SAT_OK;
     bad += fiv_occluder_create(&object_fiv_occluder, corners, 4, faces, 4, &o, NULL) != SAT_OK;
-    bad += raindrop_map_create(&object_raindrop_map, 16, 8, 1.33f, NULL) != SAT_OK;
+    bad += raindrop_map_create(&object_raindrop_map, &m) != SAT_OK;
     bad += raindrop_environment_create(&object_raindrop_environment, &equirect, NULL, NULL) != SAT_OK;
     bad += raindrop_rain_create(&object_raindrop_rain, &r) != SAT_OK;
     bad += softassign_create(&object_softassign, SIDE, SIDE, NULL) != SAT_OK;

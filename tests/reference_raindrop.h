@@ -14,7 +14,7 @@ typedef long double reference_real;
 
 typedef struct reference_drop {
     int hit;
-    reference_real reflect[3], refract[3], fresnel, transmit;
+    reference_real reflected[3], refracted[3], fresnel, transmit;
     reference_real order[4][3]; /* direction after k internal reflections */
     reference_real share[4];    /* power of order k */
     reference_real b;           /* impact parameter */
@@ -62,10 +62,10 @@ static inline reference_drop reference_trace(const reference_real *origin, const
     length = sqrtl(reference_dot(normal, normal));
     for (i = 0; i < 3; i++) normal[i] /= length;
     ci = -reference_dot(d, normal);
-    for (i = 0; i < 3; i++) out.reflect[i] = d[i] + 2 * ci * normal[i];
+    for (i = 0; i < 3; i++) out.reflected[i] = d[i] + 2 * ci * normal[i];
     if (!reference_snell(inner, d, normal, n)) {
         out.fresnel = 1;
-        memcpy(out.refract, out.reflect, sizeof out.refract);
+        memcpy(out.refracted, out.reflected, sizeof out.refracted);
         return out;
     }
     cr = -reference_dot(inner, normal);
@@ -90,7 +90,7 @@ static inline reference_drop reference_trace(const reference_real *origin, const
         a = reference_dot(inner, normal);
         for (i = 0; i < 3; i++) inner[i] -= 2 * a * normal[i];
     }
-    memcpy(out.refract, out.order[0], sizeof out.refract);
+    memcpy(out.refracted, out.order[0], sizeof out.refracted);
     return out;
 }
 
@@ -134,7 +134,7 @@ static inline void reference_colour(float *rgb, const raindrop_environment *envi
 {
     float d[3], v[3];
     int i, c, k;
-    for (i = 0; i < 3; i++) d[i] = (float)drop->reflect[i];
+    for (i = 0; i < 3; i++) d[i] = (float)drop->reflected[i];
     raindrop_environment_sample(v, environment, d, 0);
     for (c = 0; c < 3; c++) rgb[c] = (float)drop->fresnel * v[c];
     for (k = 0; k <= (orders < 0 ? 0 : orders); k++) {
@@ -167,7 +167,7 @@ static inline void reference_draw(float *fine, unsigned char *mask, int width, i
         y += rel[i] * (double)camera->up[i];
         z -= rel[i] * (double)camera->back[i];
     }
-    if (z - radius < (double)camera->near_distance) return;
+    if (z - radius < (double)camera->depth_near) return;
     /* bounds of the projected ball, generous */
     zz = z - radius;
     rr = sqrt(x * x + y * y + z * z);
@@ -329,6 +329,16 @@ static inline void reference_sky(float *rgb, int width, int height)
             }
         }
     }
+}
+
+/* a map of this side and so many samples of alpha */
+static inline sat_result reference_map(raindrop_map **out, int resolution, int samples, float n)
+{
+    raindrop_map_options o = raindrop_map_defaults();
+    o.resolution = resolution;
+    o.alpha_samples = samples;
+    o.n = n;
+    return raindrop_map_create(out, &o);
 }
 
 #endif /* REFERENCE_RAINDROP_H */

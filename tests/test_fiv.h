@@ -103,10 +103,10 @@ typedef struct test_lights { float *directions, *powers; size_t count; } test_li
 static test_lights test_get_lights(const fiv_environment *e)
 {
     test_lights l;
-    l.count = fiv_environment_lights(e, NULL, NULL, 0);
+    l.count = fiv_environment_lights(NULL, NULL, 0, e);
     l.directions = (float *)malloc(3 * l.count * sizeof(float));
     l.powers = (float *)malloc(3 * l.count * sizeof(float));
-    EXPECT_EQ(fiv_environment_lights(e, l.directions, l.powers, l.count), l.count);
+    EXPECT_EQ(fiv_environment_lights(l.directions, l.powers, l.count, e), l.count);
     return l;
 }
 
@@ -177,11 +177,11 @@ TEST(uniform_light)
     EXPECT_EQ(stats.lights, 0);
     for (k = 0; k < 50; k++) {
         test_random_unit(normal, &seed);
-        fiv_environment_irradiance(e, rgb, normal);
+        fiv_environment_irradiance(rgb, e, normal);
         EXPECT_REL(rgb[0], 3.14159265, 1e-3);
         EXPECT_REL(rgb[2], 3.14159265, 1e-3);
     }
-    fiv_environment_vector(e, fiv);
+    fiv_environment_vector(fiv, e);
     for (k = 0; k < 9; k++) EXPECT_NEAR(fiv[k], 0, 1e-5);
     l = test_get_lights(e);
     for (i = 0; i < l.count; i++) all += (double)l.powers[3 * i];
@@ -210,12 +210,12 @@ TEST(orientation_of_the_image)
     if (!EXPECT_EQ(fiv_environment_create(&e, &image, NULL, &stats), SAT_OK)) return;
     EXPECT_EQ(stats.lights, 1);
     EXPECT_NEAR(stats.light_share, 1, 1e-6);
-    fiv_environment_lights(e, direction, power, 1);
+    fiv_environment_lights(direction, power, 1, e);
     for (k = 0; k < 3; k++) EXPECT_NEAR(direction[k], d[k], 1e-3);
     EXPECT_REL(power[0], 1e8 * solid, 1e-6);
     EXPECT_REL(power[1], 2e8 * solid, 1e-6);
     normal[0] = normal[2] = 0, normal[1] = 1;
-    fiv_environment_irradiance(e, rgb, normal);
+    fiv_environment_irradiance(rgb, e, normal);
     EXPECT_REL(rgb[0], 1e8 * solid * (double)direction[1], 1e-6);
     fiv_environment_destroy(e);
 }
@@ -233,14 +233,14 @@ TEST(irradiance_is_the_sum_over_the_lights)
         if (turned) {
             test_rotation(rotation, axis, 1.1);
             EXPECT_EQ(fiv_environment_update(e, NULL, rotation), SAT_OK);
-            fiv_environment_lights(e, l.directions, l.powers, l.count);
+            fiv_environment_lights(l.directions, l.powers, l.count, e);
         }
         for (k = 0; k < 100; k++) {
             static const float origin[3] = {0, 0, 0};
             float normal[3], rgb[3];
             double truth[3];
             test_random_unit(normal, &seed);
-            fiv_environment_irradiance(e, rgb, normal);
+            fiv_environment_irradiance(rgb, e, normal);
             reference_irradiance(truth, NULL, l.directions, l.powers, l.count, origin, normal);
             for (c = 0; c < 3; c++) {
                 double off = fabs((double)rgb[c] - truth[c]);
@@ -255,7 +255,7 @@ TEST(irradiance_is_the_sum_over_the_lights)
             for (c = 0; c < 3; c++)
                 for (k = 0; k < 3; k++)
                     vector[3 * c + k] += (double)l.powers[3 * i + (size_t)c] * (double)l.directions[3 * i + (size_t)k];
-        fiv_environment_vector(e, fiv);
+        fiv_environment_vector(fiv, e);
         for (k = 0; k < 9; k++) EXPECT_NEAR(fiv[k], vector[k], 1e-5 * scale);
     }
     test_free_lights(&l);
@@ -282,8 +282,8 @@ TEST(bad_pixels_are_counted)
     EXPECT_EQ(stats.nan, 2);
     EXPECT_EQ(stats.negative, 1);
     EXPECT_EQ(stats.clamped, 1);
-    fiv_environment_irradiance(e, rgb, up);
-    fiv_environment_irradiance(clean, same, up);
+    fiv_environment_irradiance(rgb, e, up);
+    fiv_environment_irradiance(same, clean, up);
     EXPECT(memcmp(rgb, same, sizeof rgb) == 0);
     fiv_environment_destroy(e);
     fiv_environment_destroy(clean);
@@ -381,7 +381,7 @@ static void test_masks_of(const reference_mesh *m, int size, int flip, int open,
     part.triangles = n;
     o.keep_masks = 0;
     o.lazy = 1;
-    o.face = size;
+    o.resolution = size;
     lazy = test_occluder(&part, &o, &stats);
     EXPECT_EQ(stats.closed, closed);
     EXPECT_EQ(stats.triangles, n);
@@ -742,7 +742,7 @@ TEST(partial_occluders)
             fiv__normalise(t, t);
             for (k = 0; k < 3; k++) p[k] = s.stats.centre[k] - (float)r * t[k] - heights[h] * s.stats.radius * n[k];
             reference_irradiance(truth, &s.truth, lights.directions, lights.powers, lights.count, p, n);
-            fiv_environment_irradiance(s.environment, open, n);
+            fiv_environment_irradiance(open, s.environment, n);
             for (a = 0; a < 4; a++) {
                 fiv_irradiance_options o = fiv_irradiance_defaults();
                 o.accuracy = (fiv_accuracy)a;
@@ -956,7 +956,7 @@ TEST(order_of_occluders)
             EXPECT(test_same(rgb[0], rgb[1], a == 3 ? 300 : 3 * COUNT));
             for (i = 0; i < (a == 3 ? 100 : COUNT); i++) {
                 float open[3];
-                fiv_environment_irradiance(s.environment, open, normals + 3 * i);
+                fiv_environment_irradiance(open, s.environment, normals + 3 * i);
                 for (k = 0; k < 3; k++) EXPECT(rgb[0][3 * i + k] >= 0 && rgb[0][3 * i + k] <= open[k] * 1.00001f);
             }
         }
@@ -1051,7 +1051,7 @@ TEST(self_shadows)
         EXPECT_EQ(fiv_self_irradiance(rgb, points, normals, s.mesh.triangles, s.environment, &self, NULL, 0, &o, NULL),
                   SAT_OK);
         for (t = 0; t < s.mesh.triangles; t++)
-            fiv_environment_irradiance(s.environment, unshadowed + 3 * t, normals + 3 * t);
+            fiv_environment_irradiance(unshadowed + 3 * t, s.environment, normals + 3 * t);
         error = reference_nrmse(truth, rgb, s.mesh.triangles);
         open = reference_nrmse(truth, unshadowed, s.mesh.triangles);
         REPORT("self: without shadows", open, "NRMSE");
@@ -1165,8 +1165,8 @@ TEST(save_and_load)
         o = test_occluder(&m, &options, NULL);
         size = fiv_occluder_save_size(o);
         bytes = (unsigned char *)malloc(size + 1);
-        EXPECT_EQ(fiv_occluder_save(o, bytes, size - 1), SAT_ERR_ARGUMENT);
-        EXPECT_EQ(fiv_occluder_save(o, bytes, size), SAT_OK);
+        EXPECT_EQ(fiv_occluder_save(bytes, size - 1, o), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(fiv_occluder_save(bytes, size, o), SAT_OK);
         EXPECT_EQ(fiv_occluder_load(&back, bytes, size, NULL), SAT_OK);
         fiv_occluder_light(o, e, NULL);
         EXPECT_EQ(fiv_occluder_light(back, e, NULL), SAT_OK);
@@ -1201,13 +1201,13 @@ TEST(forged_saves_are_refused)
     uint64_t hash, seed = 1;
     int refused = 0, k;
     options.rho = 2;
-    options.face = 16;
+    options.resolution = 16;
     o = test_occluder(&m, &options, NULL);
     size = fiv_occluder_save_size(o);
     bytes = (unsigned char *)malloc(size);
     for (k = 0; k < 300; k++) {
         sat_result result;
-        EXPECT_EQ(fiv_occluder_save(o, bytes, size), SAT_OK);
+        EXPECT_EQ(fiv_occluder_save(bytes, size, o), SAT_OK);
         i = k < 100 ? 16 + (size_t)support_below(&seed, 100) : 16 + (size_t)support_below(&seed, (int)size - 16);
         bytes[i] = (unsigned char)support_random(&seed);
         hash = fiv__hash(bytes + 16, size - 16);
@@ -1220,7 +1220,7 @@ TEST(forged_saves_are_refused)
             float grey[2] = {1, 1};
             sat_image image = sat_image_f32(grey, 2, 1, 1);
             fiv_environment_options eo = fiv_environment_defaults();
-            eo.face = back->face;
+            eo.resolution = back->face;
             EXPECT_EQ(fiv_environment_create(&e, &image, &eo, NULL), SAT_OK);
             EXPECT_EQ(fiv_occluder_light(back, e, NULL), SAT_OK);
             fiv_environment_destroy(e);
@@ -1258,8 +1258,8 @@ TEST(lazy_samples)
     instance.occluder = lazy;
     fiv_irradiance(lazy_rgb, points, normals, COUNT, s.environment, &instance, 1, NULL, &stats);
     EXPECT(stats.missing == stats.whole + stats.clipped && stats.missing > 0);
-    EXPECT_EQ(fiv_occluder_prepare(lazy, &instance, 1, points, COUNT, &computed), SAT_OK);
-    EXPECT_EQ(fiv_occluder_prepare(lazy, &instance, 1, points, COUNT, &again), SAT_OK);
+    EXPECT_EQ(fiv_occluder_prepare(lazy, &computed, &instance, 1, points, COUNT), SAT_OK);
+    EXPECT_EQ(fiv_occluder_prepare(lazy, &again, &instance, 1, points, COUNT), SAT_OK);
     EXPECT_EQ(again, 0);
     fiv_irradiance(lazy_rgb, points, normals, COUNT, s.environment, &instance, 1, NULL, &stats);
     EXPECT_EQ(stats.missing, 0);
@@ -1270,7 +1270,7 @@ TEST(lazy_samples)
     moved = (float *)malloc(3 * s.mesh.vertices * sizeof *moved);
     for (v = 0; v < 3 * s.mesh.vertices; v++) moved[v] = s.mesh.positions[v] * (v % 3 == 1 ? 0.5f : 1.0f);
     EXPECT_EQ(fiv_occluder_invalidate(lazy, moved), SAT_OK);
-    EXPECT_EQ(fiv_occluder_prepare(lazy, &instance, 1, points, COUNT, &computed), SAT_OK);
+    EXPECT_EQ(fiv_occluder_prepare(lazy, &computed, &instance, 1, points, COUNT), SAT_OK);
     EXPECT(computed > 0);
     fiv_irradiance(lazy_rgb, points, normals, COUNT, s.environment, &instance, 1, NULL, NULL);
     fiv_occluder_destroy(s.occluder);
@@ -1327,7 +1327,7 @@ TEST(empty_and_degenerate_meshes)
     fiv_instance instance;
     int round;
     positions[9] = test_nan();
-    fiv_environment_irradiance(e, open, normal);
+    fiv_environment_irradiance(open, e, normal);
     for (round = 0; round < 3; round++) { /* no triangle; one without area; all at one point */
         if (round == 2) memset(positions, 0, sizeof positions);
         EXPECT_EQ(fiv_occluder_create(&o, positions, 5, index, round == 0 ? 0 : 4, &options, &stats), SAT_OK);
@@ -1356,7 +1356,7 @@ TEST(extreme_receivers)
     float point[3], normal[3] = {0, 1, 0}, rgb[3], open[3];
     int a, k;
     test_open_scene(&s, 2000, &options, origin, NULL);
-    fiv_environment_irradiance(s.environment, open, normal);
+    fiv_environment_irradiance(open, s.environment, normal);
     for (a = 0; a < 4; a++) {
         io.accuracy = (fiv_accuracy)a;
         instance = test_instance(s.occluder, 0, 0, 0);
@@ -1415,7 +1415,7 @@ TEST(inside_a_closed_box)
     EXPECT(stats.inside > 0 && stats.inside < stats.samples);
     EXPECT_EQ(fiv_occluder_light(o, e, NULL), SAT_OK);
     instance = test_instance(o, 0, 0, 0);
-    fiv_environment_irradiance(e, open, normal);
+    fiv_environment_irradiance(open, e, normal);
     for (a = 0; a < 3; a++) {
         fiv_irradiance_options io = fiv_irradiance_defaults();
         io.accuracy = (fiv_accuracy)a;
@@ -1450,7 +1450,7 @@ TEST(cutoff_is_a_bound)
     EXPECT_EQ(stats.below_cutoff + stats.whole + stats.clipped + stats.below_horizon, COUNT);
     for (i = 0; i < 3 * COUNT; i++) {
         float open[3];
-        fiv_environment_irradiance(s.environment, open, normals + i / 3 * 3);
+        fiv_environment_irradiance(open, s.environment, normals + i / 3 * 3);
         EXPECT_NEAR(some[i], all[i], 0.0201 * (double)open[i % 3]);
     }
     test_close_scene(&s);
@@ -1563,7 +1563,7 @@ TEST(no_allocation_per_frame)
     EXPECT_EQ(fiv_occluder_light(lazy, e, turn), SAT_OK);
     instance = test_instance(lazy, 0, 0, 0);
     EXPECT_EQ(fiv_occluder_invalidate(lazy, m.positions), SAT_OK);
-    EXPECT_EQ(fiv_occluder_prepare(lazy, &instance, 1, points, COUNT, NULL), SAT_OK);
+    EXPECT_EQ(fiv_occluder_prepare(lazy, NULL, &instance, 1, points, COUNT), SAT_OK);
     instance.occluder = o;
     for (a = 0; a < 4; a++) {
         io.accuracy = (fiv_accuracy)a;
@@ -1627,8 +1627,8 @@ TEST(bad_arguments)
     EXPECT_EQ(fiv_environment_create(&e, &two, NULL, NULL), SAT_ERR_ARGUMENT);
     for (i = 0; i < 7; i++) {
         eo = fiv_environment_defaults();
-        if (i == 0) eo.face = 7;
-        if (i == 1) eo.face = 65;
+        if (i == 0) eo.resolution = 7;
+        if (i == 1) eo.resolution = 65;
         if (i == 2) eo.delta_ratio = -1;
         if (i == 3) eo.max_lights = FIV_MAX_LIGHTS + 1;
         if (i == 4) eo.max_radiance = 0;
@@ -1639,7 +1639,7 @@ TEST(bad_arguments)
     }
     EXPECT_EQ(fiv_environment_create(&e, &sky, NULL, NULL), SAT_OK);
     eo = fiv_environment_defaults();
-    eo.face = 16;
+    eo.resolution = 16;
     EXPECT_EQ(fiv_environment_create(&other, &sky, &eo, NULL), SAT_OK);
     EXPECT_EQ(fiv_environment_update(e, NULL, skew), SAT_ERR_ARGUMENT);
     EXPECT_EQ(fiv_environment_update(e, NULL, mirror), SAT_ERR_ARGUMENT);
@@ -1653,7 +1653,7 @@ TEST(bad_arguments)
         if (i == 4) bad.first_shell = 0;
         if (i == 5) bad.last_shell = 0.2f;
         if (i == 6) bad.last_shell = test_nan();
-        if (i == 7) bad.face = 65;
+        if (i == 7) bad.resolution = 65;
         if (i == 8) bad.rho = 257;
         if (i == 9) bad.lazy = 1;
         if (i == 10) bad.max_lights = -1;
@@ -1765,10 +1765,10 @@ TEST(defaults_are_the_stated_ones)
     fiv_occluder_options o = fiv_occluder_defaults();
     fiv_irradiance_options i = fiv_irradiance_defaults();
     EXPECT_EQ(fiv_version(), FIV_VERSION);
-    EXPECT_EQ(e.face, 32);
+    EXPECT_EQ(e.resolution, 32);
     EXPECT_NEAR(e.delta_ratio, 400, 0);
     EXPECT_EQ(e.max_lights, 8);
-    EXPECT(o.theta == 32 && o.phi == 17 && o.rho == 15 && o.face == 32 && o.keep_masks == 1 && o.lazy == 0 &&
+    EXPECT(o.theta == 32 && o.phi == 17 && o.rho == 15 && o.resolution == 32 && o.keep_masks == 1 && o.lazy == 0 &&
            o.max_lights == 8 && o.keep_mesh == 0);
     EXPECT_NEAR(o.first_shell, 0.3f, 0);
     EXPECT_NEAR(o.last_shell, 6, 0);

@@ -49,7 +49,7 @@ static double rt_distance(const float *a, const reference_real *b)
 
 /* ---- optics ---- */
 
-typedef struct rt_errors { double refract, reflect, fresnel, transmit, worst_s; } rt_errors;
+typedef struct rt_errors { double refracted, reflected, fresnel, transmit, worst_s; } rt_errors;
 
 /* Sprite points against the traced drop, both from the same floats. */
 static rt_errors rt_sprite_errors(double near, double far, float n, int rays)
@@ -77,16 +77,17 @@ static rt_errors rt_sprite_errors(double near, double far, float n, int rays)
         if (!truth.hit) continue;
         raindrop_sprite_ray(d, p, &m, s, t, distance);
         raindrop_trace(&ray, d, p, m, n);
-        e = rt_distance(ray.refract, truth.refract);
-        if (e > worst.refract) worst.refract = e;
-        e = rt_distance(ray.reflect, truth.reflect);
-        if (e > worst.reflect) worst.reflect = e;
+        e = rt_distance(ray.refracted, truth.refracted);
+        if (e > worst.refracted) worst.refracted = e;
+        e = rt_distance(ray.reflected, truth.reflected);
+        if (e > worst.reflected) worst.reflected = e;
         e = fabs((double)ray.fresnel - (double)truth.fresnel);
         if (e > worst.fresnel) { worst.fresnel = e; worst.worst_s = r; }
         e = fabs((double)ray.transmit - (double)truth.transmit);
         if (e > worst.transmit) worst.transmit = e;
         for (c = 0; c < 3; c++)
-            if (expect_is_nan((double)ray.refract[c]) || expect_is_nan((double)ray.reflect[c])) worst.refract = 1e9;
+            if (expect_is_nan((double)ray.refracted[c]) || expect_is_nan((double)ray.reflected[c]))
+                worst.refracted = 1e9;
     }
     return worst;
 }
@@ -97,24 +98,24 @@ TEST(raindrop_closed_form_is_exact_to_2e_6)
     int i;
     for (i = 0; i < 3; i++) {
         rt_errors e = rt_sprite_errors(range[i], range[i + 1], 1.33f, 40000);
-        EXPECT(e.refract <= 2e-6);
-        EXPECT(e.reflect <= 2e-6);
+        EXPECT(e.refracted <= 2e-6);
+        EXPECT(e.reflected <= 2e-6);
         EXPECT(e.fresnel <= 2e-6);
         EXPECT(e.transmit <= 4e-6);
-        REPORT("closed form, largest error of refract", e.refract, "");
-        REPORT("closed form, largest error of reflect", e.reflect, "");
+        REPORT("closed form, largest error of refract", e.refracted, "");
+        REPORT("closed form, largest error of reflect", e.reflected, "");
     }
 }
 
 TEST(raindrop_other_indices_are_exact_too)
 {
     rt_errors glass = rt_sprite_errors(1.2, 20, 1.5f, 20000), bubble = rt_sprite_errors(1.2, 20, 1 / 1.33f, 20000);
-    EXPECT(glass.refract <= 3e-6 && glass.fresnel <= 3e-6);
+    EXPECT(glass.refracted <= 3e-6 && glass.fresnel <= 3e-6);
     /* at the critical angle the derivative of cos r is infinite: the bubble's digits go with the root of the
        rounding */
-    EXPECT(bubble.reflect <= 3e-6);
-    EXPECT(bubble.refract <= 2e-3);
-    REPORT("bubble, largest error of refract", bubble.refract, "");
+    EXPECT(bubble.reflected <= 3e-6);
+    EXPECT(bubble.refracted <= 2e-3);
+    REPORT("bubble, largest error of refract", bubble.refracted, "");
 }
 
 TEST(raindrop_index_one_changes_nothing)
@@ -126,7 +127,7 @@ TEST(raindrop_index_one_changes_nothing)
         raindrop_ray ray;
         raindrop_sprite_ray(d, p, &m, r, 0, 1.5f + 100 * (float)support_uniform(&seed));
         raindrop_trace(&ray, d, p, m, 1);
-        for (c = 0; c < 3; c++) EXPECT_EQ(expect_order(ray.refract[c]), expect_order(d[c]));
+        for (c = 0; c < 3; c++) EXPECT_EQ(expect_order(ray.refracted[c]), expect_order(d[c]));
         EXPECT(ray.fresnel == 0 && ray.transmit == 1);
     }
 }
@@ -140,10 +141,10 @@ TEST(raindrop_bubbles_reflect_totally)
         p[0] = sqrtf(b2);
         raindrop_trace(&ray, d, p, 1 - b2, 1 / RAINDROP_WATER);
         EXPECT(ray.fresnel >= 0 && ray.fresnel <= 1);
-        EXPECT_NEAR(raindrop__dot(ray.refract, ray.refract), 1, 1e-5);
+        EXPECT_NEAR(raindrop__dot(ray.refracted, ray.refracted), 1, 1e-5);
         if (ray.fresnel >= 1) {
             total++;
-            EXPECT(memcmp(ray.refract, ray.reflect, sizeof ray.refract) == 0 && ray.transmit == 0);
+            EXPECT(memcmp(ray.refracted, ray.reflected, sizeof ray.refracted) == 0 && ray.transmit == 0);
         }
     }
     EXPECT_NEAR((double)total / rays, 1 - 1 / (1.33 * 1.33), 2e-4);
@@ -167,14 +168,14 @@ TEST(raindrop_vector_path_equals_the_plain_one)
     for (c = 0; c < 3; c++) {
         inputs.direction[c] = in[c];
         inputs.centre_offset[c] = in[3 + c];
-        outputs.reflect[c] = out[c];
-        outputs.refract[c] = out[3 + c];
+        outputs.reflected[c] = out[c];
+        outputs.refracted[c] = out[3 + c];
     }
     inputs.one_minus_b2 = in[6];
     outputs.fresnel = out[6];
     outputs.transmit = out[7];
-    outputs.footprint_reflect = out[8];
-    outputs.footprint_refract = out[9];
+    outputs.footprint_reflected = out[8];
+    outputs.footprint_refracted = out[9];
     for (k = 0; k < 3; k++) {
         raindrop_trace_n(&outputs, &inputs, N, indices[k]);
         for (i = 0; i < N; i++) {
@@ -183,13 +184,13 @@ TEST(raindrop_vector_path_equals_the_plain_one)
             for (c = 0; c < 3; c++) { d[c] = in[c][i]; p[c] = in[3 + c][i]; }
             raindrop_trace(&ray, d, p, in[6][i], indices[k]);
             for (c = 0; c < 3; c++) {
-                EXPECT_NEAR(out[c][i], ray.reflect[c], 1e-6);
-                EXPECT_NEAR(out[3 + c][i], ray.refract[c], 1e-6);
+                EXPECT_NEAR(out[c][i], ray.reflected[c], 1e-6);
+                EXPECT_NEAR(out[3 + c][i], ray.refracted[c], 1e-6);
             }
             EXPECT_NEAR(out[6][i], ray.fresnel, 1e-6);
             EXPECT_NEAR(out[7][i], ray.transmit, 2e-6);
-            EXPECT_NEAR(out[8][i], ray.footprint_reflect, 1e-3);
-            EXPECT_NEAR(out[9][i], ray.footprint_refract, 1e-3);
+            EXPECT_NEAR(out[8][i], ray.footprint_reflected, 1e-3);
+            EXPECT_NEAR(out[9][i], ray.footprint_refracted, 1e-3);
         }
     }
     /* outputs left out are left alone */
@@ -298,8 +299,8 @@ TEST(raindrop_spheroids_are_traced)
         if (truth.b > 0.99L) continue;
         EXPECT_EQ(raindrop_trace_spheroid(&ray, d, p, ratio, 1.33f), truth.hit);
         if (!truth.hit) continue;
-        if (i & 1) sphere = support_larger(sphere, rt_distance(ray.refract, truth.refract));
-        else flat = support_larger(flat, rt_distance(ray.refract, truth.refract));
+        if (i & 1) sphere = support_larger(sphere, rt_distance(ray.refracted, truth.refracted));
+        else flat = support_larger(flat, rt_distance(ray.refracted, truth.refracted));
     }
     EXPECT(sphere <= 5e-6);
     EXPECT(flat <= 2e-5);
@@ -319,8 +320,8 @@ TEST(raindrop_spheroid_of_ratio_one_is_the_sphere)
         raindrop_trace(&a, d, p, 1 - raindrop__dot(p, p), 1.33f);
         EXPECT_EQ(raindrop_trace_spheroid(&s, d, p, 1, 1.33f), 1);
         for (c = 0; c < 3; c++) {
-            worst = support_larger(worst, fabs((double)a.refract[c] - (double)s.refract[c]));
-            worst = support_larger(worst, fabs((double)a.reflect[c] - (double)s.reflect[c]));
+            worst = support_larger(worst, fabs((double)a.refracted[c] - (double)s.refracted[c]));
+            worst = support_larger(worst, fabs((double)a.reflected[c] - (double)s.reflected[c]));
         }
         worst = support_larger(worst, fabs((double)a.fresnel - (double)s.fresnel));
     }
@@ -339,18 +340,18 @@ TEST(raindrop_map_has_table_2_1)
     raindrop_map *map = NULL;
     int i, resolution = 0;
     size_t texels = 0;
-    if (!EXPECT_EQ(raindrop_map_create(&map, 1024, 32, RAINDROP_WATER, NULL), SAT_OK)) return;
+    if (!EXPECT_EQ(reference_map(&map, 1024, 32, RAINDROP_WATER), SAT_OK)) return;
     EXPECT_EQ(raindrop_map_levels(map), 11);
     for (i = 0; i < 11; i++) {
         double distance = raindrop_map_distance(i), angle = asin(1 / distance) * 180 / acos(-1.0);
-        EXPECT(raindrop_map_level(map, i, &resolution) != NULL);
+        EXPECT(raindrop_map_level(&resolution, map, i) != NULL);
         EXPECT_EQ(resolution, rows[i].resolution);
         EXPECT_NEAR(distance, rows[i].distance, 0.5e-4);
         EXPECT_NEAR(angle, rows[i].angle, 0.5e-4 + 1e-9);
         texels += (size_t)resolution * (size_t)resolution;
     }
     EXPECT_NEAR((double)(texels * 32) / 1e6, 44.7, 0.05);
-    EXPECT(raindrop_map_level(map, 11, NULL) == NULL && raindrop_map_level(map, -1, NULL) == NULL);
+    EXPECT(raindrop_map_level(NULL, map, 11) == NULL && raindrop_map_level(NULL, map, -1) == NULL);
     raindrop_map_destroy(map);
 }
 
@@ -359,9 +360,9 @@ TEST(raindrop_map_holds_the_traced_drop)
     raindrop_map *map = NULL;
     int level, r = 0, x, y, c, inside = 0;
     double covered = 0;
-    if (!EXPECT_EQ(raindrop_map_create(&map, 256, 32, RAINDROP_WATER, NULL), SAT_OK)) return;
+    if (!EXPECT_EQ(reference_map(&map, 256, 32, RAINDROP_WATER), SAT_OK)) return;
     for (level = 0; level < 9; level += 2) {
-        const float *texels = raindrop_map_level(map, level, &r);
+        const float *texels = raindrop_map_level(&r, map, level);
         for (y = 0; y < r; y += 3) {
             for (x = 0; x < r; x += 3) {
                 const float *texel = texels + 8 * (y * r + x);
@@ -384,8 +385,8 @@ TEST(raindrop_map_holds_the_traced_drop)
                 truth = reference_trace(origin, direction, 1, (reference_real)RAINDROP_WATER);
                 if (!truth.hit || s * s + t * t > 0.999L) continue;
                 inside++;
-                EXPECT(rt_distance(texel, truth.reflect) < 4e-6);
-                EXPECT(rt_distance(texel + 4, truth.refract) < 4e-6);
+                EXPECT(rt_distance(texel, truth.reflected) < 4e-6);
+                EXPECT(rt_distance(texel + 4, truth.refracted) < 4e-6);
                 EXPECT_NEAR(texel[3], truth.fresnel, 4e-6);
                 EXPECT(texel[7] > 0 && texel[7] <= 1);
             }
@@ -393,7 +394,7 @@ TEST(raindrop_map_holds_the_traced_drop)
     }
     EXPECT(inside > 1000);
     {
-        const float *texels = raindrop_map_level(map, 0, &r);
+        const float *texels = raindrop_map_level(&r, map, 0);
         for (c = 0; c < r * r; c++) covered += (double)texels[8 * c + 7];
     }
     EXPECT_REL(covered / (r * r), acos(-1.0) / 4, 2e-4); /* the disc's share of its square */
@@ -406,8 +407,8 @@ TEST(raindrop_map_as_half_floats)
     uint16_t *half = (uint16_t *)malloc(64 * 64 * 8 * sizeof(uint16_t));
     const float *texels;
     int i;
-    if (!EXPECT_EQ(raindrop_map_create(&map, 64, 32, RAINDROP_WATER, NULL), SAT_OK)) return;
-    texels = raindrop_map_level(map, 0, NULL);
+    if (!EXPECT_EQ(reference_map(&map, 64, 32, RAINDROP_WATER), SAT_OK)) return;
+    texels = raindrop_map_level(NULL, map, 0);
     EXPECT_EQ(raindrop_map_level_half(half, map, 0), SAT_OK);
     for (i = 0; i < 64 * 64 * 8; i++)
         EXPECT_NEAR(sat__half_to_float(half[i]), texels[i], 4.9e-4 * fabs((double)texels[i]) + 3e-8);
@@ -422,16 +423,16 @@ TEST(raindrop_map_lookup_interpolates_distances)
     raindrop_map *map = NULL;
     double worst = 0, off = 0;
     int i;
-    if (!EXPECT_EQ(raindrop_map_create(&map, 512, 32, RAINDROP_WATER, NULL), SAT_OK)) return;
+    if (!EXPECT_EQ(reference_map(&map, 512, 32, RAINDROP_WATER), SAT_OK)) return;
     for (i = 0; i < 500; i++) {
         float q[8], d[3], p[3], m, s = 0.7f * (float)i / 500, distance = 1.5f + 0.02f * (float)i;
         raindrop_ray ray;
         raindrop_map_sample(q, map, s, 0.1f, distance);
         raindrop_sprite_ray(d, p, &m, s, 0.1f, distance);
         raindrop_trace(&ray, d, p, m, RAINDROP_WATER);
-        worst = support_larger(worst, fabs((double)q[4] - (double)ray.refract[0]));
+        worst = support_larger(worst, fabs((double)q[4] - (double)ray.refracted[0]));
         raindrop_map_sample(q, map, s, 0.1f, 2 * distance); /* a level too far: what a wrong bias would read */
-        off = support_larger(off, fabs((double)q[4] - (double)ray.refract[0]));
+        off = support_larger(off, fabs((double)q[4] - (double)ray.refracted[0]));
     }
     EXPECT(worst < 0.02);
     EXPECT(off > 3 * worst);
@@ -444,13 +445,13 @@ TEST(raindrop_map_refuses_bad_sizes)
     raindrop_map *map;
     static const int bad[6] = {0, -1, 3, 100, 8192, 1023};
     int i;
-    for (i = 0; i < 6; i++) EXPECT_EQ(raindrop_map_create(&map, bad[i], 32, 1.33f, NULL), SAT_ERR_ARGUMENT);
+    for (i = 0; i < 6; i++) EXPECT_EQ(reference_map(&map, bad[i], 32, 1.33f), SAT_ERR_ARGUMENT);
     EXPECT(map == NULL);
-    EXPECT_EQ(raindrop_map_create(&map, 16, 0, 1.33f, NULL), SAT_ERR_ARGUMENT);
-    EXPECT_EQ(raindrop_map_create(&map, 16, 32, 0, NULL), SAT_ERR_ARGUMENT);
-    EXPECT_EQ(raindrop_map_create(&map, 16, 32, (float)NAN, NULL), SAT_ERR_ARGUMENT);
-    EXPECT_EQ(raindrop_map_create(NULL, 16, 32, 1.33f, NULL), SAT_ERR_ARGUMENT);
-    EXPECT_EQ(raindrop_map_create(&map, 1, 1, 1 / 1.33f, NULL), SAT_OK);
+    EXPECT_EQ(reference_map(&map, 16, 0, 1.33f), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(reference_map(&map, 16, 32, 0), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(reference_map(&map, 16, 32, (float)NAN), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_map_create(NULL, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(reference_map(&map, 1, 1, 1 / 1.33f), SAT_OK);
     EXPECT_EQ(raindrop_map_levels(map), 1);
     raindrop_map_destroy(map);
     raindrop_map_destroy(NULL);
@@ -571,7 +572,7 @@ TEST(raindrop_environment_repairs_and_counts)
         for (c = 0; c < 3; c++) EXPECT(sat__is_finite(rgb[c]) && rgb[c] >= 0);
     }
     raindrop_environment_destroy(environment);
-    o.clamp = 100;
+    o.max_radiance = 100;
     EXPECT_EQ(raindrop_environment_create(&environment, &image, &o, &stats), SAT_OK);
     EXPECT(stats.clamped == 2 && stats.largest == 100);
     raindrop_environment_destroy(environment);
@@ -967,7 +968,7 @@ TEST(raindrop_rain_has_the_asked_rate)
         o.box_size[0] = o.box_size[2] = rates[k] > 50 ? 4 : 6;
         o.box_size[1] = 2;
         if (!EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK)) return;
-        drops = raindrop_rain_drops(rain, &count);
+        drops = raindrop_rain_drops(&count, rain);
         area = (double)o.box_size[0] * (double)o.box_size[2];
         volume = area * (double)o.box_size[1];
         before = (double *)malloc(sizeof(double) * (size_t)count);
@@ -1005,7 +1006,7 @@ static inline void rain_after_steps(double *rate, double *diameter, double dt, i
     o.box_size[1] = height;
     o.box_size[0] = o.box_size[2] = 4 / sqrtf(height / 8);
     if (!EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK)) return;
-    drops = raindrop_rain_drops(rain, &count);
+    drops = raindrop_rain_drops(&count, rain);
     for (i = 0; i < count; i++) first += (double)drops[i].radius;
     for (step = 0; step < steps; step++) raindrop_rain_advance(rain, dt);
     for (i = 0; i < count; i++) {
@@ -1040,7 +1041,7 @@ TEST(raindrop_a_fixed_diameter_has_the_asked_rate)
     int count = 0;
     o.diameter_mm = 2;
     if (!EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK)) return;
-    raindrop_rain_drops(rain, &count); /* rate = count / volume * drop * speed */
+    raindrop_rain_drops(&count, rain); /* rate = count / volume * drop * speed */
     EXPECT_REL(count / 512.0 * acos(-1.0) / 6 * 8e-9 * raindrop_terminal_velocity(2) * 3600e3, 10, 0.01);
     raindrop_rain_destroy(rain);
 }
@@ -1073,7 +1074,7 @@ TEST(raindrop_sizes_are_marshall_palmer)
     double lambda = 4.1 * pow(10, -0.21);
     o.count = 200000;
     if (!EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK)) return;
-    drops = raindrop_rain_drops(rain, &count);
+    drops = raindrop_rain_drops(&count, rain);
     EXPECT_EQ(count, 200000);
     for (step = 0; step < 3; step++) {
         for (k = 1; k <= 8; k++) { /* share of drops above k/2 mm */
@@ -1099,7 +1100,7 @@ TEST(raindrop_rain_stays_in_its_box)
     o.wind[0] = 3;
     o.wind[2] = -40;
     if (!EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK)) return;
-    drops = raindrop_rain_drops(rain, &count);
+    drops = raindrop_rain_drops(&count, rain);
     for (k = 0; k < 12; k++) {
         if (k == 6) EXPECT_EQ(raindrop_rain_set_centre(rain, moved), SAT_OK);
         if (k == 8) { float up[3] = {0, 30, 0}; EXPECT_EQ(raindrop_rain_set_wind(rain, up), SAT_OK); }
@@ -1130,7 +1131,7 @@ TEST(raindrop_rain_pauses_and_publishes)
     o.speed = 6;
     o.box_size[0] = o.box_size[1] = o.box_size[2] = 2.05f;
     if (!EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK)) return;
-    drops = raindrop_rain_drops(rain, &count);
+    drops = raindrop_rain_drops(&count, rain);
     before = support_hash(drops, sizeof *drops * (size_t)count);
     EXPECT_EQ(raindrop_rain_advance(rain, 0), SAT_OK);
     EXPECT(support_hash(drops, sizeof *drops * (size_t)count) == before);
@@ -1151,7 +1152,7 @@ TEST(raindrop_rain_pauses_and_publishes)
     o.count = 3000;
     o.oblate = 1;
     EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK);
-    drops = raindrop_rain_drops(rain, &count);
+    drops = raindrop_rain_drops(&count, rain);
     for (i = 0; i < count; i++)
         EXPECT_NEAR(drops[i].axis_ratio, raindrop_oblateness((double)drops[i].radius * 2e3), 1e-6);
     {
@@ -1208,7 +1209,7 @@ static rt_scene rt_open(void)
     memset(&scene, 0, sizeof scene);
     scene.environment = rt_environment();
     scene.camera = raindrop_camera_defaults();
-    scene.camera.near_distance = 0;
+    scene.camera.depth_near = 0;
     scene.background = (float *)malloc(pixels * 3 * sizeof(float));
     scene.picture = (float *)malloc(pixels * 3 * sizeof(float));
     scene.truth = (float *)malloc(pixels * 3 * sizeof(float));
@@ -1271,7 +1272,7 @@ TEST(raindrop_looks_against_ray_tracing)
     raindrop_render_options o = raindrop_render_defaults();
     raindrop_map *map = NULL;
     int i, look;
-    EXPECT_EQ(raindrop_map_create(&map, 256, 32, RAINDROP_WATER, NULL), SAT_OK);
+    EXPECT_EQ(reference_map(&map, 256, 32, RAINDROP_WATER), SAT_OK);
     o.map = map;
     o.orders = 0;
     for (i = 0; i < 4; i++) {
@@ -1368,12 +1369,12 @@ TEST(raindrop_auto_beats_the_map_in_rain)
     raindrop_render_options o = raindrop_render_defaults();
     raindrop_map *map = NULL;
     raindrop_rain *rain = rt_published(20000, NULL, NULL);
-    const raindrop_drop *drops = raindrop_rain_drops(rain, NULL);
+    const raindrop_drop *drops = raindrop_rain_drops(NULL, rain);
     raindrop_render_stats stats;
     double error[4], none;
     int look;
-    scene.camera.near_distance = 0.01f;
-    EXPECT_EQ(raindrop_map_create(&map, 256, 32, RAINDROP_WATER, NULL), SAT_OK);
+    scene.camera.depth_near = 0.01f;
+    EXPECT_EQ(reference_map(&map, 256, 32, RAINDROP_WATER), SAT_OK);
     EXPECT(reference_render(scene.truth, NULL, RT_W, RT_H, 8, &scene.camera, drops, 20000, scene.environment, 3));
     none = reference_rmse(scene.background, scene.truth, NULL, (size_t)RT_W * RT_H, scene.key);
     o.map = map;
@@ -1600,7 +1601,7 @@ TEST(raindrop_same_bits_for_any_workers)
             raindrop_rain_set_wind(rain, gust);
             raindrop_rain_advance(rain, 0.02);
             stats = rt_render(&scene, rain, NULL, NULL);
-            drops = support_hash(raindrop_rain_drops(rain, NULL), COUNT * sizeof(raindrop_drop));
+            drops = support_hash(raindrop_rain_drops(NULL, rain), COUNT * sizeof(raindrop_drop));
             hash = support_hash_add(support_hash(scene.picture, sizeof(float) * 3 * RT_W * RT_H), &stats, sizeof stats);
             if (!truth) { truth = hash; rain_truth = drops; }
             EXPECT(hash == truth);
@@ -1644,17 +1645,19 @@ TEST(raindrop_failing_allocator_leaks_nothing)
             raindrop_rain_options r = raindrop_rain_defaults();
             raindrop_rain *rain = NULL;
             raindrop_map *map = NULL;
+            raindrop_map_options m = raindrop_map_defaults();
             sat_result result;
             sat_allocator allocator = support_allocator(&memory);
             memory.fail_at = n;
-            e.allocator = r.allocator = allocator;
+            e.allocator = r.allocator = m.allocator = allocator;
+            m.resolution = 8;
             e.filter = RAINDROP_FILTER_SAT;
             e.bow_optical_depth = 0.1f;
             e.far_samples = 16;
             r.count = 10;
             result = what == 0   ? raindrop_environment_create(&environment, &image, &e, NULL)
                      : what == 1 ? raindrop_rain_create(&rain, &r)
-                                 : raindrop_map_create(&map, 8, 4, 1.33f, &allocator);
+                                 : raindrop_map_create(&map, &m);
             EXPECT(result == SAT_OK || (result == SAT_ERR_MEMORY && !environment && !rain && !map));
             EXPECT(result == SAT_OK || memory.live == 0);
             raindrop_environment_destroy(environment);
@@ -1691,8 +1694,8 @@ TEST(raindrop_extreme_drops)
     d[11] = rt_drop(1e30f, 0, -1e30f, 1e29f); /* its square overflows */
     d[12] = rt_drop(0, 0, -1, 1e-30f);   /* covers nothing */
     d[13] = rt_drop(0.3f, 0.2f, -1, 1e-3f); /* the only one to draw */
-    scene.camera.near_distance = 0.01f;
-    EXPECT_EQ(raindrop_map_create(&map, 64, 32, RAINDROP_WATER, NULL), SAT_OK);
+    scene.camera.depth_near = 0.01f;
+    EXPECT_EQ(reference_map(&map, 64, 32, RAINDROP_WATER), SAT_OK);
     o.map = map;
     rain = rt_rain_of(d, 14);
     for (look = 0; look < 4; look++) {
@@ -1736,7 +1739,7 @@ TEST(raindrop_camera_may_look_anywhere)
     raindrop_map *map = NULL;
     raindrop_render_options o = raindrop_render_defaults();
     int i, look;
-    EXPECT_EQ(raindrop_map_create(&map, 64, 32, RAINDROP_WATER, NULL), SAT_OK);
+    EXPECT_EQ(reference_map(&map, 64, 32, RAINDROP_WATER), SAT_OK);
     o.map = map;
     for (i = 0; i < 4; i++) {
         raindrop_drop drop;
@@ -1860,7 +1863,7 @@ TEST(raindrop_threshold_counts_what_it_leaves_out)
 
 TEST(raindrop_render_refuses_nonsense)
 {
-    static float rgb[3 * 8 * 8];
+    static float rgb[3 * 8 * 8], again[3 * 8 * 8];
     rt_scene scene = rt_open();
     raindrop_drop drop = rt_drop(0, 0, -2, 0.1f);
     raindrop_rain *rain = rt_rain_of(&drop, 1);
@@ -1888,6 +1891,14 @@ TEST(raindrop_render_refuses_nonsense)
     camera.exposure = (float)NAN;
     EXPECT_EQ(raindrop_render(rgb, 96, 8, 8, NULL, &camera, rain, scene.environment, NULL, NULL), SAT_ERR_ARGUMENT);
     EXPECT(rgb[0] == 0);
+    /* packed */
+    EXPECT_EQ(raindrop_render(rgb, 0, 8, 8, NULL, NULL, rain, scene.environment, NULL, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_render(again, 96, 8, 8, NULL, NULL, rain, scene.environment, NULL, NULL), SAT_OK);
+    EXPECT(memcmp(rgb, again, sizeof rgb) == 0 && rgb[3 * (4 * 8 + 4)] > 0);
+    EXPECT_EQ(raindrop_environment_render(rgb, 0, 8, 8, NULL, scene.environment, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_environment_render(again, 96, 8, 8, NULL, scene.environment, NULL), SAT_OK);
+    EXPECT(memcmp(rgb, again, sizeof rgb) == 0);
+    memset(rgb, 0, sizeof rgb);
     /* bottom row first in memory */
     EXPECT_EQ(raindrop_render(rgb + 3 * 8 * 7, -96, 8, 8, NULL, NULL, rain, scene.environment, NULL, NULL), SAT_OK);
     EXPECT(rgb[3 * (4 * 8 + 4)] > 0);

@@ -37,7 +37,7 @@ static int rg_open(rg_scene *s)
     }
     EXPECT_EQ(sat__gl_open(&s->gl, s->context.get_proc), SAT_OK);
     s->environment = rg_environment(RAINDROP_WATER);
-    EXPECT_EQ(raindrop_map_create(&s->map, 256, 32, RAINDROP_WATER, NULL), SAT_OK);
+    EXPECT_EQ(reference_map(&s->map, 256, 32, RAINDROP_WATER), SAT_OK);
     s->camera = raindrop_camera_defaults();
     s->camera.fov_y = 1.3f;
     s->background = (float *)malloc(sizeof(float) * 3 * RG_W * RG_H);
@@ -87,7 +87,7 @@ static double rg_compare(rg_scene *s, raindrop_gl *g, const raindrop_rain *rain,
     sat__gl_end(&s->gl, &state);
     s->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s->framebuffer);
     EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s->camera, options, 0, 0), SAT_OK);
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s->camera, options), SAT_OK);
     sat__gl_begin(&s->gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&s->gl, s->gpu, s->texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
     sat__gl_end(&s->gl, &state);
@@ -131,14 +131,14 @@ TEST(raindrop_gl_draws_the_picture_of_the_cpu)
         o.map = s.map;
         o.orders_radius = 1e9f;
         o.sort = 0;
-        s.camera.near_distance = quads ? 0.001f : 0.01f;
+        s.camera.depth_near = quads ? 0.001f : 0.01f;
         for (look = 0; look < 4; look++) {
             double error;
             o.look = (raindrop_look)look;
             error = rg_compare(&s, g, many, &o);
             EXPECT(error < (quads ? 5e-4 : 2e-3)); /* points vanish with their centres */
             REPORT(names[look], error, quads ? "RMSE from the CPU, rain, quads" : "RMSE from the CPU, rain, points");
-            if (!quads) s.camera.near_distance = 0.03f; /* no centre of a drop that is seen lies outside */
+            if (!quads) s.camera.depth_near = 0.03f; /* no centre of a drop that is seen lies outside */
             error = rg_compare(&s, g, few, &o);
             if (quads) EXPECT(error < 5e-4);
             REPORT(names[look], error,
@@ -228,7 +228,7 @@ TEST(raindrop_gl_flattens_as_the_cpu)
     float eye[3] = {0, 0.03f, 0.05f}, target[3] = {0, 0, 0}, up[3] = {0.3f, 1, 0};
     int i, look, soft;
     if (!rg_open(&s)) return;
-    memcpy(drops, raindrop_rain_drops(rain, NULL), sizeof drops);
+    memcpy(drops, raindrop_rain_drops(NULL, rain), sizeof drops);
     for (i = 0; i < 300; i++) drops[i].axis_ratio = ratios[i % 6];
     raindrop_rain_set_drops(rain, drops, 300);
     for (i = 0; i < 300; i++) drops[i].axis_ratio = 1;
@@ -276,7 +276,7 @@ TEST(raindrop_gl_reflects_inside_as_the_cpu)
     int orders, exit;
     if (!rg_open(&s)) return;
     g_options.quads = 1;
-    s.camera.near_distance = 0.001f;
+    s.camera.depth_near = 0.001f;
     o.sort = 0;
     EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &g_options), SAT_OK);
     EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
@@ -297,7 +297,7 @@ TEST(raindrop_gl_reflects_inside_as_the_cpu)
         }
     o.look = RAINDROP_LOOK_RAY; /* out of range: an error, as on the CPU */
     o.orders = 4;
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, &o, 0, 0), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, &o), SAT_ERR_ARGUMENT);
     raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
     rg_close(&s);
@@ -360,7 +360,9 @@ TEST(raindrop_gl_respects_the_depth_buffer)
     s.gl.ClearBufferfv(SAT__GL_COLOR, 0, black);
     depth = ((far + near) - 2 * far * near / 2.0f) / (far - near) * 0.5f + 0.5f; /* a wall at 2 m */
     s.gl.ClearBufferfv(SAT__GL_DEPTH, 0, &depth);
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL, near, far), SAT_OK);
+    s.camera.depth_near = near;
+    s.camera.depth_far = far;
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL), SAT_OK);
     sat__gl_begin(&s.gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&s.gl, s.gpu, s.texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
     sat__gl_end(&s.gl, &state);
@@ -371,7 +373,9 @@ TEST(raindrop_gl_respects_the_depth_buffer)
     }
     EXPECT(left[1] > 0);   /* before the wall */
     EXPECT(right[1] == 0); /* behind it */
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL, 1, 0.5f), SAT_ERR_ARGUMENT);
+    s.camera.depth_near = 1;
+    s.camera.depth_far = 0.5f;
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL), SAT_ERR_ARGUMENT);
     raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
     rg_close(&s);
@@ -382,7 +386,7 @@ TEST(raindrop_gl_respects_the_depth_buffer)
 static double rg_advance(raindrop_gl *g, raindrop_rain *rain, const double *steps, int count)
 {
     int n = 0, i, k, c, off = 0;
-    const raindrop_drop *cpu = raindrop_rain_drops(rain, &n);
+    const raindrop_drop *cpu = raindrop_rain_drops(&n, rain);
     raindrop_drop *gpu = (raindrop_drop *)malloc(sizeof *gpu * (size_t)n);
     EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
     for (k = 0; k < count; k++) {
@@ -499,7 +503,9 @@ TEST(raindrop_gl_restores_the_state)
     EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
     EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
     EXPECT_EQ(raindrop_gl_advance(g, 0.01), SAT_OK);
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL, 0.1f, 10), SAT_OK);
+    s.camera.depth_near = 0.1f;
+    s.camera.depth_far = 10;
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL), SAT_OK);
     {
         raindrop_drop drop;
         EXPECT_EQ(raindrop_gl_read_drops(g, &drop, 1), SAT_OK);
@@ -528,7 +534,7 @@ TEST(raindrop_gl_says_what_is_wrong)
     rg_scene s;
     EXPECT_EQ(raindrop_gl_create(&g, rg_no_procs, NULL), SAT_ERR_GL_FUNCTION);
     EXPECT(g && strstr(raindrop_gl_message(g), "gl") != NULL);
-    EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, NULL, 0, 0), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, NULL), SAT_ERR_ARGUMENT);
     raindrop_gl_destroy(g);
     EXPECT_EQ(raindrop_gl_create(&g, NULL, NULL), SAT_ERR_ARGUMENT);
     EXPECT(g == NULL && raindrop_gl_message(NULL) != NULL);
@@ -536,14 +542,14 @@ TEST(raindrop_gl_says_what_is_wrong)
     if (!rg_open(&s)) return;
     EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
     EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
-    EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, NULL, 0, 0), SAT_ERR_ARGUMENT); /* no rain yet */
+    EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, NULL), SAT_ERR_ARGUMENT); /* no rain yet */
     EXPECT_EQ(raindrop_gl_advance(g, 1), SAT_ERR_ARGUMENT);
     {
         raindrop_render_options o = raindrop_render_defaults();
         raindrop_rain *rain = rg_rain(10, 1, 2);
         EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
         o.look = RAINDROP_LOOK_MAP; /* without a map */
-        EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, &o, 0, 0), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, &o), SAT_ERR_ARGUMENT);
         raindrop_rain_destroy(rain);
     }
     raindrop_gl_destroy(g);

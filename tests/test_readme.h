@@ -97,7 +97,7 @@ TEST(readme_fiv)
         instance.occluder = occluder;
         fiv_irradiance(rgb, points, normals, 1, light, &instance, 1, NULL, NULL);
         /* README end */
-        fiv_environment_irradiance(light, all, normals);
+        fiv_environment_irradiance(all, light, normals);
         fiv_occluder_destroy(occluder);
         fiv_environment_destroy(light);
     }
@@ -134,7 +134,7 @@ TEST(readme_softassign)
     enum { ROWS = 100, COLUMNS = 150, FEATURES = 12 };
     static float patches[ROWS * FEATURES], tiles[COLUMNS * FEATURES];
     int tile_of_patch[ROWS], used[COLUMNS], i;
-    softassign_report report;
+    softassign_stats report;
     fill(0, 1);
     memcpy(patches, pixels, sizeof patches);
     memcpy(tiles, pixels + ROWS * FEATURES, sizeof tiles);

@@ -380,11 +380,11 @@ TEST(fixed32_wraps_around_and_boxes_stay_exact)
         random_box(&state, W, H, 41, b);
         EXPECT_NEAR(sat_sum(t, 0, b[0], b[1], b[2], b[3]), exact_sum(&view, 0, b[0], b[1], b[2], b[3]), 0);
     }
-    EXPECT_EQ(sat_get_statistics(t).clamped, 0);
+    EXPECT_EQ(sat_get_stats(t).clamped, 0);
     sat_destroy(t);
     o.max_value = 100; /* beyond it: clamped and counted */
     t = build(&view, &o);
-    EXPECT(sat_get_statistics(t).clamped > 1000);
+    EXPECT(sat_get_stats(t).clamped > 1000);
     EXPECT_NEAR(sat_restore(t, 0, 5, 5), p[5 * W + 5] > 100 ? 100 : p[5 * W + 5] < -100 ? -100 : p[5 * W + 5], 0);
     sat_destroy(t);
     o.max_box_area = 4e9;
@@ -694,7 +694,7 @@ TEST(tables_same_bits_for_any_worker_count)
                 EXPECT(table_hash(t, W, H, c) == hash);
                 EXPECT(support_hash(out, (size_t)(W * H * c) * 4) == filter_hash);
                 EXPECT_NEAR(sat_error_bound(t, 0, 3, 3), bound, 0);
-                EXPECT_EQ(sat_get_statistics(t).nan, W * 150 < W * H * c ? 1 : 0);
+                EXPECT_EQ(sat_get_stats(t).nan, W * 150 < W * H * c ? 1 : 0);
                 free(out);
                 sat_destroy(t);
             }
@@ -751,7 +751,7 @@ TEST(a_bad_pixel_changes_no_box_without_it)
             sat_image view = sat_image_f32(p, W, H, 1);
             sat_options o = sat_defaults();
             sat_table *t, *without;
-            sat_statistics s;
+            sat_stats s;
             uint64_t state = 4;
             o.kind = kinds[k];
             if (sat__is_fixed(o.kind)) o.max_value = 1e6;
@@ -760,7 +760,7 @@ TEST(a_bad_pixel_changes_no_box_without_it)
             without = build(&view, &o);
             p[Y * W + X] = value;
             t = build(&view, &o);
-            s = sat_get_statistics(t);
+            s = sat_get_stats(t);
             EXPECT_EQ(s.nan, b == 4 ? 1 : 0);
             EXPECT_EQ(s.infinite, b < 2 ? 1 : 0);
             for (i = 0; i < 3000; i++) {
@@ -929,8 +929,8 @@ TEST(a_column_of_pixels_takes_few_bytes)
 {
     sat_table *t = NULL;
     EXPECT_EQ(sat_create(&t, 1, 100000, 1, NULL), SAT_OK);
-    REPORT("bytes a pixel of a 1 x 100000 table", (double)sat_get_statistics(t).bytes / 100000, "bytes");
-    EXPECT(sat_get_statistics(t).bytes < 100000 * 30);
+    REPORT("bytes a pixel of a 1 x 100000 table", (double)sat_get_stats(t).bytes / 100000, "bytes");
+    EXPECT(sat_get_stats(t).bytes < 100000 * 30);
     sat_destroy(t);
 }
 
@@ -986,7 +986,7 @@ TEST(real_pictures_with_nan_infinity_and_every_half)
             t = build(&view, &o);
             sum = sat_sum(t, 0, 0, 0, view.width, view.height);
             EXPECT(sat__is_finite_double(sum));
-            if (i == 0) EXPECT(sat_get_statistics(t).nan + sat_get_statistics(t).infinite > 0);
+            if (i == 0) EXPECT(sat_get_stats(t).nan + sat_get_stats(t).infinite > 0);
             sat_destroy(t);
         }
         image_free(&picture);
@@ -1431,7 +1431,7 @@ TEST(one_allocation_at_create_and_none_afterwards)
         EXPECT_EQ(sat_update(t, &view, 3, 4, 50, 60), SAT_OK);
         EXPECT_EQ(sat_box_filter(out, 400, t, 3), SAT_OK);
         EXPECT_EQ(m.calls, 1);
-        EXPECT_EQ(m.peak, sat_get_statistics(t).bytes);
+        EXPECT_EQ(m.peak, sat_get_stats(t).bytes);
         sat_destroy(t);
         EXPECT(support_memory_clean(&m));
         m.fail_at = m.calls + 1;
@@ -1551,6 +1551,46 @@ TEST(srgb_there_and_back)
 }
 
 #ifdef SAT__VECTOR
+TEST(sat_stride_of_0_is_packed)
+{
+    enum { W = 21, H = 13 };
+    static const sat_format formats[4] = {SAT_F32, SAT_U8, SAT_U16, SAT_F16};
+    static float pixels[W * H * 3], radius[W * H], out[2][W * H * 3], mean[2][W * H];
+    uint64_t random = 7;
+    int f, k;
+    for (k = 0; k < W * H * 3; k++) pixels[k] = (float)support_uniform(&random);
+    for (k = 0; k < W * H; k++) radius[k] = (float)(k % 5);
+    for (f = 0; f < 4; f++) {
+        sat_table *t[2] = {NULL, NULL};
+        sat_moments *m = NULL;
+        for (k = 0; k < 2; k++) {
+            sat_image view = sat_image_f32(pixels, W, H, 3);
+            view.format = formats[f];
+            view.stride = k ? (ptrdiff_t)(W * 3 * sat__format_size(formats[f])) : 0;
+            EXPECT_EQ(sat_create(&t[k], W, H, 3, NULL), SAT_OK);
+            EXPECT_EQ(sat_build(t[k], &view), SAT_OK);
+            EXPECT_EQ(sat_box_filter(out[k], k ? W * 12 : 0, t[k], 2), SAT_OK);
+        }
+        EXPECT(memcmp(out[0], out[1], sizeof out[0]) == 0);
+        for (k = 0; k < 2; k++)
+            EXPECT_EQ(sat_box_filter_variable(out[k], k ? W * 12 : 0, t[k], radius, k ? W * 4 : 0), SAT_OK);
+        EXPECT(memcmp(out[0], out[1], sizeof out[0]) == 0);
+        sat_destroy(t[0]);
+        sat_destroy(t[1]);
+        if (f) continue;
+        EXPECT_EQ(sat_moments_create(&m, W, H, 1, NULL), SAT_OK);
+        for (k = 0; k < 2; k++) {
+            sat_image view = sat_image_f32(pixels, W, H, 1);
+            if (!k) view.stride = 0;
+            EXPECT_EQ(sat_moments_build(m, &view), SAT_OK);
+            EXPECT_EQ(sat_moments_filter(out[k], mean[k], k ? W * 4 : 0, m, 0, 0, 3), SAT_OK);
+        }
+        EXPECT(memcmp(out[0], out[1], W * H * 4) == 0 && memcmp(mean[0], mean[1], sizeof mean[0]) == 0);
+        sat_moments_destroy(m);
+    }
+    EXPECT_NEAR(sat_reduce_f32(pixels, 100, 0, 4), sat_reduce_f32(pixels, 100, 4, 4), 0);
+}
+
 TEST(vector_rows_equal_plain_rows_bit_for_bit)
 {
     enum { N = 1003 };

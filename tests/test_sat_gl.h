@@ -375,7 +375,7 @@ TEST(fixed_equals_the_cpu_table)
     EXPECT_EQ(sat_gl_create(&g, test_get_proc, &options), SAT_OK);
     texture = test_texture(SAT__GL_R32F, t.width, t.height, t.pixels);
     EXPECT_EQ(sat_gl_build(g, 0, texture, t.width, t.height), SAT_OK);
-    EXPECT_NEAR(sat_gl_quantum(g), sat_get_statistics(cpu).quantum, 0);
+    EXPECT_NEAR(sat_gl_quantum(g), sat_get_stats(cpu).quantum, 0);
     table = (uint32_t *)malloc((size_t)t.width * (size_t)t.height * sizeof *table);
     test_read(table, sat_gl_table(g), SAT__GL_R32UI, t.width, t.height);
     for (y = 1; y <= t.height; y++)

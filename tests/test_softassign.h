@@ -120,7 +120,7 @@ static double cost_of(const problem *q, const int *x)
 static double slack_of(double v) { return 1e-6 * fabs(v) + 1e-37; }
 
 /* allowed: the largest excess over the optimum; 1e9 asks for none. */
-static void check_solution(const problem *q, const int *x, const softassign_report *r, double allowed)
+static void check_solution(const problem *q, const int *x, const softassign_stats *r, double allowed)
 {
     EXPECT(is_valid(x, q->p.rows, q->p.columns, q->p.capacity));
     EXPECT_NEAR(r->cost, cost_of(q, x), slack_of(r->cost));
@@ -148,7 +148,7 @@ static inline softassign_options quick_options(softassign_method method)
 
 static void check_exact(problem *q)
 {
-    softassign_report r;
+    softassign_stats r;
     int *x = (int *)malloc((size_t)q->p.rows * sizeof *x), m;
     for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_EXACT; m++) {
         softassign_options o = softassign_method_defaults((softassign_method)m);
@@ -232,7 +232,7 @@ TEST(softassign_every_method_gives_a_valid_certified_assignment)
     int x[80], k;
     for (k = 0; k < 9; k++) {
         softassign_options o = quick_options(all_methods[k]);
-        softassign_report r;
+        softassign_stats r;
         /* PUBLISHED and ANTS are not cut short for quality here: only validity and the bound are asked of them */
         double allowed = k <= SOFTASSIGN_EXACT ? 0 : k == SOFTASSIGN_FAST ? 0.001 : k == SOFTASSIGN_PUBLISHED ? 3 : 0.6;
         EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
@@ -257,7 +257,7 @@ TEST(softassign_fast_keeps_the_gap_it_was_asked_for)
     size_t k;
     for (k = 0; k < sizeof gaps / sizeof *gaps; k++) {
         softassign_options o = softassign_method_defaults(SOFTASSIGN_FAST);
-        softassign_report r;
+        softassign_stats r;
         o.gap = gaps[k];
         EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
         check_solution(&q, x, &r, gaps[k]);
@@ -286,6 +286,30 @@ TEST(softassign_costs_by_function_equal_costs_by_matrix)
     EXPECT_EQ(softassign_solve(y, &p, NULL, NULL), SAT_OK);
     EXPECT(memcmp(x, y, sizeof x) == 0);
     free_problem(&q);
+}
+
+TEST(softassign_stride_of_0_is_packed)
+{
+    float cost[2 * 3] = {9, 1, 9, 1, 0, 9}, soft[2][6];
+    softassign_problem p;
+    softassign_options o = softassign_method_defaults(SOFTASSIGN_PUBLISHED);
+    int x[2], y[2], k, method;
+    memset(&p, 0, sizeof p);
+    p.rows = 2;
+    p.columns = 3;
+    p.cost = cost;
+    EXPECT_EQ(softassign_solve(x, &p, NULL, NULL), SAT_OK);
+    EXPECT(x[0] == 1 && x[1] == 0);
+    for (method = 0; method < 2; method++) {
+        o = softassign_method_defaults(method ? SOFTASSIGN_ENTROPIC : SOFTASSIGN_PUBLISHED);
+        for (k = 0; k < 2; k++) {
+            p.stride = o.soft_stride = k ? 3 : 0;
+            o.soft = soft[k];
+            EXPECT_EQ(softassign_solve(k ? y : x, &p, &o, NULL), SAT_OK);
+        }
+        EXPECT(memcmp(x, y, sizeof x) == 0 && memcmp(soft[0], soft[1], sizeof soft[0]) == 0);
+        EXPECT(soft[0][1] > soft[0][0]);
+    }
 }
 
 TEST(softassign_stride_may_be_wide_or_negative)
@@ -329,7 +353,7 @@ TEST(softassign_one_rounding_of_every_pair)
     float *a = (float *)malloc((size_t)rows * (size_t)n * sizeof *a),
           *b = (float *)malloc((size_t)columns * (size_t)n * sizeof *b);
     softassign_problem p;
-    softassign_report r;
+    softassign_stats r;
     softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
     problem q;
     uint64_t seed = 4;
@@ -360,7 +384,7 @@ TEST(softassign_finish_restores_the_optimum_after_foreign_prices)
 {
     problem a = make_features(100, 1500, 12, 31), b = make_features(100, 1500, 12, 77);
     softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
-    softassign_report r;
+    softassign_stats r;
     softassign *s;
     int x[100];
     if (!EXPECT_EQ(softassign_create(&s, 100, 1500, &o), SAT_OK)) return;
@@ -385,7 +409,7 @@ TEST(softassign_capacities)
     for (turn = 0; turn < 12; turn++) {
         problem q = turn % 2 ? make_features(60, 40, 7, (uint64_t)turn)
                              : make_dense(60, 40, turn % 4 ? cost_uniform : cost_steps, (uint64_t)turn);
-        softassign_report r;
+        softassign_stats r;
         for (k = 0; k < 40; k++) capacity[k] = support_below(&seed, 5);
         for (k = 0; k < 10; k++) capacity[k] = 4;
         for (k = 10; k < 20; k++) capacity[k] = turn % 3 + 2;
@@ -405,7 +429,7 @@ TEST(softassign_capacity_default_allows_repeats)
 {
     problem q = make_features(100, 30, 6, 3);
     softassign_options o = softassign_defaults();
-    softassign_report r;
+    softassign_stats r;
     int x[100], capacity[30], k;
     o.capacity_default = 100;
     EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
@@ -423,7 +447,7 @@ TEST(softassign_minimum_use)
     for (turn = 0; turn < 6; turn++) {
         problem q =
             turn % 2 ? make_features(50, 30, 5, (uint64_t)turn) : make_dense(50, 30, cost_uniform, (uint64_t)turn);
-        softassign_report r;
+        softassign_stats r;
         for (k = 0; k < 30; k++) {
             capacity[k] = 2 + k % 4;
             least[k] = turn < 2 ? 1 : k % 3 == 0 ? 2 : 0;
@@ -445,7 +469,7 @@ TEST(softassign_impossible_minimum_use_names_its_column)
 {
     problem q = make_dense(6, 9, cost_uniform, 3);
     int least[9] = {0, 0, 0, 1, 0, 0, 0, 0, 0}, x[6], i;
-    softassign_report r;
+    softassign_stats r;
     for (i = 0; i < 6; i++) q.cost[i * 9 + 3] = INFINITY;
     q.p.minimum_use = least;
     EXPECT_EQ(softassign_solve(x, &q.p, NULL, &r), SAT_ERR_LIMIT);
@@ -464,7 +488,7 @@ TEST(softassign_minimum_distance_between_repeats)
     for (m = 0; m < 3; m++) {
         static const softassign_method methods[] = {SOFTASSIGN_AUTO, SOFTASSIGN_GREEDY, SOFTASSIGN_EXACT};
         softassign_options o = quick_options(methods[m]);
-        softassign_report r;
+        softassign_stats r;
         int close = 0;
         o.grid_width = 12;
         o.min_distance = 3;
@@ -487,7 +511,7 @@ TEST(softassign_switching_bonus_keeps_tiles)
 {
     problem a = make_features(100, 1200, 12, 40), b;
     softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
-    softassign_report r, free_run;
+    softassign_stats r, free_run;
     int first[100], x[100], i, k, m;
     uint64_t seed = 2;
     b = make_features(100, 1200, 12, 40);
@@ -518,7 +542,7 @@ TEST(softassign_switching_bonus_keeps_tiles)
 
 /* ---- refusals ---- */
 
-static sat_result solve_with(problem *q, softassign_report *r)
+static sat_result solve_with(problem *q, softassign_stats *r)
 {
     int x[64], i;
     sat_result result;
@@ -537,7 +561,7 @@ TEST(softassign_bad_costs_are_refused_with_their_row)
         for (m = 0; m < 9; m++) {
             problem q = make_dense(30, 50, cost_uniform, 3);
             softassign_options o = quick_options(all_methods[m]);
-            softassign_report r;
+            softassign_stats r;
             q.cost[17 * 50 + 49] = bad[k];
             EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), codes[k]);
             EXPECT_EQ(r.row_error, 17);
@@ -557,7 +581,7 @@ TEST(softassign_bad_features_are_refused)
     for (large = 0; large < 2; large++)
         for (k = 0; k < 4; k++) {
             problem q = make_features(60, large ? 2500 : 80, 5, 3);
-            softassign_report r;
+            softassign_stats r;
             q.rows_f[23 * 5 + 4] = bad[k];
             EXPECT_EQ(solve_with(&q, &r), k == 3 ? SAT_ERR_ARGUMENT : SAT_ERR_NON_FINITE);
             EXPECT_EQ(r.row_error, 23);
@@ -581,7 +605,7 @@ TEST(softassign_infinity_forbids_a_pair)
         if (!EXPECT(q.optimum < 1e30)) return;
         for (m = 0; m < 9; m++) {
             softassign_options o = quick_options(all_methods[m]);
-            softassign_report r;
+            softassign_stats r;
             EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
             check_solution(&q, x, &r, m <= SOFTASSIGN_EXACT ? 0 : m == SOFTASSIGN_FAST ? 0.001 : 1e9);
             for (k = 0; k < 30; k++) EXPECT(sat__is_finite(q.cost[k * q.p.columns + x[k]]));
@@ -593,7 +617,7 @@ TEST(softassign_infinity_forbids_a_pair)
 TEST(softassign_impossible_problems_name_a_row)
 {
     problem q = make_dense(40, 45, cost_uniform, 2);
-    softassign_report r;
+    softassign_stats r;
     int m, k, x[64];
     for (k = 0; k < 45; k++) q.cost[11 * 45 + k] = INFINITY; /* row 11 has no column at all */
     for (m = 0; m < 9; m++) {
@@ -679,7 +703,7 @@ TEST(softassign_capacity_zero_everywhere)
 {
     problem q = make_dense(3, 5, cost_uniform, 2);
     int capacity[5] = {0, 0, 0, 0, 0}, x[3];
-    softassign_report r;
+    softassign_stats r;
     softassign_options o = softassign_defaults();
     q.p.capacity = capacity;
     EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_ERR_LIMIT);
@@ -703,7 +727,7 @@ TEST(softassign_tiny_temperatures_stay_finite)
             for (m = 0; m < 3; m++) {
                 problem q = make_dense(50, 80, costs[k], 5);
                 softassign_options o = softassign_method_defaults(m ? SOFTASSIGN_PUBLISHED : SOFTASSIGN_ENTROPIC);
-                softassign_report r;
+                softassign_stats r;
                 int i, finite = 1;
                 o.temperature = temperatures[t];
                 o.iterations[0] = 4;
@@ -727,7 +751,7 @@ TEST(softassign_features_of_any_magnitude)
     for (k = 0; k < 6; k++) {
         problem q = make_features(100, 1200, 6, 3);
         softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
-        softassign_report r;
+        softassign_stats r;
         for (i = 0; i < 100 * 6; i++) q.rows_f[i] = (float)((double)q.rows_f[i] * scales[k]);
         for (i = 0; i < 1200 * 6; i++) q.columns_f[i] = (float)((double)q.columns_f[i] * scales[k]);
         EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
@@ -742,7 +766,7 @@ TEST(softassign_features_of_any_magnitude)
 TEST(softassign_one_huge_forced_cost_does_not_drown_the_rest)
 {
     problem q = make_dense(60, 2000, cost_forced, 5), rest;
-    softassign_report r;
+    softassign_stats r;
     int x[60], m, i, j;
     double sum;
     rest = make_dense(60, 2000, cost_uniform, 99);
@@ -771,7 +795,7 @@ TEST(softassign_more_than_2_31_cells)
     size_t i, n = 300000;
     int rows = 8000, *x = (int *)malloc(8000 * sizeof *x), k, ok = 1;
     float *a = (float *)malloc(8000 * sizeof *a), *b = (float *)malloc(n * sizeof *b);
-    softassign_report r;
+    softassign_stats r;
     free_problem(&q);
     /* sizes that need more than the address space, or more than there is: refused, never wrapped */
     o.allocator = support_allocator(&m);
@@ -818,7 +842,7 @@ TEST(softassign_same_bits_for_any_number_of_workers)
         for (odd = 0; odd < 2; odd++)
             for (k = 0; k < 4; k++) {
                 softassign_options o = quick_options(all_methods[m]);
-                softassign_report r;
+                softassign_stats r;
                 uint64_t h;
                 o.threads = odd ? support_odd_threads(workers[k]) : support_threads(workers[k]);
                 if (m == SOFTASSIGN_ENTROPIC || m == SOFTASSIGN_PUBLISHED) {
@@ -865,7 +889,7 @@ TEST(softassign_failing_allocator_leaks_nothing)
 static void check_steps(problem *q, softassign_options o, size_t budget)
 {
     softassign *s;
-    softassign_report r;
+    softassign_stats r;
     support_memory memory;
     int *x = (int *)malloc((size_t)q->p.rows * sizeof *x), steps = 0;
     double bound = -HUGE_VAL;
@@ -912,7 +936,7 @@ TEST(softassign_steps_are_valid_at_any_moment)
 
 typedef struct counted { int calls, stop_at, rows, columns, valid, empty; double last_gap; } counted;
 
-static int count_progress(const softassign_report *report, const int *x, void *user)
+static int count_progress(const softassign_stats *report, const int *x, void *user)
 {
     counted *c = (counted *)user;
     c->calls++;
@@ -928,7 +952,7 @@ TEST(softassign_progress_can_stop_every_method)
     int m, x[80];
     for (m = 0; m < 9; m++) {
         softassign_options o = quick_options(all_methods[m]);
-        softassign_report r;
+        softassign_stats r;
         counted c = {0, 3, 80, 1500, 0, 0, 0};
         o.progress = count_progress;
         o.progress_user = &c;
@@ -952,7 +976,7 @@ TEST(softassign_greedy_is_the_published_one)
         problem q = make_features(70, 70 + (int)seed * 30, 9, seed);
         softassign_options o = softassign_method_defaults(SOFTASSIGN_GREEDY),
                            two = softassign_method_defaults(SOFTASSIGN_GREEDY_2OPT);
-        softassign_report r, better;
+        softassign_stats r, better;
         reference_greedy(q.cost, 70, q.p.columns, y);
         EXPECT_EQ(softassign_solve(x, &q.p, &o, &r), SAT_OK);
         EXPECT_REL(cost_of(&q, x), cost_of(&q, y), 1e-6);
@@ -971,7 +995,7 @@ TEST(softassign_published_is_the_pseudo_code)
     float *out = (float *)malloc((size_t)n * sizeof *out);
     for (turn = 0; turn < 4; turn++) {
         softassign_options o = softassign_method_defaults(SOFTASSIGN_PUBLISHED);
-        softassign_report r;
+        softassign_stats r;
         uint64_t seed = 5;
         double worst = 0, column, widest = 0, sharpest = 0;
         int wide = turn % 2, gold = turn / 2;
@@ -1014,7 +1038,7 @@ TEST(softassign_published_clamps_hold)
 {
     problem q = make_dense(20, 40, cost_uniform, 8);
     softassign_options o = softassign_method_defaults(SOFTASSIGN_PUBLISHED);
-    softassign_report r;
+    softassign_stats r;
     int x[20], k, wide;
     float out[20 * 40];
     for (wide = 0; wide < 2; wide++) {
@@ -1038,7 +1062,7 @@ TEST(softassign_entropic_matrix_is_feasible_and_the_bound_tightens)
 {
     problem q = make_features(60, 200, 12, 90);
     softassign_options o = softassign_method_defaults(SOFTASSIGN_ENTROPIC);
-    softassign_report r;
+    softassign_stats r;
     float *soft = (float *)malloc(60 * 200 * sizeof *soft);
     double before = -HUGE_VAL;
     int i, j, x[60], step;
@@ -1069,7 +1093,7 @@ TEST(softassign_annealing_and_ants_follow_their_seed)
     int x[60], y[60], m;
     for (m = 0; m < 2; m++) {
         softassign_options o = quick_options(m ? SOFTASSIGN_ANTS : SOFTASSIGN_ANNEALING);
-        softassign_report a, b, c;
+        softassign_stats a, b, c;
         EXPECT_EQ(softassign_solve(x, &q.p, &o, &a), SAT_OK);
         EXPECT_EQ(softassign_solve(y, &q.p, &o, &b), SAT_OK);
         EXPECT(memcmp(x, y, sizeof x) == 0 && a.iterations == b.iterations);
@@ -1084,7 +1108,7 @@ TEST(softassign_annealing_and_ants_follow_their_seed)
 
 typedef struct ant_frames { int rows, columns, frames; double first, last; const problem *q; } ant_frames;
 
-static int watch_ants(const softassign_report *report, const int *x, void *user)
+static int watch_ants(const softassign_stats *report, const int *x, void *user)
 {
     ant_frames *f = (ant_frames *)user;
     double cost = cost_of(f->q, x);
@@ -1100,7 +1124,7 @@ TEST(softassign_ants_emerge_from_noise)
     problem q = make_features(80, 400, 12, 92);
     softassign_options o = softassign_method_defaults(SOFTASSIGN_ANTS);
     ant_frames f = {80, 400, 0, 0, 0, &q};
-    softassign_report r;
+    softassign_stats r;
     int x[80];
     o.iterations[0] = 40;
     o.progress = watch_ants;
@@ -1180,7 +1204,9 @@ TEST(softassign_mosaic_places_tiles)
     goal.width = 2;
     goal.height = 3;
     goal.stride = 6;
-    EXPECT_EQ(softassign_mosaic(out, 12, &tiles, 2, 2, x, 2, 3, NULL, 0), SAT_OK);
+    tiles.stride = 0; /* packed, as the output */
+    EXPECT_EQ(softassign_mosaic(out, 0, &tiles, 2, 2, x, 2, 3, NULL, 0), SAT_OK);
+    tiles.stride = 18;
     for (j = 0; j < 6; j++)
         for (i = 0; i < 4; i++)
             for (c = 0; c < 3; c++) {
@@ -1221,7 +1247,7 @@ TEST(softassign_real_pictures_and_tiles)
 #ifdef HAVE_STB
     const char *photo = support_data("photos/fig_bowl.jpg"), *sheet = support_data("tiles/tiles_0.png");
     problem q;
-    softassign_report r;
+    softassign_stats r;
     int x[400], m;
     if (!photo || !sheet) SKIP("needs ../shared/data/photos and tiles");
     memset(&q, 0, sizeof q);
@@ -1257,7 +1283,7 @@ TEST(softassign_short_lists_stay_exact)
         int columns = turn % 2 ? 1300 : 600, i, j;
         problem q = make_features(60, columns, 20, 1);
         softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
-        softassign_report r;
+        softassign_stats r;
         seed = (uint64_t)(turn / 2) + 4;
         for (i = 0; i < 60 + columns; i++) {
             double level = (i < 60 ? 10 : 250) * support_uniform(&seed), spread = i < 60 ? 3 : 30;
@@ -1325,7 +1351,7 @@ static float brute_cost(int kind, uint64_t *seed)
 }
 
 static void brute_check(brute *b, const softassign_problem *p, sat_result result, const int *x,
-                        const softassign_report *r, const char *what)
+                        const softassign_stats *r, const char *what)
 {
     long double sum = 0, allowed;
     int used[BRUTE_COLUMNS] = {0}, i, ok = 1;
@@ -1380,7 +1406,7 @@ TEST(softassign_all_kinds_by_brute_force)
         for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_FAST; m++) {
             static const char *const names[3] = {"auto", "exact", "fast"};
             softassign_options o = softassign_method_defaults((softassign_method)m);
-            softassign_report r;
+            softassign_stats r;
             o.gap = 1e-14;
             brute_check(&b, &p, softassign_solve(x, &p, &o, &r), x, &r, names[m]);
             if (m == SOFTASSIGN_FAST || least) continue;
@@ -1403,7 +1429,7 @@ TEST(softassign_minimum_use_on_features_has_a_choice)
     const float one[1] = {0}, two[2] = {0, 1};
     const int least[2] = {0, 1}, last[3] = {0, 0, 1};
     softassign_problem p;
-    softassign_report r;
+    softassign_stats r;
     int m, k, x[2];
     for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_FAST; m++) {
         softassign_options o = softassign_method_defaults((softassign_method)m);
@@ -1435,7 +1461,7 @@ TEST(softassign_warm_frames_with_big_gates_are_optimal)
         for (frame = 0; frame < 60; frame++) {
             float cost[N * N];
             softassign_problem p;
-            softassign_report r;
+            softassign_stats r;
             double best;
             for (i = 0; i < N * N; i++)
                 cost[i] = support_uniform(&seed) < 0.85 ? gates[g] : (float)support_uniform(&seed);
@@ -1457,7 +1483,7 @@ TEST(softassign_costs_that_are_not_used_do_not_spoil_the_proof)
 {
     static const float cost[6] = {0.25f, 1e30f, 1e30f, 0.5f, 0.125f, 1e30f}, zero[6] = {0, 1, 2, 1, 0, 2};
     softassign_problem p;
-    softassign_report r;
+    softassign_stats r;
     int m, x[2];
     memset(&p, 0, sizeof p);
     p.rows = 2, p.columns = 3, p.stride = 3;
@@ -1473,7 +1499,7 @@ TEST(softassign_costs_that_are_not_used_do_not_spoil_the_proof)
     }
 }
 
-static int stop_at_once(const softassign_report *report, const int *x, void *user)
+static int stop_at_once(const softassign_stats *report, const int *x, void *user)
 {
     (void)report, (void)x;
     ++*(int *)user;
@@ -1486,7 +1512,7 @@ TEST(softassign_a_stopped_method_is_not_complete)
     int m, x[80];
     for (m = 0; m < 9; m++) {
         softassign_options o = quick_options(all_methods[m]);
-        softassign_report r;
+        softassign_stats r;
         int calls = 0;
         o.progress = stop_at_once;
         o.progress_user = &calls;
@@ -1503,7 +1529,7 @@ TEST(softassign_stamps_start_again_before_they_overflow)
 {
     problem q = make_dense(12, 20, cost_uniform, 3);
     softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
-    softassign_report r;
+    softassign_stats r;
     softassign *s = NULL;
     int x[12], frame;
     EXPECT_EQ(softassign_create(&s, 12, 20, &o), SAT_OK);
@@ -1530,7 +1556,7 @@ TEST(softassign_closed_columns_leave_lists_whole)
         int n = 2600 + (int)support_below(&seed, 1500), steps = t % 3;
         double closed = 0.02 + 0.95 * support_uniform(&seed), off = 0.6 * support_uniform(&seed), best;
         softassign_options o = softassign_method_defaults(SOFTASSIGN_EXACT);
-        softassign_report r;
+        softassign_stats r;
         softassign_problem p;
         memset(&p, 0, sizeof p);
         if (t >= 8) o.neighbours = 4 + t % 4;
@@ -1623,7 +1649,7 @@ TEST(softassign_corners_of_options_in_pairs)
                 const double second[3] = {g->low, g->high < 2e9 || g->type == 'd' ? g->high : 3, g->initial};
                 softassign_options o =
                     softassign_method_defaults((softassign_method)((a + b + k) % (SOFTASSIGN_ANTS + 1)));
-                softassign_report r;
+                softassign_stats r;
                 char text[200];
                 int x[6], j;
                 sat_result result;
@@ -1754,7 +1780,7 @@ TEST(softassign_rows_left_out_and_the_largest_total_by_brute_force)
         for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_FAST; m++) {
             softassign_options o = softassign_method_defaults((softassign_method)m);
             softassign_problem with_all = p;
-            softassign_report r;
+            softassign_stats r;
             double u[BRUTE_ROWS], v[BRUTE_COLUMNS];
             int x[BRUTE_ROWS], y[BRUTE_ROWS];
             sat_result result;
@@ -1815,7 +1841,7 @@ TEST(softassign_rows_left_out_of_larger_problems)
         problem q = make_features(rows, columns, 5, (uint64_t)turn + 3);
         float *wide = (float *)malloc((size_t)rows * (size_t)(rows + columns) * sizeof *wide),
               price = turn % 2 ? 14 : 40;
-        softassign_report r;
+        softassign_stats r;
         long double optimum, sum = 0;
         for (i = 0; i < rows; i++)
             for (j = 0; j < columns + rows; j++)

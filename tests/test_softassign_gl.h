@@ -71,7 +71,7 @@ TEST(softassign_gl_published_equals_the_cpu)
                   *gpu = (float *)malloc(n * sizeof *gpu);
             softassign_problem p = problem_of(cost, rows, columns);
             softassign_options o = softassign_method_defaults(SOFTASSIGN_PUBLISHED);
-            softassign_report r;
+            softassign_stats r;
             softassign_gl *gl;
             double soft_cost = 0, sharpest = 0, worst;
             if (n > 100) cost[n / 2] = INFINITY;
@@ -165,7 +165,7 @@ TEST(softassign_gl_sweep_equals_the_cpu)
             softassign_options o = softassign_defaults();
             softassign_gl *gl;
             int *x = (int *)malloc((size_t)rows * sizeof *x);
-            softassign_report r;
+            softassign_stats r;
             o.gather = sizes[k][2];
             for (turn = 0; turn < sweeps; turn++) { /* the plain double sweep */
                 for (bound = 0, j = 0; j < columns; j++) {
@@ -375,7 +375,7 @@ TEST(softassign_gl_bound_holds_for_many_features)
         uint64_t seed = k + 9;
         softassign_problem p;
         softassign_gl *gl;
-        softassign_report r;
+        softassign_stats r;
         memset(&p, 0, sizeof p);
         for (i = 0; i < 24 * n; i++) f[i] = (float)(1e4 + 100 * support_uniform(&seed));
         p.rows = p.columns = 12;

@@ -582,6 +582,9 @@ TEST(formats_channels_and_strides)
     tonemap_create(&map, W, H, NULL);
     EXPECT_EQ(tonemap_apply_u8(map, flipped + (H - 1) * W * 4, -(W * 4), &view, 0, NULL), SAT_OK);
     for (y = 0; y < H; ++y) EXPECT(memcmp(flipped + (H - 1 - y) * W * 4, a.u8 + y * W * 4, W * 4) == 0);
+    view.stride = 0; /* packed */
+    EXPECT_EQ(tonemap_apply_u8(map, flipped, 0, &view, 0, NULL), SAT_OK);
+    EXPECT(memcmp(flipped, a.u8, W * 4 * H) == 0);
     EXPECT_EQ(tonemap_apply_f32(map, floats, W * 16, &view, 0, NULL), SAT_OK); /* in place */
     EXPECT(memcmp(floats, a.f32, W * H * 16) == 0);
     tonemap_destroy(map);

@@ -248,7 +248,7 @@ TEST(gl_sums_are_the_cpus_integers)
     EXPECT_NEAR((double)(log_sum - map->worker[0].log_sum) / 65536 / (W * H), 0, 1e-6);
     EXPECT_EQ(sums[2], W * H);
     for (y = 0; y < H; ++y) {
-        tonemap__quantize(row, map->luminance + y * map->row, W, &map->frame);
+        tonemap__quantise(row, map->luminance + y * map->row, W, &map->frame);
         for (x = 0; x < W; ++x) off += abs(row[x] - (int32_t)quanta[y * W + x]) > (row[x] >> 20) + 1;
     }
     EXPECT_EQ(off, 0);

@@ -24,7 +24,7 @@ int main(void)
     if (!result) result = fiv_occluder_light(occluder, environment, NULL);
     instance.occluder = occluder;
     if (!result) result = fiv_irradiance(rgb, point, up, 1, environment, &instance, 1, NULL, NULL);
-    if (!result) fiv_environment_irradiance(environment, open, up);
+    if (!result) fiv_environment_irradiance(open, environment, up);
     fiv_occluder_destroy(occluder);
     fiv_environment_destroy(environment);
     return result || !(rgb[1] > 0 && rgb[1] < 0.9f * open[1]) || fiv_version() != FIV_VERSION;

@@ -111,12 +111,12 @@ static int open_environment(bench *b, int kind)
     fiv_environment_destroy(b->environment);
     check(fiv_environment_create(&b->environment, &view, NULL, NULL), "environment");
     image_free(&picture);
-    b->lights = fiv_environment_lights(b->environment, NULL, NULL, 0);
+    b->lights = fiv_environment_lights(NULL, NULL, 0, b->environment);
     free(b->directions);
     free(b->powers);
     b->directions = (float *)need(malloc(3 * b->lights * sizeof(float)));
     b->powers = (float *)need(malloc(3 * b->lights * sizeof(float)));
-    fiv_environment_lights(b->environment, b->directions, b->powers, b->lights);
+    fiv_environment_lights(b->directions, b->powers, b->lights, b->environment);
     return 1;
 }
 
@@ -501,7 +501,7 @@ static void partial_occluders(bench *b)
                 fiv__normalise(t, t);
                 for (k = 0; k < 3; k++) p[k] = -r * t[k] - heights[h] * n[k];
                 reference_irradiance(truth, &b->scene, b->directions, b->powers, b->lights, p, n);
-                fiv_environment_irradiance(b->environment, open, n);
+                fiv_environment_irradiance(open, b->environment, n);
                 for (a = 0; a < 4; a++) {
                     fiv_irradiance_options io = fiv_irradiance_defaults();
                     io.accuracy = a == 0 ? FIV_TRILINEAR : (fiv_accuracy)a;

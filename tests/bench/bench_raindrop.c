@@ -35,13 +35,13 @@ static void open_scene(void)
         bench_note("env/forest.exr is not there: a made-up sky instead");
     }
     the.camera = raindrop_camera_defaults();
-    the.camera.near_distance = 0;
+    the.camera.depth_near = 0;
     the.background = pixels_of();
     the.picture = pixels_of();
     the.truth = pixels_of();
     the.mask = (unsigned char *)malloc(SIZE * SIZE);
     raindrop_environment_create(&the.environment, &the.view, NULL, NULL);
-    raindrop_map_create(&the.map, SIZE, 32, RAINDROP_WATER, NULL);
+    reference_map(&the.map, SIZE, 32, RAINDROP_WATER);
     raindrop_environment_render(the.background, SIZE * 12, SIZE, SIZE, &the.camera, the.environment, NULL);
     the.key = reference_key(the.background, SIZE * SIZE);
 }
@@ -79,13 +79,13 @@ static void time_single(void *user)
         d[0] = v->direction[0][i]; d[1] = v->direction[1][i]; d[2] = v->direction[2][i];
         p[0] = v->offset[0][i]; p[1] = v->offset[1][i]; p[2] = v->offset[2][i];
         raindrop_trace(&ray, d, p, v->one_minus_b2[i], RAINDROP_WATER);
-        v->out[0][i] = ray.reflect[0];
-        v->out[1][i] = ray.reflect[1];
-        v->out[2][i] = ray.reflect[2];
+        v->out[0][i] = ray.reflected[0];
+        v->out[1][i] = ray.reflected[1];
+        v->out[2][i] = ray.reflected[2];
         v->out[6][i] = ray.fresnel;
-        v->out[3][i] = ray.refract[0];
-        v->out[4][i] = ray.refract[1];
-        v->out[5][i] = ray.refract[2];
+        v->out[3][i] = ray.refracted[0];
+        v->out[4][i] = ray.refracted[1];
+        v->out[5][i] = ray.refracted[2];
         v->out[7][i] = ray.transmit;
     }
 }
@@ -106,7 +106,7 @@ static void time_spheroid(void *user)
         d[0] = v->direction[0][i]; d[1] = v->direction[1][i]; d[2] = v->direction[2][i];
         p[0] = v->offset[0][i]; p[1] = v->offset[1][i]; p[2] = v->offset[2][i];
         raindrop_trace_spheroid(&ray, d, p, 0.8f, RAINDROP_WATER);
-        v->out[0][i] = ray.reflect[0] + ray.refract[0] + ray.fresnel;
+        v->out[0][i] = ray.reflected[0] + ray.refracted[0] + ray.fresnel;
     }
 }
 
@@ -126,27 +126,27 @@ static void bench_vectors(void)
     for (c = 0; c < 3; c++) {
         v.in.direction[c] = v.direction[c];
         v.in.centre_offset[c] = v.offset[c];
-        v.to.reflect[c] = v.out[c];
-        v.to.refract[c] = v.out[3 + c];
+        v.to.reflected[c] = v.out[c];
+        v.to.refracted[c] = v.out[3 + c];
     }
     v.in.one_minus_b2 = v.one_minus_b2;
     v.to.fresnel = v.out[6];
     v.to.transmit = v.out[7];
-    v.to.footprint_reflect = v.out[8];
-    v.to.footprint_refract = v.out[9];
+    v.to.footprint_reflected = v.out[8];
+    v.to.footprint_refracted = v.out[9];
     bench_table("Reflection, refraction and Fresnel factor of a fragment", "method\tbytes\tns\tmap_over_this_ratio\tsphere_over_this_ratio");
     bench_note("ratios against the trilinear map of the same row's run (base 512 for the closed forms, at distance 6 radii)");
     for (base = 16; base <= (bench_quick() ? 256 : 1024); base *= 4) {
         double bytes = 0;
         bench_times t;
-        raindrop_map_create(&v.map, base, 32, RAINDROP_WATER, NULL);
+        reference_map(&v.map, base, 32, RAINDROP_WATER);
         v.distance = 6;
         for (c = base; c; c /= 2) bytes += 32.0 * c * c;
         t = bench_ratio(time_map, &v, time_single, &v, bench_rounds(15));
         bench_row("map %d\t%.0f\t%.1f\t1\t%.2f", base, bytes, t.work / FRAGMENTS * 1e9, 1 / t.ratio);
         raindrop_map_destroy(v.map);
     }
-    raindrop_map_create(&v.map, 512, 32, RAINDROP_WATER, NULL);
+    reference_map(&v.map, 512, 32, RAINDROP_WATER);
     {
         bench_times t = bench_ratio(time_single, &v, time_map, &v, bench_rounds(31));
         bench_row("closed form, one ray\t0\t%.2f\t%.2f\t1", t.work / FRAGMENTS * 1e9, 1 / t.ratio);
@@ -228,7 +228,7 @@ static void bench_closeup(void)
             for (base = 16; base <= 1024; base *= 2) {
                 raindrop_map *map;
                 if (quick && base != 16 && base != 256) continue;
-                raindrop_map_create(&map, base, 32, RAINDROP_WATER, NULL);
+                reference_map(&map, base, 32, RAINDROP_WATER);
                 f.options.look = RAINDROP_LOOK_MAP;
                 f.options.map = map;
                 draw(&f);
@@ -301,7 +301,7 @@ static void bench_box(int count)
     int i;
     raindrop_camera camera = the.camera;
     double start;
-    camera.near_distance = 0.005f;
+    camera.depth_near = 0.005f;
     f.rain = published(count);
     f.camera = camera;
     f.options = raindrop_render_defaults();
@@ -312,7 +312,7 @@ static void bench_box(int count)
     bench_table(title, "method\tms\ttime_ratio\treference_over_this_ratio\trmse\tssim\tfragments\tdefault");
     bench_plot(count == 100000 ? "Rain: error against time; x=time_ratio; y=rmse; by=method; log=xy; picture=plot_raindrop" : "Rain: error against time; x=time_ratio; y=rmse; by=method; log=xy");
     start = bench_clock();
-    reference_render(the.truth, NULL, SIZE, SIZE, rays(), &camera, raindrop_rain_drops(f.rain, NULL), count,
+    reference_render(the.truth, NULL, SIZE, SIZE, rays(), &camera, raindrop_rain_drops(NULL, f.rain), count,
                      the.environment, 3);
     start = bench_clock() - start;
     memcpy(the.picture, the.background, sizeof(float) * 3 * SIZE * SIZE);
@@ -347,7 +347,7 @@ static void bench_counts(void)
         float wind[3] = {4, 0, 0}, calm[3] = {0, 0, 0};
         f.rain = published(counts[i]);
         f.camera = the.camera;
-        f.camera.near_distance = 0.005f;
+        f.camera.depth_near = 0.005f;
         f.options = raindrop_render_defaults();
         f.options.map = the.map;
         map = f;
@@ -405,12 +405,12 @@ static void bench_streaks(void)
     raindrop_rain_create(&rain, &o);
     memset(&m, 0, sizeof m);
     m.count = o.count;
-    m.drops = raindrop_rain_drops(rain, NULL);
+    m.drops = raindrop_rain_drops(NULL, rain);
     m.moved = (raindrop_drop *)malloc(sizeof *m.moved * (size_t)m.count);
     m.sum = pixels_of();
     m.still.rain = own_rain(m.drops, m.count);
     m.still.camera = the.camera;
-    m.still.camera.near_distance = 0.05f;
+    m.still.camera.depth_near = 0.05f;
     m.still.options = raindrop_render_defaults();
     f = m.still;
     f.rain = rain;
@@ -523,7 +523,7 @@ static void bench_left_out(void)
     memset(&f, 0, sizeof f);
     raindrop_rain_create(&f.rain, &o);
     f.camera = the.camera;
-    f.camera.near_distance = 0.05f;
+    f.camera.depth_near = 0.05f;
     f.options = raindrop_render_defaults();
     all = f;
     all.options.coverage_threshold = 0;

@@ -126,7 +126,7 @@ static void bench_build(void)
                                    bench_rounds(n > 5000 ? 7 : 21))
                            .ratio;
 #endif
-            bench_row("%s\t%d\t%.2f\t%s\t%.3f\t%d", kind_names[k], n, ratio, bench_cell(peer, 3, peer > 0), (double)sat_get_statistics(w.table).bytes / (double)pixels, k == 0);
+            bench_row("%s\t%d\t%.2f\t%s\t%.3f\t%d", kind_names[k], n, ratio, bench_cell(peer, 3, peer > 0), (double)sat_get_stats(w.table).bytes / (double)pixels, k == 0);
             sat_destroy(w.table);
         }
         free(p);

@@ -89,7 +89,7 @@ typedef struct instance {
     int *x, *y, *pred, *list, *unassigned;
     double *v, *d;
     softassign_options options;
-    softassign_report report;
+    softassign_stats report;
 } instance;
 
 static void open_instance(instance *q, const char *photo, int grid_width, int grid_height, int columns, int dense)

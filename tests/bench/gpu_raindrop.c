@@ -48,9 +48,9 @@ static int open_scene(void)
     }
     ok = succeeded(raindrop_environment_create(&the.environment, &view, NULL, NULL), "environment");
     free(sky);
-    ok = ok && succeeded(raindrop_map_create(&the.map, 1024, 32, RAINDROP_WATER, NULL), "map");
+    ok = ok && succeeded(reference_map(&the.map, 1024, 32, RAINDROP_WATER), "map");
     the.camera = raindrop_camera_defaults();
-    the.camera.near_distance = 0.005f;
+    the.camera.depth_near = 0.005f;
     sat__gl_begin(&gpu, &state, 1);
     ok = ok && succeeded(sat__gl_texture(&gpu, &the.texture, SAT__GL_RGBA16F, size, size, NULL), gpu.message);
     ok = ok && succeeded(sat__gl_framebuffer(&gpu, &the.framebuffer, &the.texture, 1, 0), gpu.message);
@@ -76,7 +76,7 @@ static void draw(raindrop_gl *g, const raindrop_render_options *o)
     static const float grey[4] = {0.2f, 0.25f, 0.3f, 1};
     gpu.BindFramebuffer(SAT__GL_FRAMEBUFFER, the.framebuffer);
     gpu.ClearBufferfv(SAT__GL_COLOR, 0, grey);
-    raindrop_gl_render(g, size, size, &the.camera, o, 0, 0);
+    raindrop_gl_render(g, size, size, &the.camera, o);
 }
 
 static void frame(raindrop_gl *g, const raindrop_render_options *o, int tone)
@@ -150,7 +150,7 @@ static raindrop_render_options set_kind(raindrop_gl *g, raindrop_rain *rain, int
 {
     raindrop_render_options o = raindrop_render_defaults();
     int n = 0, i;
-    const raindrop_drop *drops = raindrop_rain_drops(rain, &n);
+    const raindrop_drop *drops = raindrop_rain_drops(&n, rain);
     raindrop_drop *flat = (raindrop_drop *)calloc((size_t)n, sizeof *flat);
     for (i = 0; i < n; i++) flat[i] = drops[i], flat[i].axis_ratio = kind == FLAT ? 0.8f : 1;
     raindrop_rain_set_drops(rain, flat, n);
