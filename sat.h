@@ -71,8 +71,8 @@
 
    - Input: any float. NaN counts as 0 and infinity as the largest value the kind can sum; both are counted, and in
      TILED and FIXED tables a bad pixel changes no box without it. TILED keeps at most 64 pixels a tile row beyond 1e20;
-     further ones are clamped to the largest other pixel of their tile and counted. FLOAT clamps all pixels to 1.6e29
-     when their sums would overflow otherwise. SAT_NON_FINITE_REFUSE returns an error instead.
+     further ones are clamped to the largest other pixel of their tile and counted. FLOAT clamps pixels to
+     1.6e29, so that no sum overflows. SAT_NON_FINITE_REFUSE returns an error instead.
    - The same bits for any number of workers, for SSE2, AVX2, NEON and plain C, with and without contraction into fused
      multiply-adds, also under -ffast-math and -Ofast, which the
      implementation switches off for itself (gcc, clang, MSVC); only subnormals may then count as 0, as the program
@@ -301,6 +301,9 @@ SAT_DEF void sat_destroy(sat_table *table); /* NULL is fine */
 
 /* Box [x0,x1) x [y0,y1), clipped to the table; an empty box gives 0. Constant time, any number of threads. */
 SAT_DEF double sat_sum(const sat_table *table, int channel, int x0, int y0, int x1, int y1);
+/* The sums of `count` boxes, x0 y0 x1 y1 each: the same bits. For many boxes in any order: it asks memory for those to
+   come while it adds up one, and chooses the kind once. */
+SAT_DEF void sat_sums(double *out, const sat_table *table, int channel, const int *boxes, size_t count);
 /* The sum divided by the clipped area. */
 SAT_DEF double sat_mean(const sat_table *table, int channel, int x0, int y0, int x1, int y1);
 /* The exact integral of the piecewise constant image (pixel i covers [i, i+1)) over a box with real corners. */
@@ -332,6 +335,9 @@ SAT_DEF sat_result sat_box_filter_variable(float *out, ptrdiff_t out_stride, con
 /* Never below the absolute error of a box mean of that size anywhere in the table, against exact sums of the
    replaced pixels. Worst case, not typical: see sat_error_rms. */
 SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_width, int box_height);
+/* Never below the absolute error of the mean of this very box, clipped: in SAT_KIND_TILED its own tiles count, and what
+   lies elsewhere does not. Visits every tile of the box. */
+SAT_DEF double sat_error_bound_box(const sat_table *table, int channel, int x0, int y0, int x1, int y1);
 /* The root-mean-square error to expect over boxes of that size: within a factor of 4 on non-negative images whose
    pixels are not round numbers and, for FIXED kinds, not mostly below the quantum; an upper estimate on others. */
 SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width, int box_height);
@@ -389,11 +395,14 @@ SAT_DEF double sat_covariance(const sat_moments *moments, int channel, int other
 SAT_DEF sat_result sat_moments_filter(float *out, float *mean, ptrdiff_t out_stride, const sat_moments *moments,
                                       int channel, int other, int radius);
 
-/* A program that forgets SAT_IMPLEMENTATION fails to link, and this name says why. */
+/* A program that forgets SAT_IMPLEMENTATION fails to link, and this name says why, even where it implements nothing. */
 #ifdef SAT_STATIC
 static const int sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file = SAT_VERSION;
 #else
 extern const int sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file;
+#endif
+#if defined(__GNUC__) && !defined(__TINYC__) && !defined(SAT_STATIC)
+__attribute__((used)) static int sat__hint(void) { return sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file; }
 #endif
 
 #ifdef __cplusplus
@@ -838,7 +847,18 @@ static inline int sat__six_digits(char d[6], double value)
     return exponent;
 }
 
-/* As %.6g writes it, but with a point in every locale. */
+/* A whole number that six digits would not hold. */
+static inline void sat__text_whole(sat__text *t, double value)
+{
+    char out[24];
+    int n = (int)sizeof out - 1;
+    double rest = fabs(value);
+    for (out[n] = 0; rest >= 1 && n > 1; rest = floor(rest / 10)) out[--n] = (char)('0' + (int)fmod(rest, 10));
+    if (value < 0) out[--n] = '-';
+    sat__text_add(t, out + n);
+}
+
+/* As %.6g writes it, but with a point in every locale, and whole numbers with all their digits. */
 static inline void sat__text_number(sat__text *t, double value)
 {
     char d[6], out[32];
@@ -848,6 +868,10 @@ static inline void sat__text_number(sat__text *t, double value)
         return;
     }
     exponent = sat__six_digits(d, fabs(value));
+    if (exponent > 5 && exponent < 15 && floor(value) == value && fmod(fabs(value), pow(10, exponent - 5)) > 0) {
+        sat__text_whole(t, value);
+        return;
+    }
     scientific = exponent < -4 || exponent > 5;
     point = scientific ? 0 : exponent;
     while (last > 0 && d[last] == '0') last--;
@@ -3202,70 +3226,6 @@ static inline void sat__span_of(sat__span *s, int a, int b, int shift)
     s->end[s->count - 1] = b - (last << shift);
 }
 
-/* Sums over tiles [t0, t1) from inclusive sums that restart at every multiple of `super`; step: between tiles. */
-static double sat__run(const double *p, size_t step, int t0, int t1, int super)
-{
-    double sum = 0;
-    while (t0 < t1) {
-        int stop = sat__min_int(t1, (t0 | (super - 1)) + 1);
-        double s = p[(size_t)(stop - 1) * step];
-        if (t0 & (super - 1)) s -= p[(size_t)(t0 - 1) * step];
-        sum += s;
-        t0 = stop;
-    }
-    return sum;
-}
-
-/* The same down the tile rows of a table that may be a ring: columns [x0, x1) of a tile. */
-static double sat__run_above(const sat_table *t, int channel, const sat__span *y, int x, int x0, int x1)
-{
-    int super = SAT__SUPER >> t->shift, b = y->run0;
-    double sum = 0;
-    while (b < y->run1) {
-        int stop = sat__min_int(y->run1, (b | (super - 1)) + 1);
-        const double *high = sat__above(t, channel, stop - 1) + x,
-                     *low = b & (super - 1) ? sat__above(t, channel, b - 1) + x : NULL;
-        double s = x0 ? high[x1 - 1] - high[x0 - 1] : high[x1 - 1];
-        if (low) s -= x0 ? low[x1 - 1] - low[x0 - 1] : low[x1 - 1];
-        sum += s;
-        b = stop;
-    }
-    return sum;
-}
-
-static double sat__run_whole(const sat_table *t, int channel, const sat__span *x, const sat__span *y)
-{
-    int super = SAT__SUPER >> t->shift, b = y->run0;
-    double sum = 0;
-    while (b < y->run1) {
-        int stop = sat__min_int(y->run1, (b | (super - 1)) + 1);
-        double s = sat__run(t->whole + sat__tile_index(t, channel, stop - 1, 0), 1, x->run0, x->run1, super);
-        if (b & (super - 1))
-            s -= sat__run(t->whole + sat__tile_index(t, channel, b - 1, 0), 1, x->run0, x->run1, super);
-        sum += s;
-        b = stop;
-    }
-    return sum;
-}
-
-/* What the strips add to a box of more than three tiles along an axis. */
-static double sat__run_sum(const sat_table *t, int channel, const sat__span *x, const sat__span *y)
-{
-    int i, super = SAT__SUPER >> t->shift;
-    double sum = 0;
-    if (x->run1 > x->run0)
-        for (i = 0; i < y->count; i++) {
-            sum += sat__run(sat__left(t, channel, y->tile[i], y->end[i] - 1), 1, x->run0, x->run1, super);
-            if (y->begin[i])
-                sum -= sat__run(sat__left(t, channel, y->tile[i], y->begin[i] - 1), 1, x->run0, x->run1, super);
-        }
-    if (y->run1 > y->run0)
-        for (i = 0; i < x->count; i++)
-            sum += sat__run_above(t, channel, y, x->tile[i] << t->shift, x->begin[i], x->end[i]);
-    if (x->run1 > x->run0 && y->run1 > y->run0) sum += sat__run_whole(t, channel, x, y);
-    return sum;
-}
-
 /* Kept out of the short way, which would save registers for them. */
 #if defined(__GNUC__)
 #define SAT__APART __attribute__((noinline))
@@ -3289,7 +3249,7 @@ SAT__APART static double sat__giant_sum(const sat_table *t, int channel, int x0,
     return sum;
 }
 
-/* The sum over a box that is not empty and inside the table, tile by tile. */
+/* The sum over a box of at most 3 x 3 tiles that is not empty and inside the table, tile by tile. */
 SAT__APART static double sat__tiles_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
 {
     sat__span x, y;
@@ -3300,42 +3260,100 @@ SAT__APART static double sat__tiles_sum(const sat_table *t, int channel, int x0,
     for (j = 0; j < y.count; j++)
         for (i = 0; i < x.count; i++)
             sum += sat__tile_part(t, channel, y.tile[j], x.tile[i], x.begin[i], y.begin[j], x.end[i], y.end[j]);
-    if (x.run1 > x.run0 || y.run1 > y.run0) sum += sat__run_sum(t, channel, &x, &y);
     return sum;
 }
 
-/* The same where at most 2 x 2 tiles are touched, as nearly all boxes up to a tile's side: always four tiles, of which
-   those that are not there are masked. Whether a border lies in the box is chance, and a wrong guess costs more than
-   all of this. */
-static inline double sat__tiled_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+/* The sum from the corner of a super tile, which is tile (super_x, super_y), up to (x, y) inside it or on its border. */
+static inline double sat__super_corner(const sat_table *t, int channel, int super_x, int super_y, int x, int y)
 {
-    const int shift = t->shift, inner = (1 << shift) - 1, xe = x1 - 1, ye = y1 - 1, tx = x0 >> shift, ty = y0 >> shift;
-    const int right = (xe >> shift) - tx, below = (ye >> shift) - ty, left = (x0 & inner) != 0, top = (y0 & inner) != 0;
-    double sum;
-    if ((right | below) > 1) sum = sat__tiles_sum(t, channel, x0, y0, x1, y1);
-    else {
-        const sat__tile *a =
-            t->tiles + ((size_t)channel * (size_t)t->tiles_y + (size_t)ty) * (size_t)t->tiles_x + (size_t)tx;
-        const sat__tile *b = a + right, *c = a + (t->tiles_x & -below), *d = c + right;
-        const uint32_t *cells = (const uint32_t *)(const void *)t->sums + (size_t)channel * t->plane;
-        const uint32_t keep_right = 0u - (uint32_t)right, keep_below = 0u - (uint32_t)below,
-                       keep_left = 0u - (uint32_t)left, keep_top = 0u - (uint32_t)top;
-        const int xm = xe - ((xe - (x0 | inner)) & -right), ym = ye - ((ye - (y0 | inner)) & -below),
-                  yh = ym + ((y0 - 1 - ym) & -top);
-        const size_t xl = (size_t)(x0 - left);
-        const uint32_t *high = cells + (size_t)yh * t->stride, *middle = cells + (size_t)ym * t->stride,
-                       *low = cells + (size_t)ye * t->stride;
-        uint32_t da = (middle[xm] - (middle[xl] & keep_left)) - ((high[xm] - (high[xl] & keep_left)) & keep_top);
-        uint32_t db = (middle[xe] - (high[xe] & keep_top)) & keep_right;
-        uint32_t dc = (low[xm] - (low[xl] & keep_left)) & keep_below, dd = low[xe] & keep_right & keep_below;
-        if (a->slot | a->spikes | b->slot | b->spikes | c->slot | c->spikes | d->slot | d->spikes)
-            sum = sat__tiles_sum(t, channel, x0, y0, x1, y1);
-        else {
-            sum = (double)(int32_t)da * a->quantum + (double)(int32_t)db * b->quantum;
-            sum = sum + (double)(int32_t)dc * c->quantum + (double)(int32_t)dd * d->quantum;
+    const int shift = t->shift, inner = (1 << shift) - 1, tx = x >> shift, ty = y >> shift, in_x = x & inner,
+              in_y = y & inner;
+    double sum = 0;
+    if (tx > super_x && ty > super_y) sum = t->whole[sat__tile_index(t, channel, ty - 1, tx - 1)];
+    if (in_x && ty > super_y) sum += sat__above(t, channel, ty - 1)[x - 1];
+    if (in_y && tx > super_x) sum += sat__left(t, channel, ty, in_y - 1)[tx - 1];
+    if (in_x && in_y) {
+        const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, ty, tx)];
+        if (tile->slot || tile->spikes) sum += sat__tile_part(t, channel, ty, tx, 0, 0, in_x, in_y);
+        else sum += (double)(int32_t)sat__cells(t, channel, ty, in_y - 1)[x - 1] * tile->quantum;
+    }
+    return sum;
+}
+
+/* Larger boxes: four corners in each super tile that they touch. */
+SAT__APART static double sat__supers_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+{
+    const int inner = SAT__SUPER - 1, shift = t->shift;
+    double sum = 0;
+    int x, y, x_end, y_end;
+    for (y = y0; y < y1; y = y_end) {
+        int super_y = (y & ~inner) >> shift;
+        y_end = sat__min_int(y1 - 1, y | inner) + 1;
+        for (x = x0; x < x1; x = x_end) {
+            int super_x = (x & ~inner) >> shift;
+            x_end = sat__min_int(x1 - 1, x | inner) + 1;
+            sum += (sat__super_corner(t, channel, super_x, super_y, x_end, y_end) -
+                    sat__super_corner(t, channel, super_x, super_y, x, y_end)) -
+                   (sat__super_corner(t, channel, super_x, super_y, x_end, y) -
+                    sat__super_corner(t, channel, super_x, super_y, x, y));
         }
     }
+    return sum;
+}
+
+/* Boxes of more than 2 x 2 tiles, and all boxes of a table with giants. */
+SAT__APART static double sat__hard_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+{
+    const int right = ((x1 - 1) >> t->shift) - (x0 >> t->shift), below = ((y1 - 1) >> t->shift) - (y0 >> t->shift);
+    double sum = right > 2 || below > 2 ? sat__supers_sum(t, channel, x0, y0, x1, y1)
+                                        : sat__tiles_sum(t, channel, x0, y0, x1, y1);
     return t->has_giants ? sum + sat__giant_sum(t, channel, x0, y0, x1, y1) : sum;
+}
+
+static inline int sat__is_plain(const sat__tile *tile) { return !(tile->slot | tile->spikes); }
+
+/* Of one row of cells: what lies in [x0, x1) of a tile; `left` is 0 where x0 is the tile's first pixel. */
+#define SAT__ACROSS(row, x0, x1, left) ((row)[(x1) - 1] - ((row)[(x0) - (int)((left) & 1)] & (left)))
+
+/* A box that is not empty and inside the table. Nearly all boxes up to a tile's side touch 1, 2 or 4 plain tiles. */
+static inline double sat__tiled_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+{
+    const int shift = t->shift, inner = (1 << shift) - 1, tx = x0 >> shift, ty = y0 >> shift;
+    const int right = ((x1 - 1) >> shift) - tx, below = ((y1 - 1) >> shift) - ty;
+    const uint32_t left = 0u - (uint32_t)((x0 & inner) != 0), top = 0u - (uint32_t)((y0 & inner) != 0);
+    const sat__tile *a = t->tiles + ((size_t)channel * (size_t)t->tiles_y + (size_t)ty) * (size_t)t->tiles_x + (size_t)tx;
+    const uint32_t *cells = (const uint32_t *)(const void *)t->sums + (size_t)channel * t->plane;
+    const uint32_t *high = cells + (size_t)(y0 - (int)(top & 1)) * t->stride,
+                   *low = cells + (size_t)(y1 - 1) * t->stride;
+    const int xm = (x0 | inner) + 1;
+    double sum;
+    if (t->has_giants || (right | below) > 1) return sat__hard_sum(t, channel, x0, y0, x1, y1);
+    if (!below) {
+        if (!right) {
+            if (!sat__is_plain(a)) return sat__tiles_sum(t, channel, x0, y0, x1, y1);
+            return (double)(int32_t)(SAT__ACROSS(low, x0, x1, left) - (SAT__ACROSS(high, x0, x1, left) & top)) *
+                   a->quantum;
+        }
+        if (!(sat__is_plain(a) & sat__is_plain(a + 1))) return sat__tiles_sum(t, channel, x0, y0, x1, y1);
+        sum = (double)(int32_t)(SAT__ACROSS(low, x0, xm, left) - (SAT__ACROSS(high, x0, xm, left) & top)) * a->quantum;
+        return sum + (double)(int32_t)(low[x1 - 1] - (high[x1 - 1] & top)) * a[1].quantum;
+    } else {
+        const uint32_t *middle = cells + (size_t)(y0 | inner) * t->stride;
+        const sat__tile *c = a + t->tiles_x;
+        if (!right) {
+            if (!(sat__is_plain(a) & sat__is_plain(c))) return sat__tiles_sum(t, channel, x0, y0, x1, y1);
+            sum = (double)(int32_t)(SAT__ACROSS(middle, x0, x1, left) - (SAT__ACROSS(high, x0, x1, left) & top)) *
+                  a->quantum;
+            return sum + (double)(int32_t)SAT__ACROSS(low, x0, x1, left) * c->quantum;
+        }
+        if (!(sat__is_plain(a) & sat__is_plain(a + 1) & sat__is_plain(c) & sat__is_plain(c + 1)))
+            return sat__tiles_sum(t, channel, x0, y0, x1, y1);
+        sum = (double)(int32_t)(SAT__ACROSS(middle, x0, xm, left) - (SAT__ACROSS(high, x0, xm, left) & top)) *
+                  a->quantum +
+              (double)(int32_t)(middle[x1 - 1] - (high[x1 - 1] & top)) * a[1].quantum;
+        return sum + ((double)(int32_t)SAT__ACROSS(low, x0, xm, left) * c->quantum +
+                      (double)(int32_t)low[x1 - 1] * c[1].quantum);
+    }
 }
 
 /* ---- tables: building tiles */
@@ -3968,6 +3986,7 @@ static void sat__tally_flat(sat_table *t, const sat_image *image)
             const unsigned char *corner = sat__row(t, channel, t->height) + (size_t)t->width * t->element;
             total->sum_abs = t->options.kind == SAT_KIND_FLOAT ? (double)*(const float *)(const void *)corner
                                                                : *(const double *)(const void *)corner;
+            total->largest = total->sum_abs; /* as far as anybody asks: no pixel is larger */
             continue;
         }
         for (y = 0; y < t->height; y++)
@@ -4000,6 +4019,15 @@ static double sat__largest_pixel(const sat_table *t, const sat_image *image)
     return tally.largest;
 }
 
+/* A power of two keeps pixels exact that have few digits. Where it does not keep the largest one, a quantum of which that
+   pixel is a multiple is as good for the others and keeps constant images; it is never below `least`. */
+static double sat__quantum_of_largest(double power, double least, double largest)
+{
+    double steps = floor(largest / least * (1 + 4e-16));
+    if (!(largest > 0) || steps < 1 || floor(largest / power) == largest / power) return power;
+    return largest / steps;
+}
+
 /* What a fixed-point box sum may reach, in quanta, divided by the pixels of a box. */
 static double sat__fixed_range(const sat_table *t)
 {
@@ -4029,6 +4057,8 @@ static sat_result sat__resolve(sat_table *t, const sat_image *image)
         if (largest > t->limit) largest = t->limit;
         if (!(largest > 0)) return SAT_OK; /* a black image settles nothing */
         t->quantum = sat__power_of_two(largest / range);
+        if (!(t->options.max_value > 0) && (image->format == SAT_F32 || image->format == SAT_F16 || t->quantum > 1))
+            t->quantum = sat__quantum_of_largest(t->quantum, largest / range, sat__largest_pixel(t, image));
     }
     if (range * t->quantum < t->limit) t->limit = range * t->quantum;
     return SAT_OK;
@@ -4099,6 +4129,18 @@ static void sat__clear(sat_table *t)
     memset(t->mean, 0, sizeof t->mean);
 }
 
+/* FLOAT: 1 when pixels above the limit went in, which the largest one or the sum of all shows. Without this they would be
+   clamped only where some sum overflows, and a stream cannot know that. */
+static int sat__beyond_limit(sat_table *t, const sat_image *image, sat__build *b)
+{
+    int channel, beyond = 0;
+    if (b->care == SAT__CLAMP_ALL || t->options.kind != SAT_KIND_FLOAT) return 0;
+    sat__tally_flat(t, image);
+    for (channel = 0; channel < t->channels; channel++) beyond |= t->total[channel].largest > t->limit;
+    if (beyond) b->care = SAT__CLAMP_ALL - 1;
+    return beyond;
+}
+
 /* Tile rows [first_band, last_band) anew, then the strips below; flat tables anew altogether. */
 static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_band, int last_band)
 {
@@ -4120,7 +4162,7 @@ static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_b
     } else {
         for (; b.care <= SAT__CLAMP_ALL; b.care++) {
             sat__build_flat(&b);
-            if (!sat__total(t)) break;
+            if (!sat__total(t) && !sat__beyond_limit(t, image, &b)) break;
         }
     }
 #ifdef SAT__SSE2
@@ -4131,7 +4173,8 @@ static sat_result sat__rebuild(sat_table *t, const sat_image *image, int first_b
         if (t->total[channel].nan || t->total[channel].infinite)
             t->refused = t->options.non_finite == SAT_NON_FINITE_REFUSE;
     if (t->refused) sat__clear(t);
-    else if (t->options.kind == SAT_KIND_FLOAT || t->options.kind == SAT_KIND_DOUBLE) sat__tally_flat(t, image);
+    else if (t->options.kind == SAT_KIND_DOUBLE || (t->options.kind == SAT_KIND_FLOAT && b.care == SAT__CLAMP_ALL))
+        sat__tally_flat(t, image);
     return t->refused ? SAT_ERR_NON_FINITE : SAT_OK;
 }
 
@@ -4239,6 +4282,89 @@ SAT_DEF double sat_sum(const sat_table *table, int channel, int x0, int y0, int 
     if (table->options.kind == SAT_KIND_TILED) return sat__tiled_sum(table, channel, x0, y0, x1, y1);
     rows = sat__rows_at(table, channel, y0, y1);
     return sat__rows_sum(table, table->options.kind, &rows, channel, x0, x1, y1 - y0);
+}
+
+/* Asks for the cells that a box will read. Which ones these are may be guessed: a wrong line costs little. */
+#if defined(SAT__SSE2)
+#define SAT__PREFETCH(p) _mm_prefetch((const char *)(const void *)(p), _MM_HINT_T0)
+#elif defined(__GNUC__)
+#define SAT__PREFETCH(p) __builtin_prefetch(p)
+#else
+#define SAT__PREFETCH(p) (void)(p)
+#endif
+
+static inline void sat__prefetch_row(const sat_table *t, int channel, int y, int x0, int x1)
+{
+    const unsigned char *row = sat__row(t, channel, y);
+    SAT__PREFETCH(row + (size_t)x0 * t->element);
+    SAT__PREFETCH(row + (size_t)x1 * t->element);
+}
+
+static void sat__prefetch_box(const sat_table *t, int channel, const int *box)
+{
+    const int inner = t->options.tile - 1, shift = t->shift, tiled = t->options.kind == SAT_KIND_TILED;
+    int x0 = box[0], y0 = box[1], x1 = box[2], y1 = box[3];
+    if (!sat__clip_box(t, &x0, &y0, &x1, &y1)) return;
+    x0 -= tiled && x0;
+    x1 -= tiled;
+    y0 -= tiled && y0;
+    y1 -= tiled;
+    sat__prefetch_row(t, channel, y0, x0, x1);
+    sat__prefetch_row(t, channel, y1, x0, x1);
+    if (!tiled) return;
+    if (((x1 >> shift) - (x0 >> shift)) > 2 || ((y1 >> shift) - (y0 >> shift)) > 2) {
+        const double *high = sat__above(t, channel, sat__max_int(0, (y0 >> shift) - 1)),
+                     *low = sat__above(t, channel, sat__max_int(0, (y1 >> shift) - 1));
+        SAT__PREFETCH(high + x0);
+        SAT__PREFETCH(high + x1);
+        SAT__PREFETCH(low + x0);
+        SAT__PREFETCH(low + x1);
+        SAT__PREFETCH(sat__left(t, channel, y0 >> shift, y0 & inner) + (x0 >> shift));
+        SAT__PREFETCH(sat__left(t, channel, y1 >> shift, y1 & inner) + (x1 >> shift));
+        return;
+    }
+    x0 = (x0 + 1) | inner;
+    if (((y0 + 1) | inner) < y1) sat__prefetch_row(t, channel, (y0 + 1) | inner, sat__min_int(x0, x1), x1);
+    if (x0 < x1) {
+        sat__prefetch_row(t, channel, y0, x0, x0);
+        sat__prefetch_row(t, channel, y1, x0, x0);
+    }
+}
+
+/* The kind is chosen once; the compiler makes a loop for each. */
+static inline void sat__sums(double *out, const sat_table *t, sat_kind kind, int channel, const int *boxes,
+                             size_t count)
+{
+    enum { AHEAD = 16 };
+    size_t i;
+    for (i = 0; i < AHEAD && i < count; i++) sat__prefetch_box(t, channel, boxes + 4 * i);
+    for (i = 0; i < count; i++) {
+        int x0 = boxes[4 * i], y0 = boxes[4 * i + 1], x1 = boxes[4 * i + 2], y1 = boxes[4 * i + 3];
+        if (count - i > AHEAD) sat__prefetch_box(t, channel, boxes + 4 * (i + AHEAD));
+        if (!sat__clip_box(t, &x0, &y0, &x1, &y1)) out[i] = 0;
+        else if (kind == SAT_KIND_TILED) out[i] = sat__tiled_sum(t, channel, x0, y0, x1, y1);
+        else {
+            sat__rows rows = sat__rows_at(t, channel, y0, y1);
+            out[i] = sat__rows_sum(t, kind, &rows, channel, x0, x1, y1 - y0);
+        }
+    }
+}
+
+SAT_DEF void sat_sums(double *out, const sat_table *table, int channel, const int *boxes, size_t count)
+{
+    size_t i;
+    if (!out || !boxes) return;
+    if (!table || channel < 0 || channel >= table->channels) {
+        for (i = 0; i < count; i++) out[i] = 0;
+        return;
+    }
+    switch (table->options.kind) {
+    case SAT_KIND_TILED: sat__sums(out, table, SAT_KIND_TILED, channel, boxes, count); break;
+    case SAT_KIND_FLOAT: sat__sums(out, table, SAT_KIND_FLOAT, channel, boxes, count); break;
+    case SAT_KIND_DOUBLE: sat__sums(out, table, SAT_KIND_DOUBLE, channel, boxes, count); break;
+    case SAT_KIND_FIXED32: sat__sums(out, table, SAT_KIND_FIXED32, channel, boxes, count); break;
+    case SAT_KIND_FIXED64: sat__sums(out, table, SAT_KIND_FIXED64, channel, boxes, count); break;
+    }
 }
 
 SAT_DEF double sat_mean(const sat_table *table, int channel, int x0, int y0, int x1, int y1)
@@ -4626,7 +4752,7 @@ static double sat__sum_bound(const sat_table *t, const sat__tally *total, double
     case SAT_KIND_FLOAT: return 4 * u * 1.01 * sat__roundings(height, width) * all + lowered + doubles;
     case SAT_KIND_DOUBLE: return 4 * v * sat__roundings(height, width) * all + lowered + doubles;
     case SAT_KIND_FIXED32:
-    case SAT_KIND_FIXED64: return area * (0.5 * t->quantum + v * t->limit);
+    case SAT_KIND_FIXED64: return area * (0.5 * t->quantum + 4 * v * t->limit);
     case SAT_KIND_TILED: break;
     }
     return area * 0.5 * total->tile_largest + doubles;
@@ -4639,6 +4765,49 @@ SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_widt
     w = sat__min_int(box_width, table->width);
     h = sat__min_int(box_height, table->height);
     return sat__sum_bound(table, &table->total[channel], w, h) / (w * h);
+}
+
+/* What the doubles of a box may lose: `few` v times the magnitudes of all tiles that they sum, which are those of the box
+   or, beyond three tiles a side, of its super tiles; a tile's sum is below 2^31 quanta. */
+static double sat__box_doubles(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+{
+    const double v = 1.1102230246251565e-16; /* 2^-53 */
+    int tx0 = x0 >> t->shift, ty0 = y0 >> t->shift, tx1 = (x1 - 1) >> t->shift, ty1 = (y1 - 1) >> t->shift, tx, ty, i;
+    double sum = 0, few = 32;
+    if (tx1 - tx0 > 2 || ty1 - ty0 > 2) {
+        int super = (SAT__SUPER >> t->shift) - 1;
+        tx0 &= ~super;
+        ty0 &= ~super;
+        tx1 = sat__min_int(tx1 | super, t->tiles_x - 1);
+        ty1 = sat__min_int(ty1 | super, t->tiles_y - 1);
+        few = 16.0 * (2.0 * super + 2 + (tx1 - tx0) / super + (ty1 - ty0) / super);
+    }
+    for (ty = ty0; ty <= ty1; ty++)
+        for (tx = tx0; tx <= tx1; tx++) {
+            size_t index = sat__tile_index(t, channel, ty, tx);
+            sum += t->tiles[index].quantum * 2147483648.0;
+            for (i = 0; i < t->tiles[index].spikes; i++)
+                sum += fabs((double)t->spikes[index * SAT__SPIKES + (size_t)i].value);
+        }
+    return few * v * (sum + (t->has_giants ? fabs(sat__giant_sum(t, channel, x0, y0, x1, y1)) : 0));
+}
+
+SAT_DEF double sat_error_bound_box(const sat_table *table, int channel, int x0, int y0, int x1, int y1)
+{
+    const sat_table *t = table;
+    double sum = 0, area;
+    int tx, ty;
+    if (!t || channel < 0 || channel >= t->channels || !sat__clip_box(t, &x0, &y0, &x1, &y1)) return 0;
+    if (t->options.kind != SAT_KIND_TILED) return sat_error_bound(t, channel, x1 - x0, y1 - y0);
+    area = (double)(x1 - x0) * (double)(y1 - y0);
+    for (ty = y0 >> t->shift; ty <= (y1 - 1) >> t->shift; ty++)
+        for (tx = x0 >> t->shift; tx <= (x1 - 1) >> t->shift; tx++) {
+            const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, ty, tx)];
+            int w = sat__min_int(x1, (tx + 1) << t->shift) - sat__max_int(x0, tx << t->shift);
+            int h = sat__min_int(y1, (ty + 1) << t->shift) - sat__max_int(y0, ty << t->shift);
+            sum += 0.5 * (tile->slot ? sat__wide_quantum(tile) : tile->quantum) * ((double)w * h);
+        }
+    return (sum + sat__box_doubles(t, channel, x0, y0, x1, y1)) / area;
 }
 
 /* The last rounding of each corner is independent of the others, and so are those that the corners of a box do not
@@ -5175,8 +5344,7 @@ static void sat__stream_take(sat_stream *s, const sat_image *row)
     sat_table *t = s->table;
     uint64_t corner_row = s->taken + 1;
     int channel, x, slot = sat__ring_row(s, corner_row);
-    int care =
-        sat__first_care(t) == SAT__TRUST ? SAT__REPLACE_NON_FINITE : SAT__CLAMP_ALL; /* no row can be built again */
+    int care = SAT__CLAMP_ALL; /* no row can be built again */
     if (t->options.kind == SAT_KIND_TILED) {
         float *rows = t->ring_pixels + (size_t)(s->taken - s->built) * (size_t)t->width * (size_t)t->channels;
         for (channel = 0; channel < t->channels; channel++)

@@ -83,6 +83,10 @@ check_linkage() {
         fail "links without SAT_IMPLEMENTATION"
     elif [ -z "$forgotten" ] || grep -q "$symbol" <<<"$text"; then pass
     else fail "the link error without SAT_IMPLEMENTATION does not name $symbol" "$text"; fi
+    # ... and so is one that implements nothing at all
+    text=$(${CC:-cc} "$dir/use.o" -o "$dir/forgotten" $LIBS 2>&1)
+    if ! ${CC:-cc} -dM -E -x c /dev/null 2>/dev/null | grep -q __GNUC__ || grep -q "$symbol" <<<"$text"; then pass
+    else fail "the link error without any implementation does not name $symbol" "$text"; fi
     # both implemented twice: a link error, never a silent choice
     ok "second implementation" $cc -D${LIB}_IMPLEMENTATION= -c "$dir/impl.c" -o "$dir/impl2.o"
     if ${CC:-cc} "$dir/use.o" $objects "$dir/impl2.o" -o "$dir/double" $LIBS 2>/dev/null; then

@@ -1678,13 +1678,13 @@ TEST(softassign_every_refused_problem_is_named)
     (memset(&p, 0, sizeof p), o = softassign_defaults(), p.rows = 2, p.columns = 3, p.cost = cost, p.stride = 3, (void)(change), \
      EXPECT_EQ(softassign_solve(x, &p, &o, NULL), SAT_ERR_ARGUMENT),                                                             \
      EXPECT(strcmp(softassign_explain_problem(text, sizeof text, &p, &o), words) == 0) ? (void)0 : (void)puts(text))
-    REFUSED(p.rows = 0, "rows is 0; 1..2.14748e9");
-    REFUSED(p.columns = -1, "columns is -1; 1..2.14748e9");
+    REFUSED(p.rows = 0, "rows is 0; 1..2147483647");
+    REFUSED(p.columns = -1, "columns is -1; 1..2147483647");
     REFUSED(p.stride = 2, "stride is shorter than a row of the matrix");
     REFUSED(p.cost = NULL, "cost, cost_fn and row_features are NULL");
     REFUSED((p.cost = NULL, p.row_features = cost), "column_features is NULL");
-    REFUSED((p.cost = NULL, p.row_features = p.column_features = cost), "feature_count is 0; 1..2.14748e9");
-    REFUSED(p.capacity = bad, "capacity[1] is -1; 0..2.14748e9");
+    REFUSED((p.cost = NULL, p.row_features = p.column_features = cost), "feature_count is 0; 1..2147483647");
+    REFUSED(p.capacity = bad, "capacity[1] is -1; 0..2147483647");
     REFUSED(p.minimum_use = less, "minimum_use[1] is 2; 0..1");
     REFUSED(p.previous = stay, "previous[1] is 3; -1..2");
     REFUSED(p.maximise = 2, "maximise is 2; 0..1");
