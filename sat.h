@@ -853,7 +853,10 @@ static inline void sat__text_whole(sat__text *t, double value)
     char out[24];
     int n = (int)sizeof out - 1;
     double rest = fabs(value);
-    for (out[n] = 0; rest >= 1 && n > 1; rest = floor(rest / 10)) out[--n] = (char)('0' + (int)fmod(rest, 10));
+    for (out[n] = 0; rest >= 1 && n > 1; rest = floor(rest / 10)) {
+        double digit = fmod(rest, 10);
+        out[--n] = (char)('0' + (int)digit);
+    }
     if (value < 0) out[--n] = '-';
     sat__text_add(t, out + n);
 }
@@ -3263,7 +3266,7 @@ SAT__APART static double sat__tiles_sum(const sat_table *t, int channel, int x0,
     return sum;
 }
 
-/* The sum from the corner of a super tile, which is tile (super_x, super_y), up to (x, y) inside it or on its border. */
+/* The sum from the corner of a super tile, tile (super_x, super_y), up to (x, y) inside it or on its border. */
 static inline double sat__super_corner(const sat_table *t, int channel, int super_x, int super_y, int x, int y)
 {
     const int shift = t->shift, inner = (1 << shift) - 1, tx = x >> shift, ty = y >> shift, in_x = x & inner,
@@ -3321,7 +3324,8 @@ static inline double sat__tiled_sum(const sat_table *t, int channel, int x0, int
     const int shift = t->shift, inner = (1 << shift) - 1, tx = x0 >> shift, ty = y0 >> shift;
     const int right = ((x1 - 1) >> shift) - tx, below = ((y1 - 1) >> shift) - ty;
     const uint32_t left = 0u - (uint32_t)((x0 & inner) != 0), top = 0u - (uint32_t)((y0 & inner) != 0);
-    const sat__tile *a = t->tiles + ((size_t)channel * (size_t)t->tiles_y + (size_t)ty) * (size_t)t->tiles_x + (size_t)tx;
+    const sat__tile *a =
+        t->tiles + ((size_t)channel * (size_t)t->tiles_y + (size_t)ty) * (size_t)t->tiles_x + (size_t)tx;
     const uint32_t *cells = (const uint32_t *)(const void *)t->sums + (size_t)channel * t->plane;
     const uint32_t *high = cells + (size_t)(y0 - (int)(top & 1)) * t->stride,
                    *low = cells + (size_t)(y1 - 1) * t->stride;
@@ -4019,8 +4023,8 @@ static double sat__largest_pixel(const sat_table *t, const sat_image *image)
     return tally.largest;
 }
 
-/* A power of two keeps pixels exact that have few digits. Where it does not keep the largest one, a quantum of which that
-   pixel is a multiple is as good for the others and keeps constant images; it is never below `least`. */
+/* A power of two keeps pixels exact that have few digits. Where it does not keep the largest one, a quantum of which
+   that pixel is a multiple is as good for the others and keeps constant images; it is never below `least`. */
 static double sat__quantum_of_largest(double power, double least, double largest)
 {
     double steps = floor(largest / least * (1 + 4e-16));
@@ -4129,8 +4133,8 @@ static void sat__clear(sat_table *t)
     memset(t->mean, 0, sizeof t->mean);
 }
 
-/* FLOAT: 1 when pixels above the limit went in, which the largest one or the sum of all shows. Without this they would be
-   clamped only where some sum overflows, and a stream cannot know that. */
+/* FLOAT: 1 when pixels above the limit went in, which the largest one or the sum of all shows. Without this they would
+   be clamped only where some sum overflows, and a stream cannot know that. */
 static int sat__beyond_limit(sat_table *t, const sat_image *image, sat__build *b)
 {
     int channel, beyond = 0;
@@ -4767,8 +4771,8 @@ SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_widt
     return sat__sum_bound(table, &table->total[channel], w, h) / (w * h);
 }
 
-/* What the doubles of a box may lose: `few` v times the magnitudes of all tiles that they sum, which are those of the box
-   or, beyond three tiles a side, of its super tiles; a tile's sum is below 2^31 quanta. */
+/* What the doubles of a box may lose: `few` v times the magnitudes of all tiles that they sum, which are those of the
+   box or, beyond three tiles a side, of its super tiles; a tile's sum is below 2^31 quanta. */
 static double sat__box_doubles(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
 {
     const double v = 1.1102230246251565e-16; /* 2^-53 */
