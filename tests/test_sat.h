@@ -1141,11 +1141,11 @@ TEST(fixed32_reads_constant_images_exactly)
         EXPECT_NEAR(sat_restore(t, 0, 5, 5), p[0], 0);
         EXPECT_NEAR(sat_mean(t, 0, 0, 0, N, N), (double)p[0], 1e-15 * (double)p[0]);
         EXPECT_NEAR(sat_mean(t, 0, 3, 4, 500, 777), (double)p[0], 1e-15 * (double)p[0]);
-        EXPECT_EQ(sat_get_statistics(t).clamped, 0);
+        EXPECT_EQ(sat_get_stats(t).clamped, 0);
         if (v == 4) { /* a brighter frame fits, too */
             for (i = 0; i < N * N; i++) q[i] = 65535;
             EXPECT_EQ(sat_build(t, &view), SAT_OK);
-            EXPECT_EQ(sat_get_statistics(t).clamped, 0);
+            EXPECT_EQ(sat_get_stats(t).clamped, 0);
         }
         sat_destroy(t);
     }
@@ -1172,7 +1172,7 @@ TEST(streams_of_huge_pixels_equal_the_whole_image)
             p[40 * W + 9] = 1e33f, p[40 * W + 10] = 3.4e38f, p[3] = 4e35f, p[50 * W] = signs ? -3e38f : 2e29f;
             o.kind = kinds[k];
             t = build(&view, &o);
-            if (o.kind == SAT_KIND_FLOAT) EXPECT_EQ(sat_get_statistics(t).clamped, 4);
+            if (o.kind == SAT_KIND_FLOAT) EXPECT_EQ(sat_get_stats(t).clamped, 4);
             whole = filtered(t, W, H, 1, 2);
             if (!EXPECT_EQ(sat_stream_create(&s, W, 1, 2, &o), SAT_OK)) return;
             for (y = 0;; y++) {
