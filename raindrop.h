@@ -360,7 +360,8 @@ typedef enum raindrop_look {
 typedef struct raindrop_render_options {
     raindrop_look look;        /* RAINDROP_LOOK_AUTO */
     const raindrop_map *map;   /* NULL; needed by RAINDROP_LOOK_MAP */
-    float far_radius;          /* 1.5 px; 0..64: AUTO takes smaller drops for far; more is faster and coarser */
+    float far_radius;          /* 1.5 px; 0..64: AUTO takes smaller drops for far; more is faster and coarser. RAY and
+                                  AUTO do so with all below 1.4, of which a ray a pixel would see too little */
     float coverage_threshold;  /* 0.0001; 0..1: drops that cover less of a pixel are left out and counted */
     int orders;                /* 1; 0..3: internal reflections, RAY and AUTO */
     int exit_fresnel;          /* 0: the last order carries what later ones would (0 orders: eq 2.5); 1: only its own */
@@ -1836,15 +1837,17 @@ struct raindrop_rain {
     size_t bytes;
 };
 
-static const double raindrop__gravity = 9.80665 * (1 - 1.204 / 998.2); /* less the air's buoyancy */
-static const double raindrop__viscosity = 1.81e-5, raindrop__density = 998.2;
+/* Written as GLSL has them too. */
+#define RAINDROP__GRAVITY (9.80665 * (1.0 - 1.204 / 998.2)) /* m/s^2; less the air's buoyancy */
+#define RAINDROP__VISCOSITY 1.81e-5                         /* of air, Pa s */
+#define RAINDROP__DENSITY 998.2                             /* of water, kg/m^3 */
 
 /* Stokes' law for the smallest and Best 1950 for the others, blended; rms 4 % of Gunn and Kinzer's table. */
 RAINDROP_DEF double raindrop_terminal_velocity(double diameter_mm)
 {
     double d = diameter_mm * 1e-3, stokes, best, slow;
     if (!(diameter_mm > 0)) return 0;
-    stokes = raindrop__gravity * raindrop__density * d * d / (18 * raindrop__viscosity);
+    stokes = RAINDROP__GRAVITY * RAINDROP__DENSITY * d * d / (18 * RAINDROP__VISCOSITY);
     best = 9.32 * -expm1(-pow(diameter_mm / 1.77, 1.147));
     slow = stokes < best ? stokes : best; /* factored out: no power of a small number underflows */
     return slow * pow(pow(slow / stokes, 4) + pow(slow / best, 4), -0.25);
@@ -1885,11 +1888,11 @@ static inline raindrop__drag raindrop__drag_of(double radius)
     raindrop__drag drag;
     double d = 2 * radius;
     drag.vt = raindrop_terminal_velocity(d * 1e3);
-    drag.a = 18 * raindrop__viscosity / (raindrop__density * d * d);
-    drag.b = (raindrop__gravity - drag.a * drag.vt) / (drag.vt * drag.vt);
+    drag.a = 18 * RAINDROP__VISCOSITY / (RAINDROP__DENSITY * d * d);
+    drag.b = (RAINDROP__GRAVITY - drag.a * drag.vt) / (drag.vt * drag.vt);
     if (!(drag.b > 0)) {
         drag.b = 0;
-        drag.a = raindrop__gravity / drag.vt;
+        drag.a = RAINDROP__GRAVITY / drag.vt;
     }
     return drag;
 }
@@ -1910,7 +1913,7 @@ static inline raindrop__phase raindrop__sink(double v, const raindrop__drag *dra
 /* s' = -(g + a s + b s^2) for a speed s upwards, at most until s = 0; *h becomes the time that is left. */
 static inline raindrop__phase raindrop__rise(double s, const raindrop__drag *drag, double *h)
 {
-    const double g = raindrop__gravity, a = drag->a, b = drag->b, discriminant = a * a - 4 * b * g;
+    const double g = RAINDROP__GRAVITY, a = drag->a, b = drag->b, discriminant = a * a - 4 * b * g;
     raindrop__phase out;
     double apex, t, end, way;
     if (discriminant > 0) { /* roots -r1, -r2 of b s^2 + a s + g: (s + r1)/(s + r2) decays like exp(-root t) */
@@ -2357,6 +2360,10 @@ RAINDROP_DEF raindrop_render_options raindrop_render_defaults(void)
 }
 
 enum { RAINDROP__BAND = 16, RAINDROP__BATCH = 128 };
+#define RAINDROP__LEAST_RADIUS 1.4f /* pixels; smaller drops are far in every look but the sprites; and those that are
+                                       blurred less than this are not round */
+#define RAINDROP__LEAST_BLUR 0.61f  /* pixels; such a disc cancels what a lattice of pixels would add */
+#define RAINDROP__SHORT 2.5f        /* pixels; shorter streaks are two still drops */
 #define RAINDROP__FAR_BIT 0x80000000u
 
 typedef struct raindrop__frame {
@@ -2443,18 +2450,40 @@ static inline float raindrop__sprite_half(const raindrop__frame *frame, const ra
     return half > 0.5f ? half : 0.5f;
 }
 
-/* Radius of the round, soft disc that stands for a drop that is moving or out of focus: the second moments of the
-   drop, the circle of confusion and the pixel add up. */
-static inline float raindrop__soft_radius(const raindrop__visible *v)
+/* A far drop, moving or not: a parallelogram with the drop's area and, for every streak, its second moments: of a disc
+   of area a that moves by (sx, sy), |sy| >= |sx| (else x and y change places), those of a square of that area and the
+   way, (a + sx^2)/12, sx sy/12 and (a + sy^2)/12. Two edges are level: its share of a pixel is a sum of squares, and
+   the shares of all pixels sum to its area exactly, wherever it stands. */
+typedef struct raindrop__shape { float half_height, slope, half_width, opacity; int swapped; } raindrop__shape;
+
+static inline raindrop__shape raindrop__far_shape(const raindrop__visible *v)
 {
-    return sqrtf(v->radius * v->radius + v->blur * v->blur + 1.0f / 3);
+    raindrop__shape shape;
+    float a = (float)RAINDROP__PI * (v->radius * v->radius + v->blur * v->blur), across, along, height2;
+    shape.swapped = fabsf(v->streak[0]) > fabsf(v->streak[1]);
+    across = shape.swapped ? v->streak[1] : v->streak[0];
+    along = shape.swapped ? v->streak[0] : v->streak[1];
+    height2 = along * along + a;
+    shape.slope = across * along / height2;
+    shape.half_height = 0.5f * sqrtf(height2);
+    shape.half_width = 0.5f * sqrtf(a * (1 + across * across / height2));
+    shape.opacity = (float)RAINDROP__PI * v->radius * v->radius / (4 * shape.half_height * shape.half_width);
+    return shape;
+}
+
+/* Far drops that are blurred much stay round. */
+static inline int raindrop__is_round(const raindrop__visible *v) { return v->blur > RAINDROP__LEAST_RADIUS; }
+
+static inline float raindrop__path_radius(const raindrop__visible *v)
+{
+    return v->blur > 0.25f ? sqrtf(v->radius * v->radius + v->blur * v->blur) : v->radius;
 }
 
 /* The pixels a drop may touch. */
 static inline raindrop__box raindrop__bounds(const raindrop__frame *frame, const raindrop__visible *v,
                                              const raindrop__placed *placed)
 {
-    float across[2], up[2], wide = 0.5f, ax = 0.5f * fabsf(v->streak[0]) + 0.5f + v->blur,
+    float across[2], up[2], ax = 0.5f * fabsf(v->streak[0]) + 0.5f + v->blur,
                             ay = 0.5f * fabsf(v->streak[1]) + 0.5f + v->blur;
     if (raindrop__is_sprite(frame)) {
         float half = raindrop__sprite_half(frame, placed);
@@ -2462,9 +2491,16 @@ static inline raindrop__box raindrop__bounds(const raindrop__frame *frame, const
                                   floorf(v->x + half - 0.5f) + 1, floorf(v->y + half - 0.5f) + 1);
     }
     if (v->drop & RAINDROP__FAR_BIT) {
-        wide = raindrop__is_still(v) ? 0.886227f * v->radius : raindrop__soft_radius(v) + 0.5f * fabsf(v->streak[0]);
-        ay = raindrop__is_still(v) ? wide : raindrop__soft_radius(v) + 0.5f * fabsf(v->streak[1]);
-        return raindrop__make_box(frame, v->x - wide, v->y - ay, v->x + wide, v->y + ay);
+        if (raindrop__is_round(v)) {
+            ax += v->radius;
+            ay += v->radius;
+        } else {
+            raindrop__shape shape = raindrop__far_shape(v);
+            float wide = shape.half_width + fabsf(shape.slope) * shape.half_height;
+            ax = shape.swapped ? shape.half_height : wide;
+            ay = shape.swapped ? wide : shape.half_height;
+        }
+        return raindrop__make_box(frame, v->x - ax, v->y - ay, v->x + ax, v->y + ay);
     }
     raindrop__tangents(across, placed->x, placed->z, placed->radius);
     raindrop__tangents(up, placed->y, placed->z, placed->radius);
@@ -2511,6 +2547,8 @@ static inline void raindrop__add_motion(raindrop__visible *v, const raindrop__fr
     if (camera->aperture > 0)
         v->blur = raindrop__clamp(
             0.5f * camera->aperture * frame->focal * fabsf(1 / placed->z - 1 / camera->focus_distance), 0, 1e5f);
+    if (v->streak[0] * v->streak[0] + v->streak[1] * v->streak[1] + v->blur * v->blur < 1e-4f)
+        v->streak[0] = v->streak[1] = v->blur = 0;
 }
 #endif
 
@@ -2575,7 +2613,10 @@ static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop
     v->y = frame->half_height - frame->focal * placed.y / placed.z;
     v->depth = placed.z;
     v->drop = index;
-    if (frame->options.look == RAINDROP_LOOK_AUTO && v->radius < frame->options.far_radius) {
+    if (!raindrop__is_sprite(frame) &&
+        v->radius < (frame->options.look == RAINDROP_LOOK_AUTO && frame->options.far_radius > RAINDROP__LEAST_RADIUS
+                         ? frame->options.far_radius
+                         : RAINDROP__LEAST_RADIUS)) {
         v->drop |= RAINDROP__FAR_BIT;
         fate = RAINDROP__FAR;
     }
@@ -2583,7 +2624,7 @@ static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop
     if (box.x0 >= box.x1 || box.y0 >= box.y1) return RAINDROP__OUTSIDE;
     if (raindrop__all_occluded(frame, &box, v->depth)) return RAINDROP__HIDDEN;
     v->rows = (uint32_t)box.y0 << 16 | (uint32_t)box.y1;
-    if (fate == RAINDROP__FAR || !raindrop__is_still(v)) {
+    if (fate == RAINDROP__FAR) {
         raindrop__to_world(world, &frame->camera, placed.x, placed.y, placed.z);
         raindrop__far(colour, frame->environment, world);
         raindrop__set(v->colour, colour[0], colour[1], colour[2]);
@@ -2670,12 +2711,54 @@ typedef struct raindrop__batch {
     float reflect_cone[RAINDROP__BATCH], refract_cone[RAINDROP__BATCH]; /* footprints in radians */
 } raindrop__batch;
 
+/* Share of a pixel on the inner side of a straight edge, s pixels from its middle: exact for any normal n, as the
+   convolution of the two boxes that a square is. A rim of radius d has a straight edge's mean coverage where the edge
+   lies 1/(24 d) farther in: half the curvature times the pixel's variance. Discs of a radius of 1 pixel or more so keep
+   their area within 2 % wherever they stand, where the distance clamped to a pixel has 8 % too much, and swings. */
+static inline float raindrop__half_plane(float s, float nx, float ny)
+{
+    float lo = fabsf(nx), hi = fabsf(ny), h, g, sum;
+    if (lo > hi) {
+        lo = hi;
+        hi = fabsf(nx);
+    }
+    lo = lo > 0.01f ? lo : 0.01f;
+    hi = hi > 0.7f ? hi : 0.7f;
+    s = raindrop__clamp(s, -1, 1);
+    h = 0.5f * (hi + lo);
+    g = 0.5f * (hi - lo);
+    sum = s + h > 0 ? (s + h) * (s + h) : 0;
+    sum -= s + g > 0 ? (s + g) * (s + g) : 0;
+    sum -= s - g > 0 ? (s - g) * (s - g) : 0;
+    sum += s - h > 0 ? (s - h) * (s - h) : 0;
+    return raindrop__clamp(0.5f * sum / (lo * hi), 0, 1);
+}
+
+/* The same for vectors: (gx, gy) any length but 0, per_length the inverse of it. */
+static inline raindrop__v raindrop__half_plane_v(raindrop__v s, raindrop__v gx, raindrop__v gy, raindrop__v per_length)
+{
+    const raindrop__v zero = raindrop__splat(0), one = raindrop__splat(1), half = raindrop__splat(0.5f);
+    raindrop__v nx = raindrop__mul(raindrop__abs(gx), per_length), ny = raindrop__mul(raindrop__abs(gy), per_length);
+    raindrop__v lo = raindrop__max(raindrop__min(nx, ny), raindrop__splat(0.01f)),
+                hi = raindrop__max(raindrop__max(nx, ny), raindrop__splat(0.7f));
+    raindrop__v h = raindrop__mul(half, raindrop__add(hi, lo)), g = raindrop__mul(half, raindrop__sub(hi, lo));
+    raindrop__v a, b, c, d;
+    s = raindrop__min(raindrop__max(s, raindrop__splat(-1)), one);
+    a = raindrop__max(raindrop__add(s, h), zero);
+    b = raindrop__max(raindrop__add(s, g), zero);
+    c = raindrop__max(raindrop__sub(s, g), zero);
+    d = raindrop__max(raindrop__sub(s, h), zero);
+    a = raindrop__add(raindrop__mul(a, a), raindrop__mul(d, d));
+    b = raindrop__add(raindrop__mul(b, b), raindrop__mul(c, c));
+    a = raindrop__div(raindrop__mul(half, raindrop__sub(a, b)), raindrop__mul(lo, hi));
+    return raindrop__min(raindrop__max(a, zero), one);
+}
+
 /* b and its gradient at a pixel decide how much of it the drop covers; p and 1-b^2 stay this side of the rim. */
 static inline void raindrop__batch_rays(raindrop__batch *batch, int keep_alpha)
 {
     const raindrop_camera *camera = &batch->frame->camera;
-    const raindrop__v one = raindrop__splat(1), half = raindrop__splat(0.5f),
-                      rim = raindrop__splat(batch->flatness < 1 ? 1e9f : 0.999f);
+    const raindrop__v one = raindrop__splat(1), rim = raindrop__splat(batch->flatness < 1 ? 1e9f : 0.999f);
     const raindrop__v k = raindrop__splat(batch->focal_in_radii), per_focal = raindrop__splat(1 / batch->frame->focal);
     int at, i;
     for (at = 0; at < batch->count; at += RAINDROP__LANES) {
@@ -2694,11 +2777,15 @@ static inline void raindrop__batch_rays(raindrop__batch *batch, int keep_alpha)
             /* half the gradient of b^2: (q - t r) (k - t / f), without the small change of the ray's length */
             raindrop__v scale = raindrop__sub(k, raindrop__mul(t, per_focal));
             raindrop__v gx = raindrop__mul(px, scale), gy = raindrop__mul(py, scale);
-            raindrop__v slope =
-                raindrop__div(raindrop__sqrt(raindrop__add(raindrop__mul(gx, gx), raindrop__mul(gy, gy))), b);
-            raindrop__v cover =
-                raindrop__add(half, raindrop__div(raindrop__sub(one, b), raindrop__max(slope, raindrop__splat(1e-9f))));
-            raindrop__store(batch->alpha + at, raindrop__min(raindrop__max(cover, raindrop__splat(0)), one));
+            raindrop__v length = raindrop__sqrt(raindrop__add(raindrop__mul(gx, gx), raindrop__mul(gy, gy)));
+            raindrop__v slope = raindrop__max(raindrop__div(length, b), raindrop__splat(1e-9f));
+            raindrop__v inside = raindrop__div(raindrop__sub(one, b), slope); /* pixels */
+            raindrop__v twice_apart =
+                raindrop__max(raindrop__mul(raindrop__splat(24), b), raindrop__mul(raindrop__splat(12), slope));
+            inside = raindrop__sub(inside, raindrop__div(slope, twice_apart));
+            raindrop__store(batch->alpha + at,
+                            raindrop__half_plane_v(inside, gx, gy,
+                                                   raindrop__div(one, raindrop__max(length, raindrop__splat(1e-20f)))));
         }
         inward = raindrop__min(one, raindrop__div(rim, b));
         raindrop__store(batch->one_minus_b2 + at,
@@ -2816,7 +2903,7 @@ static inline void raindrop__batch_lookup(float (*colour)[4], raindrop__batch *b
 static inline float raindrop__flat_cover(const raindrop__batch *batch, const float d[3], float p[3])
 {
     const raindrop_camera *camera = &batch->frame->camera;
-    float stretch = 1 / batch->flatness, unit[3], q[3], along, b, gx, gy;
+    float stretch = 1 / batch->flatness, unit[3], q[3], along, b, gx, gy, slope;
     raindrop__set(unit, d[0], d[1] * stretch, d[2]);
     raindrop__set(q, p[0], p[1] * stretch, p[2]);
     along = raindrop__dot(q, unit) / raindrop__dot(unit, unit);
@@ -2824,10 +2911,13 @@ static inline float raindrop__flat_cover(const raindrop__batch *batch, const flo
     b = sqrtf(raindrop__dot(q, q)) + 1e-9f;
     gx = q[0] * camera->right[0] + q[1] * stretch * camera->right[1] + q[2] * camera->right[2];
     gy = q[0] * camera->up[0] + q[1] * stretch * camera->up[1] + q[2] * camera->up[2];
-    gx = batch->focal_in_radii * sqrtf(gx * gx + gy * gy) / b;
+    slope = sqrtf(gx * gx + gy * gy) + 1e-20f;
     if (b > 0.999f) raindrop__combine(q, 0.999f / b, q, 0, q);
     raindrop__set(p, q[0], q[1] * batch->flatness, q[2]);
-    return raindrop__clamp((1 - b) / (gx + 1e-9f) + 0.5f, 0, 1);
+    gx /= slope;
+    gy /= slope;
+    slope = slope * batch->focal_in_radii / b + 1e-9f;
+    return raindrop__half_plane((1 - b) / slope - slope / (2 * b > slope ? 24 * b : 12 * slope), gx, gy);
 }
 
 /* One fragment of a flattened drop. */
@@ -3002,39 +3092,78 @@ static inline void raindrop__draw_still(raindrop__batch *batch, const raindrop__
 
 /* ---- motion and defocus
 
-   A disc of radius r that moves l pixels covers a pixel, u along and w across the path from the middle, for the share
-   ([u-h, u+h] cut with [-l/2, l/2]) / l of the time, h = sqrt(r^2 - w^2) being half its chord: for every l, and in the
-   limit l = 0 the disc itself. Its integral over the picture is the disc's area. */
+   A disc of radius r that moves l pixels covers a point, u along and w across the path from the middle, for the share
+   ([u-h, u+h] cut with [-l/2, l/2]) / l of the time, h = sqrt(r^2 - w^2) being half its chord. A pixel takes the mean
+   over boxes as wide, along and across, as the path needs to cross a pixel: a chord at the pixel's centre would let the
+   streak's energy swing with its place (by half for thin ones). Along it the mean of a clamped ramp is a difference of
+   squares. Of streaks shorter than RAINDROP__SHORT it is that of two still discs, the points of Gauss' quadrature. */
 
-typedef struct raindrop__path { float along[2], length, radius; } raindrop__path;
+typedef struct raindrop__path { float along[2], length, radius, width; } raindrop__path;
 
 static inline raindrop__path raindrop__path_of(const raindrop__visible *v, float radius)
 {
     raindrop__path path;
-    float length = sqrtf(v->streak[0] * v->streak[0] + v->streak[1] * v->streak[1]);
+    float length = sqrtf(v->streak[0] * v->streak[0] + v->streak[1] * v->streak[1]), x, y;
     path.along[0] = length > 1e-6f ? v->streak[0] / length : 1;
     path.along[1] = length > 1e-6f ? v->streak[1] / length : 0;
-    path.length = length > 1 ? length : 1; /* a pixel of softness along the path */
+    x = fabsf(path.along[0]);
+    y = fabsf(path.along[1]);
+    path.length = length;
     path.radius = radius;
+    path.width = 1 / (x > y ? x : y);
     return path;
+}
+
+static inline float raindrop__disc_cover(float radius, float dx, float dy)
+{
+    float apart = sqrtf(dx * dx + dy * dy) + 1e-6f;
+    return raindrop__half_plane(radius - apart - 1 / (24 * (apart > 0.5f ? apart : 0.5f)), dx / apart, dy / apart);
+}
+
+/* Half the chord's mean over a pixel: its integral is half a segment of the circle. */
+static inline float raindrop__mean_chord(const raindrop__path *path, float w)
+{
+    float r = path->radius, half = 0.5f * path->width, a = raindrop__clamp((w - half) / r, -1, 1),
+          b = raindrop__clamp((w + half) / r, -1, 1), area;
+    if (!(b > a)) return 0;
+    area = b * sqrtf((1 - b) * (1 + b)) - a * sqrtf((1 - a) * (1 + a)) + asinf(b) - asinf(a);
+    return 0.5f * r * r * area / path->width;
+}
+
+/* The mean over a pixel of v clamped to [-l/2, l/2], and l/2. */
+static inline float raindrop__mean_clamp(const raindrop__path *path, float v)
+{
+    float w = path->width, half = 0.5f * path->length, a, b, c, d;
+    a = raindrop__clamp(v + 0.5f * w + half, 0, w);
+    b = raindrop__clamp(v + 0.5f * w - half, 0, w);
+    c = v - 0.5f * w + half;
+    d = v - 0.5f * w - half;
+    return 0.5f * (a * a - b * b) / w + (c > 0 ? c : 0) - (d > 0 ? d : 0);
 }
 
 /* [from, to] along the path, in pixels from its middle, while the pixel is covered; returns its share. */
 static inline float raindrop__path_cover(float span[2], const raindrop__path *path, float dx, float dy)
 {
     float u = dx * path->along[0] + dy * path->along[1], w = dy * path->along[0] - dx * path->along[1];
-    float h2 = path->radius * path->radius - w * w, h;
-    if (h2 <= 0) return 0;
-    h = sqrtf(h2);
-    span[0] = u - h > -0.5f * path->length ? u - h : -0.5f * path->length;
-    span[1] = u + h < 0.5f * path->length ? u + h : 0.5f * path->length;
-    return span[1] > span[0] ? (span[1] - span[0]) / path->length : 0;
+    float h2 = path->radius * path->radius - w * w, h = h2 > 0 ? sqrtf(h2) : 0, half = 0.5f * path->length;
+    span[0] = raindrop__clamp(u - h, -half, half);
+    span[1] = raindrop__clamp(u + h, -half, half);
+    if (path->length < RAINDROP__SHORT) {
+        float x = 0.288675f * path->length * path->along[0], y = 0.288675f * path->length * path->along[1];
+        return 0.5f * (raindrop__disc_cover(path->radius, dx - x, dy - y) +
+                       raindrop__disc_cover(path->radius, dx + x, dy + y));
+    }
+    h = raindrop__mean_chord(path, w);
+    if (!(h > 0)) return 0;
+    return (raindrop__mean_clamp(path, u + h) - raindrop__mean_clamp(path, u - h)) / path->length;
 }
 
-static inline void raindrop__draw_far_soft(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
+/* A far drop that is far out of focus. */
+static inline void raindrop__draw_far_round(raindrop__batch *batch, const raindrop__visible *v,
+                                            const raindrop__box *box)
 {
     const raindrop__frame *frame = batch->frame;
-    raindrop__path path = raindrop__path_of(v, raindrop__soft_radius(v));
+    raindrop__path path = raindrop__path_of(v, raindrop__path_radius(v));
     float opacity = v->radius * v->radius / (path.radius * path.radius), span[2];
     int x, y;
     for (y = box->y0; y < box->y1; y++) {
@@ -3073,8 +3202,7 @@ static inline void raindrop__flush_soft(raindrop__batch *batch, float *alpha)
 static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
 {
     const raindrop__frame *frame = batch->frame;
-    raindrop__path path =
-        raindrop__path_of(v, v->blur > 0.25f ? sqrtf(v->radius * v->radius + v->blur * v->blur) : v->radius);
+    raindrop__path path = raindrop__path_of(v, raindrop__path_radius(v));
     int moving = v->streak[0] * v->streak[0] + v->streak[1] * v->streak[1] > 0.0625f, samples = !moving          ? 1
                                                                                                 : v->radius < 6  ? 4
                                                                                                 : v->radius < 24 ? 8
@@ -3091,7 +3219,7 @@ static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__v
             float dx = (float)x + 0.5f - v->x, dy = (float)y + 0.5f - v->y, cover;
             if (moving) cover = opacity * raindrop__path_cover(span, &path, dx, dy);
             else {
-                float blur = v->blur > 0.5f ? v->blur : 0.5f;
+                float blur = v->blur > RAINDROP__LEAST_BLUR ? v->blur : RAINDROP__LEAST_BLUR;
                 cover = raindrop__lens(v->radius, blur, sqrtf(dx * dx + dy * dy)) / ((float)RAINDROP__PI * blur * blur);
             }
             if (!(cover > 0) || raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth))
@@ -3108,25 +3236,49 @@ static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__v
 }
 #endif
 
-/* A far drop that stands still: a square of its area, cut exactly with the pixels. */
-static inline void raindrop__draw_far(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
+/* One row of a far drop's pixels (a column where x and y have changed places), at y0..y1 of its parallelogram: `x` is
+   the first, seen from the middle of the part of the path that is in this row, which moves by w. */
+static inline void raindrop__far_row(raindrop__batch *batch, const raindrop__visible *v, const raindrop__shape *shape,
+                                     float opacity, float x, float w, int major, int first, int last)
 {
     const raindrop__frame *frame = batch->frame;
-    float half = 0.886227f * v->radius; /* sqrt(pi)/2 */
-    int x, y;
-    for (y = box->y0; y < box->y1; y++) {
-        float low = v->y - half > (float)y ? v->y - half : (float)y,
-              high = v->y + half < (float)(y + 1) ? v->y + half : (float)(y + 1);
-        for (x = box->x0; x < box->x1; x++) {
-            float left = v->x - half > (float)x ? v->x - half : (float)x,
-                  right = v->x + half < (float)(x + 1) ? v->x + half : (float)(x + 1);
-            float alpha = (high - low) * (right - left);
-            if (!(high > low) || !(right > left) ||
-                raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth))
-                continue;
-            raindrop__blend(raindrop__pixel(frame, x, y), alpha, v->colour);
-            batch->tally->fragments++;
-        }
+    float scale = 0.5f / w, left = shape->half_width - 0.5f * w, right = shape->half_width + 0.5f * w, right_of = 0;
+    int at;
+    for (at = first; at <= last; at++, x += 1) {
+        /* the mean over the way w of what lies right of x: of ramps, whose integrals are squares */
+        float a = left - x > 0 ? left - x : 0, b = right - x > 0 ? right - x : 0, c = -right - x > 0 ? -right - x : 0,
+              d = -left - x > 0 ? -left - x : 0, more = scale * ((b - a) * (b + a) - (d - c) * (d + c)),
+              alpha = opacity * (right_of - more);
+        int px = shape->swapped ? major : at - 1, py = shape->swapped ? at - 1 : major;
+        right_of = more;
+        if (at == first || !(alpha > 0) ||
+            raindrop__occluded(frame, (size_t)py * (size_t)frame->width + (size_t)px, v->depth))
+            continue;
+        raindrop__blend(raindrop__pixel(frame, px, py), alpha < 1 ? alpha : 1, v->colour);
+        batch->tally->fragments++;
+    }
+}
+
+/* A far drop: its parallelogram cut with the pixels. */
+static inline void raindrop__draw_far(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
+{
+    const raindrop__shape shape = raindrop__far_shape(v);
+    float middle = shape.swapped ? v->y : v->x, across = shape.swapped ? v->x : v->y;
+    int row = shape.swapped ? box->x0 : box->y0, end = shape.swapped ? box->x1 : box->y1;
+    int low = shape.swapped ? box->y0 : box->x0, high = shape.swapped ? box->y1 : box->x1;
+    for (; row < end; row++) {
+        float from = (float)row - across, to = from + 1, w, at, reach;
+        int first, last;
+        from = from > -shape.half_height ? from : -shape.half_height;
+        to = to < shape.half_height ? to : shape.half_height;
+        if (!(to > from)) continue;
+        w = fabsf(shape.slope) * (to - from);
+        w = w > 0.01f ? w : 0.01f;
+        at = middle + shape.slope * 0.5f * (from + to);
+        reach = shape.half_width + 0.5f * w;
+        first = sat__max_int(raindrop__pixel_down(at - reach, high), low);
+        last = sat__min_int(raindrop__pixel_up(at + reach, high), high);
+        raindrop__far_row(batch, v, &shape, shape.opacity * (to - from), (float)first - at, w, row, first, last);
     }
 }
 
@@ -3257,8 +3409,8 @@ static inline void raindrop__draw(raindrop__batch *batch, const raindrop__visibl
     box.y1 = sat__min_int(box.y1, y1);
     if (raindrop__is_sprite(frame)) raindrop__draw_sprite(batch, v, &placed, &box);
     else if (v->drop & RAINDROP__FAR_BIT) {
-        if (raindrop__is_still(v)) raindrop__draw_far(batch, v, &box);
-        else raindrop__draw_far_soft(batch, v, &box);
+        if (raindrop__is_round(v)) raindrop__draw_far_round(batch, v, &box);
+        else raindrop__draw_far(batch, v, &box);
     }
 #ifndef RAINDROP_NO_STREAK
     else if (!raindrop__is_still(v)) raindrop__draw_soft(batch, v, &box);
@@ -3503,6 +3655,17 @@ RAINDROP_DEF const char *raindrop_gl_glsl(void)
            "#endif\n";
 }
 
+/* The constants that the shaders share with the code above, as it has them. */
+#define RAINDROP__TEXT(value) #value
+#define RAINDROP__CONSTANT(name, value) "const float " name " = " RAINDROP__TEXT(value) ";\n"
+static const char raindrop__glsl_constants[] =
+    RAINDROP__CONSTANT("LEAST_RADIUS", RAINDROP__LEAST_RADIUS)
+    RAINDROP__CONSTANT("LEAST_BLUR", RAINDROP__LEAST_BLUR)
+    RAINDROP__CONSTANT("SHORT", RAINDROP__SHORT)
+    RAINDROP__CONSTANT("GRAVITY", RAINDROP__GRAVITY)
+    RAINDROP__CONSTANT("VISCOSITY", RAINDROP__VISCOSITY)
+    RAINDROP__CONSTANT("DENSITY", RAINDROP__DENSITY);
+
 /* Lookups in the environment's levels, laid out as an atlas: level 0, and to its right the others one above another. */
 static const char raindrop__glsl_environment[] =
     "uniform sampler2D environment, far_drops;\n"
@@ -3538,23 +3701,25 @@ static const char raindrop__glsl_draw_vertex[] =
     "uniform vec4 view;\n"                     /* half width, half height, focal length in pixels, near distance */
     "uniform vec4 limits;\n"                   /* far radius, coverage threshold, depth planes */
     "flat out vec4 place;\n"                   /* centre in pixels, half side (sprite) or radius, focal length in
-                                                  radii */
-    "flat out vec4 seen;\n"                    /* centre in radii, view space, z forward; axis ratio */
-    "flat out vec4 far_colour;\n"              /* colour, half side of the square that stands for a far drop */
+                                                  radii; of a far drop: opacity */
+    "flat out vec4 seen;\n"                    /* centre in radii, view space, z forward; axis ratio. Of a far drop
+                                                  raindrop__shape: half height, slope, half width, swapped */
+    "flat out vec4 far_colour;\n"              /* colour; 1: a far drop */
     "#ifdef SOFT\n"
     "uniform vec4 shutter;\n"                  /* the camera's velocity, exposure */
     "uniform vec2 lens;\n"                     /* aperture, focus distance */
     "flat out vec4 path;\n"                    /* in pixels: streak, circle of confusion, radius of what moves (0: sharp
-                                                  and still) */
+                                                  and still, or far and not round) */
     "vec4 path_of(vec3 v, float r, bool is_far) {\n"
     "    vec3 w = motion.xyz - shutter.xyz;\n"
     "    vec2 fall = vec2(dot(w, right), dot(w, up)) + v.xy / v.z * dot(w, back);\n"
     "    vec2 streak = clamp(shutter.w * view.z / v.z * fall, -1e5, 1e5);\n"
-    "    float blur = min(0.5 * lens.x * view.z * abs(1.0 / v.z - 1.0 / lens.y), 1e5), way2 = dot(streak, streak), r2 = r * r + blur * blur;\n"
-    "    if (way2 + blur * blur < 0.0625) return vec4(0.0);\n"
-    "    return vec4(streak, blur, is_far ? sqrt(r2 + 1.0 / 3.0) : way2 <= 0.0625 ? r + max(blur, 0.5) : blur > 0.25 ? sqrt(r2) : r);\n"
+    "    float blur = min(0.5 * lens.x * view.z * abs(1.0 / v.z - 1.0 / lens.y), 1e5), way2 = dot(streak, streak);\n"
+    "    return vec4(streak, blur, way2 + blur * blur < 0.0625 ? 0.0 : way2 <= 0.0625 && !is_far ? r + max(blur, LEAST_BLUR) : blur > 0.25 ? length(vec2(r, blur)) : r);\n"
     "}\n"
-    "#endif\n"
+    "#endif\n";
+
+static const char raindrop__glsl_draw_place[] =
     "void main() {\n"
     "    vec3 rel = drop.xyz - eye, v = vec3(dot(rel, right), dot(rel, up), -dot(rel, back));\n"
     "#ifdef FLAT\n"
@@ -3565,7 +3730,7 @@ static const char raindrop__glsl_draw_vertex[] =
     "#endif\n"
     "    float d2 = dot(v, v), tangent2 = r * r / (d2 - r * r), stretch = sqrt(d2) / v.z;\n"
     "    float area_radius = view.z * sqrt(tangent2 * ratio * stretch * stretch * stretch);\n"
-    "    vec2 reach = vec2(0.0);\n"
+    "    vec2 right_reach = vec2(0.0), up_reach = vec2(0.0);\n" /* from the middle to the sides of the square or streak */
     "    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);\n"
     "    place = vec4(0.0);\n"
     "    seen = vec4(0.0);\n"
@@ -3575,50 +3740,76 @@ static const char raindrop__glsl_draw_vertex[] =
     "#endif\n"
     "    bool kept = ratio > 0.0 && ratio <= 1.0 && r > 0.0 && d2 > 1.0001 * r * r && v.z - r > view.w && v.z > 1.0001 * r;\n"
     "    if (kept && 3.14159265 * area_radius * area_radius >= limits.y) {\n"
-    "        vec2 middle = view.xy + view.z * v.xy / v.z, along = vec2(1.0, 0.0);\n"
+    "        vec2 middle = view.xy + view.z * v.xy / v.z;\n"
     "        seen = vec4(v / r, ratio);\n"
     "        place = vec4(middle, area_radius, v.z / (view.z * r));\n"
     "#if LOOK < 2\n"
     "        place.z = max(view.z * sqrt(tangent2) * stretch, 0.5);\n"
-    "        reach = vec2(place.z + 0.01);\n" /* rasterisers snap to 1/256 of a pixel; the fragment cuts exactly */
+    "        right_reach = vec2(place.z + 0.01, 0.0);\n"
+    "        up_reach = right_reach.yx;\n" /* rasterisers snap to 1/256 of a pixel; the fragment cuts exactly */
     "#else\n"
     /* tangents from the eye, exact off axis */
     "        vec2 q = sqrt(v.xy * v.xy + v.z * v.z - r * r), low = (v.xy * q - r * v.z) / (v.z * q + r * v.xy);\n"
     "        vec2 high = (v.xy * q + r * v.z) / (v.z * q - r * v.xy);\n"
-    "        bool is_far = LOOK == 3 && area_radius < limits.x;\n"
-    "        reach = 0.5 * view.z * (high - low) + 1.0;\n"
+    "        bool is_far = area_radius < (LOOK == 3 ? max(limits.x, LEAST_RADIUS) : LEAST_RADIUS);\n"
+    "        vec4 blurred = vec4(0.0);\n"
+    "        vec2 reach = 0.5 * view.z * (high - low) + 1.0;\n"
     "        middle = view.xy + 0.5 * view.z * (low + high);\n"
+    "#ifdef SOFT\n"
+    "        path = blurred = path_of(v, area_radius, is_far);\n"
+    "        if (is_far && path.z <= LEAST_RADIUS) path.w = 0.0;\n"
+    "        if (path.w > 0.0) {\n"
+    "            float way = length(path.xy);\n"
+    "            vec2 along = way > 1e-6 ? path.xy / way : vec2(1.0, 0.0);\n"
+    "            reach = vec2(path.w) + vec2(0.5 * way + 1.0, 1.0);\n"
+    "            middle = place.xy;\n"
+    "            right_reach = reach.x * along;\n"
+    "            up_reach = reach.y * vec2(-along.y, along.x);\n"
+    "        } else\n"
+    "#endif\n"
+    "        {\n"
+    "            right_reach = vec2(reach.x, 0.0);\n"
+    "            up_reach = vec2(0.0, reach.y);\n"
+    "        }\n"
     "        if (is_far) {\n"
     "            vec3 d = v.x * right + v.y * up - v.z * back, at = fold(d);\n"
     "            vec2 size = vec2(textureSize(far_drops, 0));\n"
-    "            far_colour = vec4(textureLod(far_drops, (at.xy * (size - 2.0) + 1.0) / size, 0.0).rgb, 0.886227 * area_radius);\n"
-    "            reach = vec2(far_colour.w + 1.0);\n"
+    "            far_colour = vec4(textureLod(far_drops, (at.xy * (size - 2.0) + 1.0) / size, 0.0).rgb, 1.0);\n"
+    /* raindrop__far_shape */
+    "            bool swapped = abs(blurred.x) > abs(blurred.y);\n"
+    "            vec2 way = swapped ? blurred.yx : blurred.xy;\n"
+    "            float a = 3.14159265 * (area_radius * area_radius + blurred.z * blurred.z), h2 = way.y * way.y + a, slope = way.x * way.y / h2;\n"
+    "            vec2 half_size = 0.5 * sqrt(vec2(a * (1.0 + way.x * way.x / h2), h2));\n"
+    "            seen = vec4(half_size.y, slope, half_size.x, swapped ? 1.0 : 0.0);\n"
     "            middle = place.xy;\n"
+    "            place.w = 3.14159265 * area_radius * area_radius / (4.0 * half_size.x * half_size.y);\n"
+    "            if (blurred.z <= LEAST_RADIUS) {\n" /* one more pixel on all sides, whose squares it may touch */
+    "                right_reach = vec2(half_size.x + 0.51 + 0.5 * abs(slope), 0.0);\n"
+    "                up_reach = vec2(slope, 1.0) * (half_size.y + 0.51);\n"
+    "                if (swapped) right_reach = right_reach.yx, up_reach = up_reach.yx;\n"
+    "            }\n"
     "        }\n"
-    "#ifdef SOFT\n"
-    "        path = path_of(v, area_radius, is_far);\n"
-    "        if (path.w > 0.0) {\n"
-    "            float way = length(path.xy);\n"
-    "            if (way > 1e-6) along = path.xy / way;\n"
-    "            reach = path.w + 0.01 + vec2(0.5 * max(way, 1.0), 0.0);\n"
-    "            middle = place.xy;\n"
-    "        }\n"
-    "#endif\n"
     "#endif\n"
     "        float z = limits.z > 0.0 ? ((limits.w + limits.z) - 2.0 * limits.w * limits.z / v.z) / (limits.w - limits.z) : 0.0;\n"
     "#ifdef QUADS\n"
-    "        vec2 corner = (vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0) * reach;\n"
-    "        middle += corner.x * along + corner.y * vec2(-along.y, along.x);\n"
+    "        vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;\n"
+    "        middle += corner.x * right_reach + corner.y * up_reach;\n"
     "#endif\n"
     "        gl_Position = vec4(middle / view.xy - 1.0, z, 1.0);\n"
     "    }\n"
     "#ifndef QUADS\n"
+    "    vec2 reach = abs(right_reach) + abs(up_reach);\n"
     "    gl_PointSize = max(2.0 * max(reach.x, reach.y), 1.0);\n"
     "#endif\n"
     "}\n";
 
-/* Two lookups a ray: what all looks share. */
+/* Two lookups a ray, and raindrop__half_plane: what all looks share. */
 static const char raindrop__glsl_shade[] =
+    "float half_plane(float s, vec2 n) {\n"
+    "    float lo = max(min(abs(n.x), abs(n.y)), 0.01), hi = max(max(abs(n.x), abs(n.y)), 0.7), h = 0.5 * (hi + lo), g = 0.5 * (hi - lo);\n"
+    "    vec4 v = max(clamp(s, -1.0, 1.0) + vec4(h, g, -g, -h), 0.0);\n"
+    "    return clamp(0.5 * dot(v * v, vec4(1.0, -1.0, -1.0, 1.0)) / (lo * hi), 0.0, 1.0);\n"
+    "}\n"
     "flat in vec4 place;\n"
     "flat in vec4 seen;\n"
     "flat in vec4 far_colour;\n"
@@ -3714,7 +3905,8 @@ static const char raindrop__glsl_flat[] =
     "    vec3 s = vec3(1.0, 1.0 / seen.w, 1.0), unit = d * s, q = p * s;\n"
     "    float n = optics.x, d2 = dot(unit, unit);\n"
     "    q -= dot(q, unit) / d2 * unit;\n"
-    "    float b = length(q) + 1e-9, slope = place.w * length(vec2(dot(q * s, right), dot(q * s, up))) / b;\n"
+    "    vec2 rim = vec2(dot(q * s, right), dot(q * s, up));\n"
+    "    float b = length(q) + 1e-9, length_of_rim = length(rim) + 1e-20, slope = place.w * length_of_rim / b + 1e-9;\n"
     "    q *= min(1.0, 0.999 / b);\n"
     "    vec3 hit = q - sqrt((1.0 - dot(q, q)) / d2) * unit, normal = normalize(hit * s), inner = refract(d, normal, 1.0 / n);\n"
     "    bool total = dot(inner, inner) < 0.5;\n" /* refract then gives 0 */
@@ -3726,13 +3918,26 @@ static const char raindrop__glsl_flat[] =
     "        ray.refracted = refract(inner, -normalize(hit * s), n);\n"
     "        if (dot(ray.refracted, ray.refracted) < 0.5) ray.transmit = 0.0, ray.refracted = inner;\n"
     "    }\n"
-    "    return clamp((1.0 - b) / (slope + 1e-9) + 0.5, 0.0, 1.0);\n"
+    "    return half_plane((1.0 - b) / slope - slope / max(24.0 * b, 12.0 * slope), rim / length_of_rim);\n"
     "}\n"
     "#endif\n";
 
-/* LOOK 2 and 3: raindrop__batch_rays, raindrop__draw_far, and with SOFT raindrop__draw_soft and
-   raindrop__draw_far_soft. */
-static const char raindrop__glsl_draw_ray[] =
+/* LOOK 2 and 3: raindrop__batch_rays, raindrop__draw_far. */
+static const char raindrop__glsl_draw_trace[] =
+    "float disc_cover(float radius, vec2 at) {\n" /* raindrop__disc_cover */
+    "    float apart = length(at) + 1e-6;\n"
+    "    return half_plane(radius - apart - 1.0 / (24.0 * max(apart, 0.5)), at / apart);\n"
+    "}\n"
+    /* raindrop__far_row: one pixel of it */
+    "float far_cover(vec2 at) {\n"
+    "    if (seen.w > 0.5) at = at.yx;\n"
+    "    float low = max(at.y - 0.5, -seen.x), high = min(at.y + 0.5, seen.x), w = max(abs(seen.y) * (high - low), 0.01);\n"
+    "    if (high <= low) return 0.0;\n"
+    "    vec2 x = at.x - seen.y * 0.5 * (low + high) + vec2(-0.5, 0.5);\n"
+    "    vec2 a = max(seen.z - 0.5 * w - x, 0.0), b = max(seen.z + 0.5 * w - x, 0.0), c = max(-seen.z - 0.5 * w - x, 0.0), d = max(-seen.z + 0.5 * w - x, 0.0);\n"
+    "    vec2 right_of = ((b - a) * (b + a) - (d - c) * (d + c)) * 0.5 / w;\n"
+    "    return place.w * (high - low) * (right_of.x - right_of.y);\n"
+    "}\n"
     /* the pixel's ray through the drop whose centre is projected `at` from here; cover: the share of the pixel it
        takes */
     "struct fragment { raindrop_ray ray; vec3 d, p; float one_minus_b2, cover; };\n"
@@ -3741,7 +3946,7 @@ static const char raindrop__glsl_draw_ray[] =
     "    vec3 d = vec3((gl_FragCoord.xy - view.xy) / view.z, 1.0), q = vec3(at * place.w, 0.0);\n"
     "    float l2 = dot(d, d), t = dot(q, d) / l2;\n"
     "    vec3 p = q - t * d;\n"
-    "    float b2 = dot(p, p), b = sqrt(max(b2, 1e-12)), slope = length(p.xy * (place.w - t / view.z)) / b;\n"
+    "    float b2 = dot(p, p), b = sqrt(max(b2, 1e-12)), slope = max(length(p.xy * (place.w - t / view.z)) / b, 1e-9);\n"
     "    f.d = (d.x * right + d.y * up - d.z * back) / sqrt(l2);\n"
     "    f.p = p.x * right + p.y * up - p.z * back;\n"
     "#ifdef FLAT\n"
@@ -3753,9 +3958,12 @@ static const char raindrop__glsl_draw_ray[] =
     "    f.p *= min(1.0, 0.999 / b);\n"
     "    f.one_minus_b2 = max(1.0 - b2, 0.001999);\n"
     "    f.ray = raindrop_trace(f.d, f.p, f.one_minus_b2, optics.x);\n"
-    "    f.cover = clamp(0.5 + (1.0 - b) / max(slope, 1e-9), 0.0, 1.0);\n"
+    "    f.cover = half_plane((1.0 - b) / slope - slope / max(24.0 * b, 12.0 * slope), p.xy / max(length(p.xy), 1e-20));\n"
     "    return f;\n"
-    "}\n"
+    "}\n";
+
+/* raindrop__draw_soft, raindrop__draw_far_round. */
+static const char raindrop__glsl_draw_soft[] =
     "#ifdef SOFT\n"
     "flat in vec4 path;\n"
     "float lens_share(float r, float c, float apart) {\n"
@@ -3766,25 +3974,42 @@ static const char raindrop__glsl_draw_ray[] =
     "    float k = (r + c - apart) * (apart + r - c) * (apart - r + c) * (apart + r + c);\n"
     "    return (r * r * acos(x) + c * c * acos(y) - 0.5 * sqrt(max(k, 0.0))) / (3.14159265 * c * c);\n"
     "}\n"
+    /* raindrop__mean_chord, raindrop__mean_clamp, raindrop__path_cover */
+    "float mean_chord(float r, float w, float width) {\n"
+    "    vec2 x = clamp(vec2(w - 0.5 * width, w + 0.5 * width) / r, -1.0, 1.0), s = x * sqrt((1.0 - x) * (1.0 + x)) + asin(x);\n"
+    "    return r * r * 0.5 * (s.y - s.x) / width;\n"
+    "}\n"
+    "float mean_clamp(float v, float way, float w) {\n"
+    "    vec2 e = vec2(0.5 * way, -0.5 * way), a = clamp(v + 0.5 * w + e, 0.0, w), b = max(v - 0.5 * w + e, 0.0);\n"
+    "    return 0.5 * (a.x * a.x - a.y * a.y) / w + b.x - b.y;\n"
+    "}\n"
+    "float path_cover(vec2 at, vec2 along, float way, float u, float w) {\n"
+    "    vec2 apart = 0.288675 * way * along;\n"
+    "    if (way < SHORT) return 0.5 * (disc_cover(path.w, at - apart) + disc_cover(path.w, at + apart));\n"
+    "    float width = 1.0 / max(abs(along.x), abs(along.y)), h = mean_chord(path.w, w, width);\n"
+    "    return h > 0.0 ? (mean_clamp(u + h, way, width) - mean_clamp(u - h, way, width)) / way : 0.0;\n"
+    "}\n"
     "void draw_soft(vec2 at) {\n"
-    "    float r = place.z, way = length(path.xy), length1 = max(way, 1.0);\n"
-    "    bool is_far = far_colour.w > 0.0, moves = way > 0.25;\n"
+    "    float r = place.z, way = length(path.xy);\n"
+    "    bool is_far = far_colour.w > 0.5, moves = way > 0.25;\n"
     "    vec2 along = way > 1e-6 ? path.xy / way : vec2(1.0, 0.0);\n"
     "    float u = dot(at, along), w = along.x * at.y - along.y * at.x, h = sqrt(max(path.w * path.w - w * w, 0.0));\n"
-    "    float from = max(u - h, -0.5 * length1), to = min(u + h, 0.5 * length1);\n"
-    "    float alpha = (to - from) / length1 * r * r / (path.w * path.w);\n"
-    "    if (!moves && !is_far) alpha = lens_share(r, max(path.z, 0.5), length(at)), from = to = 0.0;\n"
+    "    float from = clamp(u - h, -0.5 * way, 0.5 * way), to = clamp(u + h, -0.5 * way, 0.5 * way), alpha;\n"
+    "    if (moves || is_far) alpha = path_cover(at, along, way, u, w) * r * r / (path.w * path.w);\n"
+    "    else alpha = lens_share(r, max(path.z, LEAST_BLUR), length(at)), from = to = 0.0;\n"
     "    if (alpha <= 0.0) discard;\n"
     "    colour = vec4(far_colour.rgb, alpha);\n"
     "    if (is_far) return;\n"
     "    int samples = !moves ? 1 : r < 6.0 ? 4 : r < 24.0 ? 8 : 16;\n"
-    "    float blur = 2.0 * path.z + (moves ? max(min(2.0 * r, length1) / float(samples), 1.0) : 1.0);\n"
+    "    float blur = 2.0 * path.z + (moves ? max(min(2.0 * r, way) / float(samples), 1.0) : 1.0);\n"
     "    vec3 sum = vec3(0.0);\n"
     "    for (int j = 0; j < samples; j++)\n"
     "        sum += shade(trace(at - along * mix(from, to, (float(j) + 0.5) / float(samples))).ray, blur);\n"
     "    colour.rgb = sum / float(samples);\n"
     "}\n"
-    "#endif\n"
+    "#endif\n";
+
+static const char raindrop__glsl_draw_ray[] =
     "void main() {\n"
     "    vec2 at = gl_FragCoord.xy - place.xy;\n"
     "#ifdef SOFT\n"
@@ -3793,10 +4018,9 @@ static const char raindrop__glsl_draw_ray[] =
     "        return;\n"
     "    }\n"
     "#endif\n"
-    "    if (far_colour.w > 0.0) {\n" /* a square cut with the pixel */
-    "        vec2 cut = max(min(at + 0.5, vec2(far_colour.w)) - max(at - 0.5, vec2(-far_colour.w)), vec2(0.0));\n"
-    "        if (cut.x * cut.y <= 0.0) discard;\n"
-    "        colour = vec4(far_colour.rgb, cut.x * cut.y);\n"
+    "    if (far_colour.w > 0.5) {\n"
+    "        colour = vec4(far_colour.rgb, far_cover(at));\n"
+    "        if (colour.a <= 0.0) discard;\n"
     "        return;\n"
     "    }\n"
     "    fragment f = trace(at);\n"
@@ -3812,11 +4036,10 @@ static const char raindrop__glsl_draw_ray[] =
 
 /* raindrop__step and raindrop__reenter in floats. */
 static const char raindrop__glsl_step[] =
-    "const float G = 9.79482824;\n"
     "float decay(float x) { return x < 1e-3 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x); }\n"
     "float log_1p(float x) { return abs(x) < 1e-3 ? x * (1.0 - x * (0.5 - x / 3.0)) : log(1.0 + x); }\n"
     "float terminal(float mm) {\n"
-    "    float stokes = G * 998.2 * mm * mm * 1e-6 / (18.0 * 1.81e-5), best = 9.32 * decay(pow(mm / 1.77, 1.147));\n"
+    "    float stokes = GRAVITY * DENSITY * mm * mm * 1e-6 / (18.0 * VISCOSITY), best = 9.32 * decay(pow(mm / 1.77, 1.147));\n"
     "    float slow = min(stokes, best), s = slow / stokes, t = slow / best;\n"
     "    return slow * inversesqrt(sqrt(s * s * s * s + t * t * t * t));\n"
     "}\n"
@@ -3827,9 +4050,9 @@ static const char raindrop__glsl_step[] =
     "                (a + b * vt) * h + log_1p(q));\n"
     "}\n"
     "vec3 rise(float s, float a, float b, inout float h) {\n"
-    "    float d = a * a - 4.0 * b * G, apex, t, end, way;\n"
+    "    float d = a * a - 4.0 * b * GRAVITY, apex, t, end, way;\n"
     "    if (d > 0.0) {\n"
-    "        float root = sqrt(d), sum = a + root, r1 = 2.0 * G / sum, start = (s + r1) / (2.0 * b * s + sum);\n"
+    "        float root = sqrt(d), sum = a + root, r1 = 2.0 * GRAVITY / sum, start = (s + r1) / (2.0 * b * s + sum);\n"
     "        apex = log(start * sum / r1) / root;\n"
     "        t = min(h, apex);\n"
     "        start *= exp(-root * t);\n"
@@ -3851,7 +4074,7 @@ static const char raindrop__glsl_step[] =
     "    speed *= exp(-damping);\n"
     "}\n"
     "void fall(inout vec3 velocity, out vec3 way, float radius, vec3 wind, float h) {\n"
-    "    float mm = 2e3 * radius, vt = terminal(mm), a = 18.0 * 1.81e-5 / (998.2 * mm * mm * 1e-6), b = max(G - a * vt, 1e-6) / (vt * vt);\n"
+    "    float mm = 2e3 * radius, vt = terminal(mm), a = 18.0 * VISCOSITY / (DENSITY * mm * mm * 1e-6), b = max(GRAVITY - a * vt, 1e-6) / (vt * vt);\n"
     "    float v = wind.y - velocity.y, left = h;\n"
     "    vec2 side = velocity.xz - wind.xz, side_way = wind.xz * h;\n"
     "    way = wind * h;\n"
@@ -3974,18 +4197,28 @@ RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl)
 /* The program of a look and a kind, built when it is first asked for. */
 static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int kind)
 {
-    const char *library[3], *vertex[2], *fragment[5];
+    const char *library[4], *vertex[3], *fragment[7];
     sat__gl_shaders shaders;
     if (g->draw[look][kind]) return SAT_OK;
     memset(&shaders, 0, sizeof shaders);
     library[0] = raindrop_gl_glsl();
-    library[1] = raindrop__glsl_environment;
+    library[1] = raindrop__glsl_constants;
+    library[2] = raindrop__glsl_environment;
     vertex[0] = raindrop__glsl_draw_vertex;
+    vertex[1] = raindrop__glsl_draw_place;
     fragment[0] = raindrop__glsl_shade;
-    fragment[1] = look <= RAINDROP_LOOK_SPRITE ? raindrop__glsl_draw_sprite : raindrop__glsl_orders;
-    fragment[2] = look <= RAINDROP_LOOK_SPRITE ? NULL : raindrop__glsl_flat;
-    fragment[3] = raindrop__glsl_draw_ray;
-    library[2] = vertex[1] = fragment[4] = NULL;
+    if (look <= RAINDROP_LOOK_SPRITE) {
+        fragment[1] = raindrop__glsl_draw_sprite;
+        fragment[2] = NULL;
+    } else {
+        fragment[1] = raindrop__glsl_orders;
+        fragment[2] = raindrop__glsl_flat;
+        fragment[3] = raindrop__glsl_draw_trace;
+        fragment[4] = raindrop__glsl_draw_soft;
+        fragment[5] = raindrop__glsl_draw_ray;
+        fragment[6] = NULL;
+    }
+    library[3] = vertex[2] = NULL;
     shaders.name = "raindrop: drops";
     shaders.library = library;
     shaders.vertex = vertex;
@@ -4001,7 +4234,7 @@ static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int
 static inline sat_result raindrop__gl_programs(raindrop_gl *g)
 {
     static const char *const varyings[] = {"next_drop", "next_motion", NULL};
-    const char *vertex[3];
+    const char *vertex[4];
     sat__gl_shaders shaders;
     sat_result result = SAT_OK;
     int look;
@@ -4009,9 +4242,10 @@ static inline sat_result raindrop__gl_programs(raindrop_gl *g)
         result = raindrop__gl_draw_program(g, look, 0);
     if (result != SAT_OK) return result;
     memset(&shaders, 0, sizeof shaders);
-    vertex[0] = raindrop__glsl_step;
-    vertex[1] = raindrop__glsl_advance;
-    vertex[2] = NULL;
+    vertex[0] = raindrop__glsl_constants;
+    vertex[1] = raindrop__glsl_step;
+    vertex[2] = raindrop__glsl_advance;
+    vertex[3] = NULL;
     shaders.name = "raindrop: advance";
     shaders.vertex = vertex;
     shaders.varyings = varyings;

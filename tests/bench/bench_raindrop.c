@@ -291,10 +291,10 @@ static void bench_box(int count)
                  {"map, unsorted (as published)", RAINDROP_LOOK_MAP, 0, 0},
                  {"closed form, sprite", RAINDROP_LOOK_SPRITE, 0, 1},
                  {"ray", RAINDROP_LOOK_RAY, 0, 1},
-                 {"auto, far below 0.5 px", RAINDROP_LOOK_AUTO, 0.5f, 1},
-                 {"auto, far below 1 px", RAINDROP_LOOK_AUTO, 1, 1},
                  {"auto, far below 1.5 px", RAINDROP_LOOK_AUTO, 1.5f, 1},
+                 {"auto, far below 2 px", RAINDROP_LOOK_AUTO, 2, 1},
                  {"auto, far below 3 px", RAINDROP_LOOK_AUTO, 3, 1},
+                 {"auto, far below 6 px", RAINDROP_LOOK_AUTO, 6, 1},
                  {"auto, far below 1.5 px, unsorted", RAINDROP_LOOK_AUTO, 1.5f, 0}};
     char title[128];
     frame f, map;
@@ -325,7 +325,7 @@ static void bench_box(int count)
         t = bench_ratio(draw, &f, draw, &map, bench_rounds(count > 500000 ? 5 : 9));
         draw(&f);
         bench_row("%s\t%.1f\t%.2f\t%.0f\t%.4f\t%.3f\t%zu\t%d", rows[i].name, t.work * 1e3, t.ratio, start / t.work, error_of(NULL),
-                  reference_ssim(the.picture, the.truth, NULL, SIZE, SIZE, the.key), f.stats.fragments, i == 6);
+                  reference_ssim(the.picture, the.truth, NULL, SIZE, SIZE, the.key), f.stats.fragments, i == 4);
     }
     raindrop_rain_destroy(f.rain);
 }
@@ -435,6 +435,51 @@ static void bench_streaks(void)
     raindrop_rain_destroy(m.still.rain);
     free(m.moved);
     free(m.sum);
+}
+
+/* Light of one drop under a white sky over its area, for many places among the pixels and directions of its streak. */
+static void bench_energy(void)
+{
+    enum { SIDE = 64, PLACES = 64 };
+    static const float radii[] = {0.05f, 0.2f, 0.5f, 1, 1.5f, 2, 8}, streaks[] = {0, 1, 4, 16};
+    static float white[3 * 16 * 8], picture[3 * SIDE * SIDE];
+    sat_image image = sat_image_f32(white, 16, 8, 3);
+    raindrop_environment *sky = NULL;
+    raindrop_camera camera = raindrop_camera_defaults();
+    raindrop_render_options o = raindrop_render_defaults();
+    size_t i, j;
+    int k, place;
+    for (i = 0; i < 3 * 16 * 8; i++) white[i] = 1;
+    raindrop_environment_create(&sky, &image, NULL, NULL);
+    o.coverage_threshold = 0;
+    bench_table("Light of a drop over its area, by its place among the pixels", "radius_px\tstreak_px\tsmallest\tmean\tlargest\tdefault");
+    for (i = 0; i < sizeof radii / sizeof *radii; i++)
+        for (j = 0; j < sizeof streaks / sizeof *streaks; j++) {
+            double least = 9, most = 0, mean = 0;
+            for (place = 0; place < PLACES; place++) {
+                float pixel = 2.0f / SIDE, angle = 0.39f * (float)place, r = radii[i] * pixel;
+                raindrop_drop drop = {{0, 0, -1}, 0, {0, 0, 0}, 1};
+                raindrop_rain *rain;
+                double sum = 0;
+                drop.position[0] = pixel * (float)(place % 8) / 8;
+                drop.position[1] = pixel * (float)(place / 8) / 8;
+                drop.radius = r;
+                drop.velocity[0] = cosf(angle);
+                drop.velocity[1] = sinf(angle);
+                rain = own_rain(&drop, 1);
+                camera.exposure = streaks[j] * pixel;
+                memset(picture, 0, sizeof picture);
+                raindrop_render(picture, SIDE * 12, SIDE, SIDE, NULL, &camera, rain, sky, &o, NULL);
+                raindrop_rain_destroy(rain);
+                for (k = 0; k < SIDE * SIDE; k++) sum += (double)picture[3 * k];
+                sum *= (double)(1 - r * r) / (acos(-1.0) * (double)radii[i] * (double)radii[i]);
+                least = sum < least ? sum : least;
+                most = sum > most ? sum : most;
+                mean += sum / PLACES;
+            }
+            bench_row("%g\t%g\t%.4f\t%.4f\t%.4f\t1", (double)radii[i], (double)streaks[j], least, mean, most);
+        }
+    raindrop_environment_destroy(sky);
 }
 
 /* ---- the environment's filters */
@@ -597,6 +642,7 @@ int main(void)
     if (!bench_quick()) bench_box(1000000);
     bench_counts();
     bench_streaks();
+    bench_energy();
     bench_filters();
     bench_left_out();
     bench_drag();
