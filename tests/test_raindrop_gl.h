@@ -222,7 +222,7 @@ static void rg_draw_on_black(rg_scene *s, raindrop_gl *g, const raindrop_render_
     sat__gl_upload(&s->gl, s->texture, SAT__GL_RGBA32F, RG_W, RG_H, s->gpu);
     sat__gl_end(&s->gl, &state);
     s->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s->framebuffer);
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s->camera, options, 0, 0), SAT_OK);
+    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s->camera, options), SAT_OK);
     sat__gl_begin(&s->gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&s->gl, s->gpu, s->texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
     sat__gl_end(&s->gl, &state);
