@@ -23,8 +23,9 @@
      mesopic        reds fade in dim light, by the whole picture or by each neighbourhood (eq A.10 to A.14)
      Ashikhmin      threshold against intensity, local and global (Michael 2010, section 4.3)
      colours        those beyond the display come back along their hue, dimmed and faded (gamut); nothing turns cyan
-     leaving out    searches that cannot change what is seen (tolerance_codes), with a proven bound; searches away from
-                    edges (selective; Michael 2010, section 4.4), without one
+     guided         the same curve with the mean of a self-guided filter of log luminance (He 2013), which leaks over no
+                    edge: the default
+     leaving out    searches away from edges (selective; Michael 2010, section 4.4)
      metering       as a camera: between percentiles, in steps, within limits; or eq A.1's log-average; or a fixed
                     exposure
      adaptation     the metered light, key, white and range approach those of the picture with a time constant in
@@ -39,15 +40,14 @@
    OPTIONS (define before the implementation)
 
      TONEMAP_STATIC         every function private to the file
-     TONEMAP_NO_MESOPIC, TONEMAP_NO_ASHIKHMIN, TONEMAP_NO_SELECTIVE, TONEMAP_NO_SKIPPING, TONEMAP_NO_SOFT,
-     TONEMAP_NO_WHITE
+     TONEMAP_NO_MESOPIC, TONEMAP_NO_ASHIKHMIN, TONEMAP_NO_SELECTIVE, TONEMAP_NO_SOFT, TONEMAP_NO_WHITE
                             leave that code out; asking for it is then SAT_ERR_ARGUMENT
      TONEMAP_GL             the OpenGL part
      and those of sat.h: SAT_NO_SIMD, SAT_NO_STDLIB, SAT_ASSERT
 
    MEMORY, THREADS, ERRORS
 
-     One allocation of about 4 bytes a pixel of the picture, and 50 rows of that for each worker; none in a frame.
+     One allocation of about 4 bytes a pixel of the picture, and 85 rows of that for each worker; none in a frame.
      threads shares out bands of 64 rows. Every call checks its arguments and answers with a sat_result; on an error the
      output is untouched. An object serves one call at a time.
 
@@ -77,9 +77,7 @@
      local 7.5 ns a pixel: the luminance and its logarithm 18 %, sums 8 %, search 45 %, colour and sRGB 25 %. Times
      this: global 0.4, + mesopic 1.25, soft scales 1.4, Ashikhmin 1.7; SAT_NO_SIMD 1.9 (clang -O2) to 2.4 (gcc -O2);
      OpenCV's global Drago operator 3.8, pfstmo_reinhard02 -s 24. SSIM against the operator with exact Gaussians 0.987
-     to 0.998. tolerance_codes = 2 skips 32 % (StillLife) and 42 % (night) of the searches, but the bounds take about as
-     long as what they save: the time is between 1.0 and 1.2. On noise it looks at an eighth of the tiles, sees that
-     nothing can be skipped, and costs 1.03. selective pays where few pixels are near edges, 0.9 to 1.1, and for
+     to 0.998. selective pays where few pixels are near edges, 0.9 to 1.1, and for
      Ashikhmin, 0.6, at an SSIM of only 0.9.
      Against flicker: 0.5 % of noise moves single pixels by up to 56 codes with soft = 0 and by less than 1 with soft =
      1. */
@@ -129,13 +127,15 @@ typedef enum tonemap_operator {
     TONEMAP_PHOTOGRAPHIC_GLOBAL, /* one curve for all pixels, eq A.3 */
     TONEMAP_ASHIKHMIN,           /* threshold against intensity, local; Michael 2010, section 4.3 */
     TONEMAP_ASHIKHMIN_GLOBAL,    /* its curve alone */
-    TONEMAP_LINEAR               /* exposure only: eq A.2, clipped */
+    TONEMAP_LINEAR,              /* exposure only: eq A.2, clipped */
+    TONEMAP_GUIDED               /* the photographic curve with La from a self-guided filter of log2 luminance: no rings
+                                    round lamps, no seams, nothing flickers */
 } tonemap_operator;
 
 /* Reds fade towards orange in dim light (Slomp 2012, section A.5). */
 typedef enum tonemap_mesopic {
     TONEMAP_MESOPIC_OFF,
-    TONEMAP_MESOPIC_UNIFORM, /* one light level, the mean of the picture */
+    TONEMAP_MESOPIC_UNIFORM, /* one light level, the metered luminance: a lamp in the picture does not switch it off */
     TONEMAP_MESOPIC_LOCAL    /* the level around each pixel: a red lamp in the night stays red */
 } tonemap_mesopic;
 
@@ -148,14 +148,17 @@ typedef enum tonemap_metering {
 } tonemap_metering;
 
 typedef struct tonemap_options {
-    tonemap_operator operation; /* TONEMAP_PHOTOGRAPHIC_LOCAL */
+    tonemap_operator operation; /* TONEMAP_GUIDED */
     double key;                 /* 0.18; -1e6..10; the display value of the metered luminance before compression;
                                    <= 0: estimated from the log-average's place between dark and bright (Reinhard
                                    2003) */
-    double white;               /* INFINITY; 0..1e12 or infinity (no burn-out); the smallest luminance shown as white,
-                                   in units in which the log-average is the key; 0: estimated, at least 1 */
+    double white;               /* 0; 0..1e12 or infinity (no burn-out); the smallest luminance shown as white, in units
+                                   in which the metered luminance is the key; 0: estimated, at least 1 (infinity with
+                                   TONEMAP_NO_WHITE) */
     double phi;                 /* 8; -16..16; sharpening of the scale test, eq A.5 */
     double epsilon;             /* 0.05; 1e-9..1e9; threshold of the scale test, eq A.7 */
+    double edge;                /* 0.45; 0.01..10; guided: light that varies by so many octaves around a pixel (standard
+                                   deviation) is half an edge; less is texture, whose contrast stays */
     int scales;                 /* 8; 1..8; how many of the box lengths 1 3 5 7 11 17 27 41 */
     double soft;                /* 1; 0..1; half width of the band around epsilon in which scales are mixed, as a share
                                    of epsilon; 0: the paper's hard choice, which flickers (and the default with
@@ -167,11 +170,10 @@ typedef struct tonemap_options {
     double meter_low;           /* 0.02; 0..0.5; share of the darkest that percentile metering leaves out */
     double meter_high;          /* 0.98; 0.5..1; where it stops */
     tonemap_mesopic mesopic;    /* TONEMAP_MESOPIC_OFF */
-    double cd_per_unit;         /* 0; 0..1e30; cd/m2 of a luminance of 1; 0: unknown, the log-average counts as 10
-                                   cd/m2 */
+    double cd_per_unit;         /* 0; 0..1e30; cd/m2 of a luminance of 1; 0: unknown, the metered luminance counts as 10
+                                   for Ashikhmin's curve, and as 1 for mesopic vision, which is asked for in dim
+                                   light */
     double lux_per_cd;          /* 1; 0..1e6; illuminance that belongs to a luminance of 1 cd/m2, eq A.10 */
-    double tolerance_codes;     /* 0; 0..255; 0: every pixel is searched; else pixels whose display value is known to
-                                   within so many 8-bit sRGB codes without a search are not searched (local operator) */
     double selective;           /* 0; 0..1e30; 0: off; else only pixels whose Sobel gradient of the scaled luminance
                                    exceeds this are searched (Michael 2010, section 4.4) */
     double adapt_seconds;       /* 0; 0..1e30; time constant of the eye's adaptation; 0: each picture for itself */
@@ -197,7 +199,6 @@ typedef struct tonemap_stats {
     size_t clamped;                /* pixels with a display component above 1 */
     size_t scale[10];              /* searched pixels by the box that was taken, smallest first */
     size_t searched, skipped;      /* pixels with and without a search */
-    double worst_codes;            /* proven bound of the error that skipping made, 8-bit sRGB codes */
 } tonemap_stats;
 
 typedef struct tonemap tonemap;
@@ -248,7 +249,7 @@ extern "C" {
 
 /* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL
    state as it was (but for pending errors, which are lost). Nothing waits for the GPU: the log-average and the
-   adaptation stay there. All options but threads and tolerance_codes work. Metering by percentiles (the default), an
+   adaptation stay there. All options but threads work. Metering by percentiles (the default), an
    estimated key or white, and Ashikhmin's range take a histogram that draws one point a pixel, and on ES
    EXT_float_blend; TONEMAP_METERING_LOG_AVERAGE does without. */
 typedef struct tonemap_gl tonemap_gl;
@@ -263,8 +264,7 @@ TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl);
 /* Other options from the next picture on; the adaptation goes on. Costs nothing: key, white, exposure, the seconds, the
    limits of adaptation, cd_per_unit and lux_per_cd are uniforms. What the shaders are compiled for is SAT_ERR_ARGUMENT,
    and nothing changes: another value of any other option, a key or white that is estimated where it was not or the
-   other way round, a white that is infinite where it was not. Allocator, threads and tolerance_codes are not looked
-   at. */
+   other way round, a white that is infinite where it was not. Allocator and threads are not looked at. */
 TONEMAP_DEF sat_result tonemap_gl_set_options(tonemap_gl *gl, const tonemap_options *options);
 /* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 TONEMAP_DEF const char *tonemap_gl_message(const tonemap_gl *gl);
@@ -321,11 +321,6 @@ enum { TONEMAP__HAS_SELECTIVE = 0 };
 #else
 enum { TONEMAP__HAS_SELECTIVE = 1 };
 #endif
-#ifdef TONEMAP_NO_SKIPPING
-enum { TONEMAP__HAS_SKIPPING = 0 };
-#else
-enum { TONEMAP__HAS_SKIPPING = 1 };
-#endif
 #ifdef TONEMAP_NO_SOFT
 enum { TONEMAP__HAS_SOFT = 0 };
 #else
@@ -343,7 +338,9 @@ enum {
                                 size */
     TONEMAP__BOXES = 20,   /* room for the boxes of one row */
     TONEMAP__GROUP = 16,   /* pixels searched together */
-    TONEMAP__TILE = 8,     /* side of the tiles of which skipping bounds the result */
+    TONEMAP__RADIUS = 10,  /* of the two boxes of the guided filter: together they reach as far as the largest box */
+    TONEMAP__GUIDED_ROWS = 2 * TONEMAP__RADIUS + 2,
+    TONEMAP__RINGS = 3 * TONEMAP__GUIDED_ROWS + 2, /* rows of the guided filter; the search needs 42 of them */
     TONEMAP__BAND = 64,    /* rows of the smallest piece of work: 2 reach + 2 rows of sums are made anew for each */
     TONEMAP__CHUNK = 64,   /* pixels converted to display values together */
     TONEMAP__BINS = 16 * 201, /* of the luminance histogram: 16 an octave, from 2^-100 to 2^100 */
@@ -357,18 +354,22 @@ enum {
 #define TONEMAP__DARKEST_BITS 0x0d800000u
 #define TONEMAP__UNUSABLE 0x80000000u /* -0: a luminance that counts as 0 and says that the pixel shows its
                                          neighbours */
+#define TONEMAP__HIGHLIGHTS 4.5       /* octaves from the metered luminance up to what a tenth of the picture reaches */
 #define TONEMAP__LOCAL_CAP 256.0f     /* of the scaled luminance in the sums; the display has 0.4 % left beyond it */
 #define TONEMAP__QUANTUM 4096.0f      /* steps a unit: 41 * 41 * 256 * 4096 < 2^31 */
+#define TONEMAP__STEPS 64.0f          /* of the guided filter, an octave: 441 (18 * 64)^2 < 2^31 */
+#define TONEMAP__OCTAVES 10.0f        /* below a scaled luminance of 1, where they begin: code 3 */
 #define TONEMAP__ASHIKHMIN_QUANTUM 1048576.0f /* the same for luminances up to 1: 35 * 35 * 2^20 < 2^31 */
 
 TONEMAP_DEF int tonemap_version(void) { return TONEMAP_VERSION; }
 
 static const sat__field tonemap__fields[] = {
-    SAT__FIELD(tonemap_options, 'i', operation, 0, 0, TONEMAP_LINEAR, ' '),
+    SAT__FIELD(tonemap_options, 'i', operation, TONEMAP_GUIDED, 0, TONEMAP_GUIDED, ' '),
     SAT__FIELD(tonemap_options, 'd', key, 0.18, -1e6, 10, ' '),
-    SAT__FIELD(tonemap_options, 'd', white, (double)INFINITY, 0, 1e12, 'I'),
+    SAT__FIELD(tonemap_options, 'd', white, 0, 0, 1e12, 'I'),
     SAT__FIELD(tonemap_options, 'd', phi, 8, -16, 16, ' '),
     SAT__FIELD(tonemap_options, 'd', epsilon, 0.05, 1e-9, 1e9, ' '),
+    SAT__FIELD(tonemap_options, 'd', edge, 0.45, 0.01, 10, ' '),
     SAT__FIELD(tonemap_options, 'i', scales, 8, 1, 8, ' '),
     SAT__FIELD(tonemap_options, 'd', soft, 1, 0, 1, ' '),
     SAT__FIELD(tonemap_options, 'd', gamut, 0.5, 0, 1, '-'),
@@ -378,7 +379,6 @@ static const sat__field tonemap__fields[] = {
     SAT__FIELD(tonemap_options, 'i', mesopic, 0, 0, TONEMAP_MESOPIC_LOCAL, ' '),
     SAT__FIELD(tonemap_options, 'd', cd_per_unit, 0, 0, 1e30, ' '),
     SAT__FIELD(tonemap_options, 'd', lux_per_cd, 1, 0, 1e6, ' '),
-    SAT__FIELD(tonemap_options, 'd', tolerance_codes, 0, 0, 255, ' '),
     SAT__FIELD(tonemap_options, 'd', selective, 0, 0, 1e30, ' '),
     SAT__FIELD(tonemap_options, 'd', adapt_seconds, 0, 0, 1e30, ' '),
     SAT__FIELD(tonemap_options, 'd', darker_seconds, 0, 0, 1e30, ' '),
@@ -394,6 +394,7 @@ TONEMAP_DEF tonemap_options tonemap_defaults(void)
     tonemap_options o;
     sat__fields_default(&o, sizeof o, tonemap__fields, SAT__COUNT(tonemap__fields));
     if (!TONEMAP__HAS_SOFT) o.soft = 0;
+    if (!TONEMAP__HAS_WHITE) o.white = (double)INFINITY;
     return o;
 }
 
@@ -413,8 +414,6 @@ static inline const char *tonemap__left_out(const tonemap_options *o)
         return "mesopic is on; TONEMAP_NO_MESOPIC left it out";
     if (!TONEMAP__HAS_WHITE && !tonemap__is_infinite(o->white)) return "white is finite; TONEMAP_NO_WHITE left it out";
     if (!TONEMAP__HAS_SELECTIVE && o->selective > 0) return "selective is above 0; TONEMAP_NO_SELECTIVE left it out";
-    if (!TONEMAP__HAS_SKIPPING && o->tolerance_codes > 0)
-        return "tolerance_codes is above 0; TONEMAP_NO_SKIPPING left it out";
     if (!TONEMAP__HAS_SOFT && o->soft > 0) return "soft is above 0; TONEMAP_NO_SOFT left it out";
     return NULL;
 }
@@ -447,12 +446,14 @@ TONEMAP_DEF const char *tonemap_explain(char *text, size_t size, int width, int 
 /* What one worker needs: sums of 2 reach + 2 rows, and rows of intermediate values. Rows are padded so that groups at
    the right border may read and write past the last pixel. */
 typedef struct tonemap__worker {
-    uint32_t *sums;       /* ring of rows; row j is the sum of all pixels above j and left of x, modulo 2^32 */
+    uint32_t *sums;       /* ring of rows; row j is the sum of all pixels above j and left of x, modulo 2^32; or the
+                             guided filter's rings */
+    uint32_t *column[4];  /* the guided filter's sums of 21 rows: q, q^2; a, b */
+    const float *nothing; /* a row of zeros */
     float *pixels;        /* a row of the input as floats */
     float *local;         /* La, eq A.4; then the factor from input to display */
     float *rho;           /* eq A.11 */
     float *edge;          /* Sobel gradient */
-    float *peak;          /* largest component of each column of a row of tiles */
     uint32_t *bins, *histogram; /* memory; the same or NULL when nobody asks */
     int64_t log_sum;      /* of log2 of the positive luminances, in 2^-16 */
     tonemap_stats stats;
@@ -477,6 +478,7 @@ typedef struct tonemap__frame {
     float inverse_white2;   /* 1 / white^2 */
     float epsilon, term[TONEMAP__LENGTHS]; /* the test of eq A.5 and A.7: |c - v| < epsilon c + term[k] */
     float soft, gamut;
+    float edge2;            /* variance that makes half an edge, in q^2 of the guided filter */
     float lux;              /* illuminance of a scaled luminance of 1 */
     float rho;              /* eq A.11 of the whole picture; 1 where there is nothing to do */
     float curve_low, curve_factor, cd; /* Ashikhmin: display = (C(L cd) - curve_low) curve_factor */
@@ -484,21 +486,26 @@ typedef struct tonemap__frame {
     int radius[TONEMAP__BOXES];
 } tonemap__frame;
 
+/* Means over a range of the sorted pixels: unlike a quantile, they hardly notice one pixel more. A pixel counts less
+   and less from 18 to 24 octaves below the 99 % quantile: residue is no light. */
+typedef struct tonemap__meter {
+    double share[TONEMAP__BINS]; /* pixels of each bin, as far as they count */
+    double value[16], all, mean; /* log2 of the middles of an octave's bins; sum of the shares; log2 of every pixel */
+} tonemap__meter;
+
 struct tonemap {
     tonemap_options options;
     sat_allocator allocator;
     void *block;
     size_t block_size;
-    int width, height, row, ring_row, workers, tiles_x, tiles_y, started, skipping;
+    int width, height, row, ring_row, workers, started;
     unsigned known;         /* bit i: state[i] was measured, not only set */
-    double held;            /* what percentile metering said, until it moves by more than a step; see
-                               tonemap__metered */
+    tonemap__meter *meter;
+    double held[2];         /* what percentile metering said, and the estimated white, until they move by more than a
+                               step; see tonemap__hold */
     float *luminance;       /* the picture, rows `row` floats apart */
     float *row_sum;         /* of each row */
     unsigned char *row_unusable; /* some pixel of the row shows its neighbours */
-    struct tonemap__range *tile_range, *tile_reached; /* of each tile: its own; with its neighbours in the row */
-    float *tile_peak;       /* largest component */
-    float *tile_local;      /* La where the tile is skipped, else -1 */
     tonemap__worker *worker;
     double state[TONEMAP__STATES];
     tonemap__frame frame;
@@ -588,8 +595,8 @@ static inline float tonemap__sane_luminance(float y, tonemap_stats *stats)
 }
 
 /* Pixels [x, end) of a row. lane[x % 4] sums the luminances, so that four pixels at a time give the same sum. */
-static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, float *peak, float *lane,
-                                          const float *pixels, int channels, int x, int end)
+static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, float *lane, const float *pixels,
+                                          int channels, int x, int end)
 {
     int64_t log_sum = 0;
     size_t positive = 0;
@@ -597,8 +604,6 @@ static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, 
         const float *p = pixels + (size_t)x * (size_t)channels;
         float y = channels == 1 ? p[0] : sat__luminance(p[0], p[1], p[2]), t;
         uint32_t bits;
-        int c;
-        for (c = 0; peak && c < (channels == 1 ? 1 : 3); c++) peak[x] = p[c] > peak[x] ? p[c] : peak[x];
         if (!(y >= TONEMAP__DARKEST && y <= TONEMAP__BRIGHTEST)) {
             int finite = sat__is_finite(y);
             y = tonemap__sane_luminance(y, &w->stats);
@@ -646,8 +651,8 @@ static inline void tonemap__count4(uint32_t *histogram, sat__i32x4 bits)
 }
 
 /* Whole groups of four of a row of at most 2^16 pixels; returns where it stopped. */
-static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, float *peak, float *lane,
-                                          const float *pixels, int channels, int x, int end)
+static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, float *lane, const float *pixels,
+                                          int channels, int x, int end)
 {
     sat__f32x4 sum = sat__f32x4_load(lane), low = sat__f32x4_set1(TONEMAP__DARKEST),
                high = sat__f32x4_set1(TONEMAP__BRIGHTEST);
@@ -661,14 +666,11 @@ static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, 
         y = tonemap__luminance4(channels, r, g, b);
         if (!sat__i32x4_all(sat__i32x4_and(sat__f32x4_less_equal(low, y), sat__f32x4_less_equal(y, high)))) {
             sat__f32x4_store(lane, sum);
-            tonemap__measure_plain(w, luminance, peak, lane, pixels, channels, x, x + 4);
+            tonemap__measure_plain(w, luminance, lane, pixels, channels, x, x + 4);
             sum = sat__f32x4_load(lane);
             continue;
         }
         sat__f32x4_store(luminance + x, y);
-        if (peak)
-            sat__f32x4_store(peak + x,
-                             sat__f32x4_max(sat__f32x4_max(sat__f32x4_max(r, g), b), sat__f32x4_load(peak + x)));
         sum = sat__f32x4_add(sum, y);
         bits = sat__f32x4_bits(y);
         exponents = sat__i32x4_add(exponents, sat__i32x4_shift_right(bits, 23));
@@ -686,17 +688,17 @@ static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, 
 }
 #endif
 
-static inline float tonemap__measure_row(tonemap__worker *w, float *luminance, float *peak, const float *pixels,
-                                         int channels, int width)
+static inline float tonemap__measure_row(tonemap__worker *w, float *luminance, const float *pixels, int channels,
+                                         int width)
 {
     float lane[4] = {0, 0, 0, 0};
     int x = 0, end;
     while (x < width) {
         end = width - x > 65536 ? x + 65536 : width;
 #ifdef SAT__VECTOR
-        x = tonemap__measure_vector(w, luminance, peak, lane, pixels, channels, x, end);
+        x = tonemap__measure_vector(w, luminance, lane, pixels, channels, x, end);
 #endif
-        tonemap__measure_plain(w, luminance, peak, lane, pixels, channels, x, end);
+        tonemap__measure_plain(w, luminance, lane, pixels, channels, x, end);
         x = end;
     }
     return (lane[0] + lane[1]) + (lane[2] + lane[3]);
@@ -722,46 +724,29 @@ typedef struct tonemap__job {
     int as_float;
 } tonemap__job;
 
-static inline int tonemap__skips(const tonemap_options *o)
-{
-    return TONEMAP__HAS_SKIPPING && o->tolerance_codes > 0 && o->operation == TONEMAP_PHOTOGRAPHIC_LOCAL;
-}
-
-/* The largest component of each tile of a row of tiles. */
-static inline void tonemap__store_peaks(tonemap *map, tonemap__worker *w, int tile_y)
-{
-    float *tile = map->tile_peak + (size_t)tile_y * (size_t)map->tiles_x;
-    int t, x;
-    for (t = 0; t < map->tiles_x; t++) {
-        tile[t] = 0;
-        for (x = t * TONEMAP__TILE; x < (t + 1) * TONEMAP__TILE; x++) {
-            tile[t] = w->peak[x] > tile[t] ? w->peak[x] : tile[t];
-            w->peak[x] = 0;
-        }
-    }
-}
-
 static void tonemap__measure_bands(int begin, int end, int worker, void *context)
 {
     const tonemap__job *job = (const tonemap__job *)context;
     tonemap *map = job->map;
     tonemap__worker *w = &map->worker[worker];
-    int x, y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height),
-           skips = tonemap__skips(&map->options);
+    int x, y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height);
     for (; y < y1; y++) {
         float *luminance = map->luminance + (size_t)y * (size_t)map->row;
         const float *pixels = tonemap__float_row(w->pixels, job->hdr, y);
         size_t unusable = w->stats.nan + w->stats.negative;
-        map->row_sum[y] =
-            tonemap__measure_row(w, luminance, skips ? w->peak : NULL, pixels, job->hdr->channels, map->width);
+        map->row_sum[y] = tonemap__measure_row(w, luminance, pixels, job->hdr->channels, map->width);
         map->row_unusable[y] = (unsigned char)(w->stats.nan + w->stats.negative > unusable);
         for (x = map->width; x < map->row; x++) luminance[x] = luminance[map->width - 1];
-        if (skips && (y % TONEMAP__TILE == TONEMAP__TILE - 1 || y + 1 == map->height))
-            tonemap__store_peaks(map, w, y / TONEMAP__TILE);
     }
 }
 
 /* ---- between the passes: key, white and range of the picture */
+
+/* log2 of a luminance in a bin, part of the way through it. */
+static inline double tonemap__bin_value(int bin, double part)
+{
+    return bin / 16 - 100 + log2(1 + (bin % 16 + part) / 16);
+}
 
 /* The luminance below which a share of the positive ones lies, as log2; within a sixteenth of an octave. */
 static inline double tonemap__quantile(const uint32_t *histogram, size_t positive, double share)
@@ -770,10 +755,8 @@ static inline double tonemap__quantile(const uint32_t *histogram, size_t positiv
     int bin;
     for (bin = 0; bin < TONEMAP__BINS; bin++) {
         double count = (double)histogram[bin];
-        if (count > 0 && seen + count >= wanted) {
-            double part = (bin % 16 + (wanted > seen ? (wanted - seen) / count : 0)) / 16;
-            return bin / 16 - 100 + log2(1 + part);
-        }
+        if (count > 0 && seen + count >= wanted)
+            return tonemap__bin_value(bin, wanted > seen ? (wanted - seen) / count : 0);
         seen += count;
     }
     return 0;
@@ -783,8 +766,9 @@ static inline double tonemap__quantile(const uint32_t *histogram, size_t positiv
 static inline int tonemap__has_range(double low, double high) { return high - low > 0.125; }
 
 /* The key from where the log-average lies between dark and bright, and the white from their distance (Reinhard 2003, on
-   quantiles: minimum and maximum of a real picture are noise). All arguments and results are base-2 logarithms. A white
-   below 1 would brighten midtones more than highlights. */
+   quantiles: minimum and maximum of a real picture are noise). All arguments and results are base-2 logarithms. The
+   white is no brighter than the brightest pixels but a few (the 99.5 to 99.95 % quantiles): pictures of low range would
+   end at a light grey; a white below 1 would brighten midtones more than highlights. */
 static inline double tonemap__estimated_key(double average, double low, double high)
 {
     double place = (2 * average - low - high) / (high - low);
@@ -792,9 +776,10 @@ static inline double tonemap__estimated_key(double average, double low, double h
     return log2(0.18) + 2 * (place < -1 ? -1 : place > 1 ? 1 : place);
 }
 
-static inline double tonemap__estimated_white(double low, double high)
+static inline double tonemap__estimated_white(double low, double high, double brightest)
 {
     double white = log2(1.5) + high - low - 5;
+    if (brightest < white) white = brightest;
     return white > 0 ? white : 0;
 }
 
@@ -817,44 +802,54 @@ static inline double tonemap__log_average(int64_t log_sum, size_t positive)
     return (double)whole + (double)rest / (double)step;
 }
 
-/* Percentile metering: how far the mean between the percentiles is from that of all, in bins of the histogram, so that
-   a flat picture has exactly its log-average. */
-static inline double tonemap__metered(const uint32_t *histogram, size_t positive, double average,
-                                      const tonemap_options *o)
+static inline void tonemap__open_meter(tonemap__meter *m, const uint32_t *histogram, size_t positive)
 {
-    double top = tonemap__quantile(histogram, positive, 0.99), all = 0, whole = 0, inner = 0, sum = 0, seen = 0,
-           octave[16], low, high;
-    int bin, i;
-    for (i = 0; i < 16; i++) octave[i] = log2(1 + (i + 0.5) / 16);
+    double top = tonemap__quantile(histogram, positive, 0.99);
+    int bin;
+    m->all = m->mean = 0;
+    for (bin = 0; bin < 16; bin++) m->value[bin] = tonemap__bin_value(16 * 100 + bin, 0.5);
     for (bin = 0; bin < TONEMAP__BINS; bin++) {
-        double v = bin / 16 - 100 + octave[bin % 16], w = (v - (top - 24)) / 6;
-        whole += (double)histogram[bin] * v;
-        all += (double)histogram[bin] * (w < 0 ? 0 : w > 1 ? 1 : w);
+        double v = bin / 16 - 100 + m->value[bin % 16], w = (v - (top - 24)) / 6;
+        m->share[bin] = (double)histogram[bin] * (w < 0 ? 0 : w > 1 ? 1 : w);
+        m->all += m->share[bin];
+        m->mean += (double)histogram[bin] * v / (double)positive;
     }
-    low = o->meter_low * all;
-    high = o->meter_high * all;
+}
+
+static inline double tonemap__mean_between(const tonemap__meter *m, double low, double high)
+{
+    double seen = 0, sum = 0, inner = 0;
+    int bin;
+    low *= m->all;
+    high *= m->all;
     for (bin = 0; bin < TONEMAP__BINS; bin++) {
-        double v = bin / 16 - 100 + octave[bin % 16], w = (v - (top - 24)) / 6,
-               next = seen + (double)histogram[bin] * (w < 0   ? 0
-                                                       : w > 1 ? 1
-                                                               : w);
-        double n = (next < high ? next : high) - (seen > low ? seen : low);
+        double next = seen + m->share[bin], n = (next < high ? next : high) - (seen > low ? seen : low);
         if (n > 0) {
             inner += n;
-            sum += n * v;
+            sum += n * (bin / 16 - 100 + m->value[bin % 16]);
         }
         seen = next;
     }
-    if (inner > 0) average += sum / inner - whole / (double)positive;
-    return average;
+    return inner > 0 ? sum / inner : m->mean;
 }
 
-/* In steps of 1/64 octave; while the eye adapts, what was held stays until the new value is more than a step away. */
-static inline double tonemap__hold(tonemap *map, double average)
+/* Percentile metering: how far the mean between the percentiles is from that of all, so that a flat picture has exactly
+   its log-average. Where the brightest fifth would be beyond 22 times the key, the picture is exposed for that: a lit
+   table is worth more than the dark room around it. */
+static inline double tonemap__metered(const tonemap__meter *m, double average, const tonemap_options *o)
 {
-    int holds = map->options.adapt_seconds > 0 && map->started && map->known & 1u << TONEMAP__HELD;
-    if (!holds || fabs(average - map->held) > 1 / 64.0) map->held = floor(average * 64 + 0.5) / 64;
-    return map->held;
+    double bright = tonemap__mean_between(m, 0.8, o->meter_high > 0.8 ? o->meter_high : 1) - TONEMAP__HIGHLIGHTS;
+    average += tonemap__mean_between(m, o->meter_low, o->meter_high) - m->mean;
+    return average > bright ? average : bright;
+}
+
+/* In steps of a fraction of an octave; while the eye adapts, what was held stays until the new value is more than a
+   step away. */
+static inline double tonemap__hold(const tonemap *map, double *held, unsigned known, double value, double steps)
+{
+    int holds = map->options.adapt_seconds > 0 && map->started && map->known & known;
+    if (!holds || fabs(value - *held) * steps > 1) *held = floor(value * steps + 0.5) / steps;
+    return *held;
 }
 
 /* Limits of adaptation, as log2. */
@@ -885,6 +880,15 @@ static inline void tonemap__collect(tonemap *map, int64_t *log_sum)
     total->mean = sum / ((double)map->width * map->height);
 }
 
+static inline double tonemap__measured_white(tonemap *map, const tonemap__meter *m, const double *state, double low,
+                                             double high)
+{
+    const tonemap_options *o = &map->options;
+    double brightest = tonemap__mean_between(m, 0.995, 0.9995) +
+                       (o->exposure > 0 ? log2(o->exposure) : state[TONEMAP__KEY] - state[TONEMAP__AVERAGE]);
+    return tonemap__hold(map, &map->held[1], 1u << TONEMAP__WHITE, tonemap__estimated_white(low, high, brightest), 8);
+}
+
 /* What this picture alone would ask for; 0 when it is black. */
 static inline int tonemap__measured_state(tonemap *map, double *state)
 {
@@ -893,10 +897,12 @@ static inline int tonemap__measured_state(tonemap *map, double *state)
     int ashikhmin = tonemap__is_ashikhmin(o);
     double low = 0, high = 0, average;
     int64_t log_sum;
+    tonemap__meter *m = map->meter;
     tonemap__collect(map, &log_sum);
     if (!map->stats.positive) return 0;
     average = tonemap__log_average(log_sum, map->stats.positive);
     if (histogram) {
+        tonemap__open_meter(m, histogram, map->stats.positive);
         low = tonemap__quantile(histogram, map->stats.positive, 0.01);
         high = tonemap__quantile(histogram, map->stats.positive, 0.99);
     }
@@ -904,11 +910,11 @@ static inline int tonemap__measured_state(tonemap *map, double *state)
     if (o->metering == TONEMAP_METERING_PERCENTILES) {
         if (map->started && map->stats.positive * 1000 < (size_t)map->width * (size_t)map->height)
             return 0; /* as good as black */
-        average = tonemap__hold(map, tonemap__metered(histogram, map->stats.positive, average, o));
+        average = tonemap__hold(map, &map->held[0], 1u << TONEMAP__HELD, tonemap__metered(m, average, o), 64);
     }
     state[TONEMAP__AVERAGE] = average = tonemap__limited(average, o);
     state[TONEMAP__KEY] = o->key > 0 ? log2(o->key) : tonemap__estimated_key(average, low, high);
-    state[TONEMAP__WHITE] = o->white > 0 ? 0 : tonemap__estimated_white(low, high);
+    state[TONEMAP__WHITE] = o->white > 0 ? 0 : tonemap__measured_white(map, m, state, low, high);
     state[TONEMAP__LOW] = ashikhmin ? tonemap__quantile(histogram, map->stats.positive, 0.0005) : 0;
     state[TONEMAP__HIGH] = ashikhmin ? tonemap__quantile(histogram, map->stats.positive, 0.9995) : 0;
     map->stats.low = exp2(low);
@@ -993,7 +999,7 @@ static inline void tonemap__frame_boxes(tonemap__frame *f, const tonemap_options
         f->boxes = 1;
     }
     f->reach = f->radius[f->boxes - 1];
-    f->inverse_cap = f->boxes > 1 ? 1 / f->cap : 0;
+    f->inverse_cap = f->boxes > 1 || o->operation == TONEMAP_GUIDED ? 1 / f->cap : 0;
 }
 
 static inline void tonemap__prepare_frame(tonemap *map)
@@ -1014,6 +1020,7 @@ static inline void tonemap__prepare_frame(tonemap *map)
     f->inverse_white2 = !TONEMAP__HAS_WHITE || tonemap__is_infinite(white) ? 0 : (float)(1 / (white * white));
     f->epsilon = (float)o->epsilon;
     f->soft = (float)o->soft;
+    f->edge2 = (float)(o->edge * o->edge) * (TONEMAP__STEPS * TONEMAP__STEPS);
     f->gamut = o->gamut < 0 ? -1 : (float)o->gamut;
     if (o->operation == TONEMAP_LINEAR && !tonemap__is_infinite(white)) f->curve_factor = (float)(1 / white);
     else f->curve_factor = 1;
@@ -1028,290 +1035,14 @@ static inline void tonemap__prepare_frame(tonemap *map)
         if (!tonemap__has_range(low, high))
             f->curve_low = f->curve_factor = 0; /* a flat picture has no range: it gets the key */
     }
-    f->lux = (float)(cd * o->lux_per_cd / (double)f->scale);
-    f->rho = TONEMAP__HAS_MESOPIC && o->mesopic == TONEMAP_MESOPIC_UNIFORM
-                 ? tonemap__rho((float)(map->stats.mean * cd * o->lux_per_cd))
-                 : 1;
+    cd = (o->cd_per_unit > 0 ? o->cd_per_unit : 1 / exp2(average)) * o->lux_per_cd;
+    f->lux = (float)(cd / (double)f->scale);
+    f->rho =
+        TONEMAP__HAS_MESOPIC && o->mesopic == TONEMAP_MESOPIC_UNIFORM ? tonemap__rho((float)(exp2(average) * cd)) : 1;
     tonemap__frame_boxes(f, o, key);
     map->stats.adapted = exp2(average);
     map->stats.key = key;
     map->stats.white = white;
-}
-
-/* ---- guaranteed skipping: which tiles need no search
-
-   La is the mean over a box, or the pixel itself. Every length above 1 is a sum of twos and threes, so the mean over
-   any box lies between the smallest and the largest mean over the windows of 2 x 2, 3 x 2, 2 x 3 and 3 x 3 pixels
-   inside it: a much narrower range than that of the pixels, which are noisy. With La in [low, high], the display value
-   of a component v (of the input, scaled) lies between v / (1 + high) and v / (1 + low). The tile gets the La whose
-   display value stands in the middle, in sRGB codes. How far that can be off grows with v until the display value
-   reaches 1, so the tile's largest component is the worst case. */
-
-typedef struct tonemap__range { float low, high, pixel_low, pixel_high; } tonemap__range;
-
-/* Windows that begin in `rows` rows of a tile; two more rows, `row` floats apart, and two more columns follow. */
-static inline void tonemap__tile_range_plain(tonemap__range *range, const float *tile, int row, int rows)
-{
-    static const float share[4] = {1 / 4.0f, 1 / 6.0f, 1 / 6.0f, 1 / 9.0f};
-    float low[4] = {FLT_MAX, FLT_MAX, FLT_MAX, FLT_MAX}, high[4] = {0, 0, 0, 0};
-    int i, k, x, y;
-    range->pixel_low = range->pixel_high = tile[0];
-    for (x = 0; x < TONEMAP__TILE; x++)
-        for (y = 0; y < rows; y++) {
-            const float *p = tile + (ptrdiff_t)y * row + x;
-            float sum[4], h2[3], h3[3];
-            range->pixel_low = p[0] < range->pixel_low ? p[0] : range->pixel_low;
-            range->pixel_high = p[0] > range->pixel_high ? p[0] : range->pixel_high;
-            for (i = 0; i < 3; i++, p += row) {
-                h2[i] = p[0] + p[1];
-                h3[i] = h2[i] + p[2];
-            }
-            sum[0] = h2[0] + h2[1];
-            sum[1] = h3[0] + h3[1];
-            sum[2] = sum[0] + h2[2];
-            sum[3] = sum[1] + h3[2];
-            for (k = 0; k < 4; k++) {
-                low[k] = sum[k] < low[k] ? sum[k] : low[k];
-                high[k] = sum[k] > high[k] ? sum[k] : high[k];
-            }
-        }
-    range->low = low[0] * share[0];
-    range->high = high[0] * share[0];
-    for (k = 1; k < 4; k++) {
-        if (low[k] * share[k] < range->low) range->low = low[k] * share[k];
-        if (high[k] * share[k] > range->high) range->high = high[k] * share[k];
-    }
-}
-
-#ifdef SAT__VECTOR
-static inline float tonemap__lowest4(sat__f32x4 v)
-{
-    float a[4];
-    sat__f32x4_store(a, v);
-    a[0] = a[1] < a[0] ? a[1] : a[0];
-    a[2] = a[3] < a[2] ? a[3] : a[2];
-    return a[2] < a[0] ? a[2] : a[0];
-}
-
-static inline float tonemap__highest4(sat__f32x4 v)
-{
-    float a[4];
-    sat__f32x4_store(a, v);
-    a[0] = a[1] > a[0] ? a[1] : a[0];
-    a[2] = a[3] > a[2] ? a[3] : a[2];
-    return a[2] > a[0] ? a[2] : a[0];
-}
-
-/* Two rows of sums over two and three columns are carried down: the windows that begin in a row need the next two. */
-static inline void tonemap__tile_range_vector(tonemap__range *range, const float *tile, int row, int rows)
-{
-    sat__f32x4 low22 = sat__f32x4_set1(FLT_MAX), low32 = low22, low23 = low22, low33 = low22, darkest = low22;
-    sat__f32x4 high22 = sat__f32x4_set1(0), high32 = high22, high23 = high22, high33 = high22, brightest = high22;
-    int x, y;
-    for (x = 0; x < TONEMAP__TILE; x += 4) {
-        const float *p = tile + x;
-        sat__f32x4 pixel = sat__f32x4_load(p), next = sat__f32x4_load(p + row), two, three, two_below, three_below;
-        two = sat__f32x4_add(pixel, sat__f32x4_load(p + 1));
-        three = sat__f32x4_add(two, sat__f32x4_load(p + 2));
-        p += row;
-        two_below = sat__f32x4_add(next, sat__f32x4_load(p + 1));
-        three_below = sat__f32x4_add(two_below, sat__f32x4_load(p + 2));
-        for (y = 0; y < rows; y++) {
-            sat__f32x4 sum2 = sat__f32x4_add(two, two_below), sum3 = sat__f32x4_add(three, three_below);
-            darkest = sat__f32x4_min(darkest, pixel);
-            brightest = sat__f32x4_max(brightest, pixel);
-            low22 = sat__f32x4_min(low22, sum2);
-            high22 = sat__f32x4_max(high22, sum2);
-            low32 = sat__f32x4_min(low32, sum3);
-            high32 = sat__f32x4_max(high32, sum3);
-            two = two_below;
-            three = three_below;
-            pixel = next;
-            p += row;
-            next = sat__f32x4_load(p);
-            two_below = sat__f32x4_add(next, sat__f32x4_load(p + 1));
-            three_below = sat__f32x4_add(two_below, sat__f32x4_load(p + 2));
-            sum2 = sat__f32x4_add(sum2, two_below);
-            sum3 = sat__f32x4_add(sum3, three_below);
-            low23 = sat__f32x4_min(low23, sum2);
-            high23 = sat__f32x4_max(high23, sum2);
-            low33 = sat__f32x4_min(low33, sum3);
-            high33 = sat__f32x4_max(high33, sum3);
-        }
-    }
-    low22 = sat__f32x4_min(sat__f32x4_mul(low22, sat__f32x4_set1(1 / 4.0f)),
-                           sat__f32x4_mul(low33, sat__f32x4_set1(1 / 9.0f)));
-    low23 = sat__f32x4_mul(sat__f32x4_min(low23, low32), sat__f32x4_set1(1 / 6.0f));
-    high22 = sat__f32x4_max(sat__f32x4_mul(high22, sat__f32x4_set1(1 / 4.0f)),
-                            sat__f32x4_mul(high33, sat__f32x4_set1(1 / 9.0f)));
-    high23 = sat__f32x4_mul(sat__f32x4_max(high23, high32), sat__f32x4_set1(1 / 6.0f));
-    range->low = tonemap__lowest4(sat__f32x4_min(low22, low23));
-    range->high = tonemap__highest4(sat__f32x4_max(high22, high23));
-    range->pixel_low = tonemap__lowest4(darkest);
-    range->pixel_high = tonemap__highest4(brightest);
-}
-#endif
-
-static inline void tonemap__merge_range(tonemap__range *range, const tonemap__range *other)
-{
-    range->low = other->low < range->low ? other->low : range->low;
-    range->high = other->high > range->high ? other->high : range->high;
-}
-
-/* The rows of a row of tiles side by side in the cache: walked tile by tile where they are, they come one line at a
-   time from far away. Rows are padded with their last pixel, and the last row stands for those below it, which adds no
-   new values. */
-static inline const float *tonemap__gather_tiles(const tonemap *map, tonemap__worker *w, int ty)
-{
-    float *rows = (float *)(void *)w->sums;
-    int i;
-    for (i = 0; i < TONEMAP__TILE + 2; i++)
-        memcpy(rows + (size_t)i * (size_t)map->row,
-               map->luminance + (size_t)sat__min_int(ty * TONEMAP__TILE + i, map->height - 1) * (size_t)map->row,
-               (size_t)map->row * sizeof(float));
-    return rows;
-}
-
-static inline void tonemap__find_range(tonemap *map, const float *rows, int tx, int ty)
-{
-    tonemap__range *range = &map->tile_range[(size_t)ty * (size_t)map->tiles_x + (size_t)tx];
-    int count = sat__min_int(TONEMAP__TILE, map->height - ty * TONEMAP__TILE);
-#ifdef SAT__VECTOR
-    tonemap__tile_range_vector(range, rows + tx * TONEMAP__TILE, map->row, count);
-#else
-    tonemap__tile_range_plain(range, rows + tx * TONEMAP__TILE, map->row, count);
-#endif
-}
-
-/* v^(1 / 2.4): sRGB codes are 269.025 times it less 14.025. Below 0.0031308 they are fewer; the bound is larger
-   there. */
-static inline float tonemap__power(float v) { return tonemap__exp2(tonemap__log2(v) * (1 / 2.4f)); }
-
-/* What 1 / (1 + La) can be, and the largest component that the display does not clip. */
-typedef struct tonemap__bound { float most, least, peak; } tonemap__bound;
-
-static inline tonemap__bound tonemap__display_bound(const tonemap *map, const tonemap__range *range, float peak)
-{
-    const tonemap__frame *f = &map->frame;
-    float half = 0.5f / f->quantum, low = range->low, high = range->high, pixel = range->pixel_high * f->scale;
-    tonemap__bound bound;
-    if (pixel > f->cap) high = TONEMAP__BRIGHTEST; /* La grows with the pixel there: no bound */
-    if (!(pixel < f->term[0] && high * f->scale < f->term[0])) { /* the first step may fail: La is then the pixel */
-        low = range->pixel_low < low ? range->pixel_low : low;
-        high = range->pixel_high > high ? range->pixel_high : high;
-    }
-    high = high < TONEMAP__BRIGHTEST ? high * f->scale < f->cap ? high * f->scale : f->cap : high;
-    bound.most = 1 / (1 + (low * f->scale > half ? low * f->scale - half : 0)); /* the means are of rounded pixels */
-    bound.least = 1 / (1 + high + half);
-    peak *= f->scale * (1 + pixel * f->inverse_white2);
-    bound.peak = peak > TONEMAP__DARKEST ? peak * bound.most < 1 ? peak : 1 / bound.most : TONEMAP__DARKEST;
-    return bound;
-}
-
-/* A quick no: x^p >= x and 1 - x^p >= p (1 - x) for p = 1 / 2.4 and x <= 1. */
-static inline int tonemap__may_skip(const tonemap *map, const tonemap__bound *b)
-{
-    return 269.025f / 2.4f * b->peak * (b->most - b->least) <= 2.1f * (float)map->options.tolerance_codes;
-}
-
-/* The La of a tile that needs no search, or -1; *error is how many codes it may be off. */
-static inline float tonemap__skipped_local(const tonemap *map, const tonemap__bound *b, float *error)
-{
-    float upper = tonemap__power(b->most), lower = tonemap__power(b->least), middle = (upper + lower) / 2,
-          peak = tonemap__power(b->peak);
-    float above = 269.025f * peak * (upper - middle);
-    float below = 269.025f * (peak * upper < 0.9999f ? peak : 1 / middle) *
-                  (middle - lower); /* a clipped component: up to its own limit */
-    *error = (above > below ? above : below) + 0.05f; /* of the polynomials */
-    return *error <= (float)map->options.tolerance_codes ? tonemap__exp2(-2.4f * tonemap__log2(middle)) - 1 : -1;
-}
-
-static inline int tonemap__tile_may_skip(const tonemap *map, int tx, int ty)
-{
-    size_t at = (size_t)ty * (size_t)map->tiles_x + (size_t)tx;
-    tonemap__bound bound = tonemap__display_bound(map, &map->tile_range[at], map->tile_peak[at]);
-    return tonemap__may_skip(map, &bound);
-}
-
-/* One row of tiles in eight is looked at first, to see whether skipping is worth it. */
-static inline int tonemap__is_sample(int ty) { return (ty & 7) == 3 || ty == 0; }
-
-static void tonemap__sample_tiles(int begin, int end, int worker, void *context)
-{
-    const tonemap__job *job = (const tonemap__job *)context;
-    tonemap__worker *w = &job->map->worker[worker];
-    int x;
-    for (; begin < end; begin++) {
-        const float *rows;
-        if (!tonemap__is_sample(begin)) continue;
-        rows = tonemap__gather_tiles(job->map, w, begin);
-        for (x = 0; x < job->map->tiles_x; x++) {
-            tonemap__find_range(job->map, rows, x, begin);
-            w->stats.skipped += (size_t)tonemap__tile_may_skip(job->map, x, begin);
-        }
-    }
-}
-
-/* The ranges of the other tiles, and what the boxes around a tile's pixels reach in its row. */
-static void tonemap__range_tiles(int begin, int end, int worker, void *context)
-{
-    const tonemap__job *job = (const tonemap__job *)context;
-    tonemap *map = job->map;
-    int x, i, reach = (map->frame.reach + TONEMAP__TILE - 1) / TONEMAP__TILE;
-    for (; begin < end; begin++) {
-        const float *rows = tonemap__is_sample(begin) ? NULL : tonemap__gather_tiles(map, &map->worker[worker], begin);
-        const tonemap__range *range = map->tile_range + (size_t)begin * (size_t)map->tiles_x;
-        tonemap__range *reached = map->tile_reached + (size_t)begin * (size_t)map->tiles_x;
-        for (x = 0; rows && x < map->tiles_x; x++) tonemap__find_range(map, rows, x, begin);
-        for (x = 0; x < map->tiles_x; x++) {
-            int x1 = sat__min_int(x + reach + 1, map->tiles_x);
-            reached[x] = range[x];
-            for (i = sat__max_int(x - reach, 0); i < x1; i++) tonemap__merge_range(&reached[x], &range[i]);
-        }
-    }
-}
-
-static inline void tonemap__bound_tile(tonemap *map, tonemap__worker *w, int tx, int ty)
-{
-    int reach = (map->frame.reach + TONEMAP__TILE - 1) / TONEMAP__TILE, y = sat__max_int(ty - reach, 0),
-        y1 = sat__min_int(ty + reach + 1, map->tiles_y);
-    size_t at = (size_t)ty * (size_t)map->tiles_x + (size_t)tx;
-    tonemap__range range = map->tile_range[at];
-    tonemap__bound bound;
-    float error;
-    map->tile_local[at] = -1;
-    if (!tonemap__tile_may_skip(map, tx, ty)) return; /* its own windows are too different already */
-    for (; y < y1; y++) tonemap__merge_range(&range, &map->tile_reached[(size_t)y * (size_t)map->tiles_x + (size_t)tx]);
-    bound = tonemap__display_bound(map, &range, map->tile_peak[at]);
-    if (!tonemap__may_skip(map, &bound)) return;
-    map->tile_local[at] = tonemap__skipped_local(map, &bound, &error);
-    if (!(map->tile_local[at] < 0) && (double)error > w->stats.worst_codes) w->stats.worst_codes = (double)error;
-}
-
-static void tonemap__bound_tiles(int begin, int end, int worker, void *context)
-{
-    const tonemap__job *job = (const tonemap__job *)context;
-    int x;
-    for (; begin < end; begin++)
-        for (x = 0; x < job->map->tiles_x; x++) tonemap__bound_tile(job->map, &job->map->worker[worker], x, begin);
-}
-
-/* Fills tile_local; 0 when fewer than one sampled tile in 16 could be skipped by itself: the whole is then searched. */
-static inline int tonemap__plan_skipping(tonemap *map, tonemap__job *job)
-{
-    const sat_threads *threads = &map->options.threads;
-    size_t hits = 0, sampled = 0;
-    int i;
-    sat__parallel_for(threads, map->tiles_y, tonemap__sample_tiles, job);
-    for (i = 0; i < map->workers; i++) {
-        hits += map->worker[i].stats.skipped;
-        map->worker[i].stats.skipped = 0;
-    }
-    for (i = 0; i < map->tiles_y; i++) sampled += tonemap__is_sample(i) ? (size_t)map->tiles_x : 0;
-    if (hits * 16 < sampled) return 0;
-    sat__parallel_for(threads, map->tiles_y, tonemap__range_tiles, job);
-    sat__parallel_for(threads, map->tiles_y, tonemap__bound_tiles, job);
-    return 1;
 }
 
 /* ---- second pass: sums. A ring of rows of a summed-area table of the scaled luminance, rounded to a quantum and added
@@ -1759,7 +1490,7 @@ static inline void tonemap__search_ashikhmin_vector(float *local, const float *l
 }
 #endif
 
-/* Searches pixels [x, end) of a row and may overwrite what follows them in the group; x is a multiple of the tile. */
+/* Searches pixels [x, end) of a row and may overwrite what follows them in the group. */
 static inline void tonemap__search(tonemap__worker *w, const float *luminance, const tonemap__window *window,
                                    const tonemap__frame *f, int ashikhmin, int x, int end)
 {
@@ -1812,6 +1543,228 @@ static inline void tonemap__sobel_row(float *out, const float *above, const floa
     for (; x < width; x++) out[x] = tonemap__sobel(above, row, below, x - 1, x, sat__min_int(x + 1, width - 1));
 }
 
+/* ---- the guided filter (He 2013, eq 5, 6 and 8 with the picture as its own guide), on q = log2 of the scaled
+   luminance
+
+   Around each pixel a = var / (var + edge^2) and b = mean (1 - a), over 21 x 21 pixels; La = exp2(mean(a) q + mean(b)),
+   over as many. Where light varies less than edge, a is small and La the mean around; across an edge a is 1 and La the
+   pixel's own: nothing leaks over it, and nothing is chosen that could flicker. All sums are of integers modulo 2^32:
+   columns of 21 rows, to which a row is added and one taken away, then along the row. */
+
+/* Rows are kept as long as they are in a sum: 0: steps, 1: a, 2: b; 3: sums along two rows. */
+static inline uint32_t *tonemap__guided_ring(const tonemap *map, const tonemap__worker *w, int which, int j)
+{
+    int row = which * TONEMAP__GUIDED_ROWS + (which < 3 ? j % TONEMAP__GUIDED_ROWS : j);
+    return w->sums + (size_t)row * (size_t)map->ring_row + TONEMAP__BOXES;
+}
+
+/* Steps above the darkest of the scaled luminances of row j. A pixel that is no measurement counts as the one to its
+   left, or as the first usable one. */
+static inline void tonemap__steps_row(float *out, const tonemap *map, int j)
+{
+    const float *luminance = map->luminance + (size_t)j * (size_t)map->row;
+    float scale = map->frame.scale, darkest = 1 / 1024.0f;
+    int x = 0, last;
+#ifdef SAT__VECTOR
+    sat__f32x4 offset = sat__f32x4_set1(TONEMAP__OCTAVES), steps = sat__f32x4_set1(TONEMAP__STEPS);
+    for (; x + 4 <= map->row; x += 4) {
+        sat__f32x4 v = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale));
+        v = sat__f32x4_max(sat__f32x4_min(v, sat__f32x4_set1(TONEMAP__LOCAL_CAP)), sat__f32x4_set1(darkest));
+        sat__f32x4_store(out + x, sat__f32x4_mul(sat__f32x4_add(tonemap__log2_4(v), offset), steps));
+    }
+#endif
+    for (; x < map->row; x++) {
+        float v = luminance[x] * scale;
+        v = v < TONEMAP__LOCAL_CAP ? v : TONEMAP__LOCAL_CAP;
+        out[x] = (tonemap__log2(v > darkest ? v : darkest) + TONEMAP__OCTAVES) * TONEMAP__STEPS;
+    }
+    if (!map->row_unusable[j]) return;
+    for (last = 0; last < map->width && sat__float_bits(luminance[last]) == TONEMAP__UNUSABLE; last++) {}
+    if (last == map->width) last = 0;
+    for (x = 0; x < map->width; x++) {
+        if (sat__float_bits(luminance[x]) == TONEMAP__UNUSABLE) out[x] = out[last];
+        else last = x;
+    }
+}
+
+/* Adds what enters to the columns' sums of steps and of their squares, and takes away what leaves. */
+static inline void tonemap__move_steps(uint32_t *sum, uint32_t *square, const float *enters, const float *leaves,
+                                       int width)
+{
+    int x = 0;
+#ifdef SAT__VECTOR
+    int32_t *s = (int32_t *)(void *)sum, *s2 = (int32_t *)(void *)square;
+    for (; x + 4 <= width; x += 4) {
+        sat__i32x4 q = sat__f32x4_truncate(sat__f32x4_load(enters + x)),
+                   old = sat__f32x4_truncate(sat__f32x4_load(leaves + x));
+        sat__f32x4 v = sat__i32x4_to_f32(q), v_old = sat__i32x4_to_f32(old); /* squares below 2^24 are exact */
+        v = sat__f32x4_sub(sat__f32x4_mul(v, v), sat__f32x4_mul(v_old, v_old));
+        sat__i32x4_store(s + x, sat__i32x4_add(sat__i32x4_load(s + x), sat__i32x4_sub(q, old)));
+        sat__i32x4_store(s2 + x, sat__i32x4_add(sat__i32x4_load(s2 + x), sat__f32x4_truncate(v)));
+    }
+#endif
+    for (; x < width; x++) {
+        uint32_t q = (uint32_t)(int32_t)enters[x], old = (uint32_t)(int32_t)leaves[x];
+        sum[x] += q - old;
+        square[x] += q * q - old * old;
+    }
+}
+
+static inline void tonemap__move_sums(uint32_t *sum, const uint32_t *enters, const uint32_t *leaves, int width)
+{
+    int x = 0;
+#ifdef SAT__VECTOR
+    int32_t *s = (int32_t *)(void *)sum;
+    const int32_t *in = (const int32_t *)(const void *)enters, *out = (const int32_t *)(const void *)leaves;
+    for (; x + 4 <= width; x += 4)
+        sat__i32x4_store(s + x, sat__i32x4_add(sat__i32x4_load(s + x),
+                                               sat__i32x4_sub(sat__i32x4_load(in + x), sat__i32x4_load(out + x))));
+#endif
+    for (; x < width; x++) sum[x] += enters[x] - leaves[x];
+}
+
+/* Sums along two rows: entry x is what lies left of x, so that a box is a difference. Before the row stand zeros,
+   behind it the whole. */
+static inline void tonemap__add_along(uint32_t *sum0, uint32_t *sum1, const uint32_t *column0, const uint32_t *column1,
+                                      int width)
+{
+    uint32_t s0 = 0, s1 = 0;
+    int x;
+    memset(sum0 - TONEMAP__RADIUS, 0, TONEMAP__RADIUS * sizeof *sum0);
+    memset(sum1 - TONEMAP__RADIUS, 0, TONEMAP__RADIUS * sizeof *sum1);
+    for (x = 0; x < width; x++) {
+        sum0[x] = s0;
+        sum1[x] = s1;
+        s0 += column0[x];
+        s1 += column1[x];
+    }
+    for (; x < width + TONEMAP__RADIUS + 1; x++) {
+        sum0[x] = s0;
+        sum1[x] = s1;
+    }
+}
+
+/* a in 2^-20 and b in 2^-10 steps of pixels [x, end) whose boxes have one size. */
+static inline void tonemap__guided_fit(uint32_t *a, uint32_t *b, const uint32_t *sum, const uint32_t *square, int x,
+                                       int end, float inverse, float edge2)
+{
+    int r = TONEMAP__RADIUS;
+#ifdef SAT__VECTOR
+    const int32_t *s = (const int32_t *)(const void *)sum, *s2 = (const int32_t *)(const void *)square;
+    for (; x + 4 <= end; x += 4) {
+        sat__f32x4 i = sat__f32x4_set1(inverse), half = sat__f32x4_set1(0.5f), share, mean, var;
+        mean = sat__f32x4_mul(
+            sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_load(s + x + r + 1), sat__i32x4_load(s + x - r))), i);
+        var = sat__f32x4_mul(
+            sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_load(s2 + x + r + 1), sat__i32x4_load(s2 + x - r))), i);
+        var = sat__f32x4_max(sat__f32x4_sub(var, sat__f32x4_mul(mean, mean)), sat__f32x4_set1(0));
+        share = sat__f32x4_div(var, sat__f32x4_add(var, sat__f32x4_set1(edge2)));
+        mean = sat__f32x4_mul(sat__f32x4_add(mean, half), sat__f32x4_sub(sat__f32x4_set1(1), share));
+        sat__i32x4_store((int32_t *)(void *)(a + x),
+                         sat__f32x4_truncate(sat__f32x4_mul(share, sat__f32x4_set1(1048576.0f))));
+        sat__i32x4_store((int32_t *)(void *)(b + x),
+                         sat__f32x4_truncate(sat__f32x4_mul(mean, sat__f32x4_set1(1024.0f))));
+    }
+#endif
+    for (; x < end; x++) {
+        float mean = (float)(int32_t)(sum[x + r + 1] - sum[x - r]) * inverse;
+        float var = (float)(int32_t)(square[x + r + 1] - square[x - r]) * inverse - mean * mean, share;
+        var = var > 0 ? var : 0;
+        share = var / (var + edge2);
+        a[x] = (uint32_t)(int32_t)(share * 1048576.0f);
+        b[x] = (uint32_t)(int32_t)((mean + 0.5f) * (1 - share) * 1024.0f);
+    }
+}
+
+static inline void tonemap__guided_local(float *local, const float *steps, const uint32_t *a, const uint32_t *b, int x,
+                                         int end, float inverse)
+{
+    int r = TONEMAP__RADIUS;
+    float share = inverse / (1048576.0f * TONEMAP__STEPS), base = inverse / (1024.0f * TONEMAP__STEPS);
+#ifdef SAT__VECTOR
+    const int32_t *sa = (const int32_t *)(const void *)a, *sb = (const int32_t *)(const void *)b;
+    for (; x + 4 <= end; x += 4) {
+        sat__f32x4 va = sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_load(sa + x + r + 1), sat__i32x4_load(sa + x - r)));
+        sat__f32x4 vb = sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_load(sb + x + r + 1), sat__i32x4_load(sb + x - r)));
+        va = sat__f32x4_mul(sat__f32x4_mul(va, sat__f32x4_set1(share)), sat__f32x4_load(steps + x));
+        vb = sat__f32x4_sub(sat__f32x4_mul(vb, sat__f32x4_set1(base)), sat__f32x4_set1(TONEMAP__OCTAVES));
+        sat__f32x4_store(local + x, tonemap__exp2_4(sat__f32x4_add(va, vb)));
+    }
+#endif
+    for (; x < end; x++) {
+        float va = (float)(int32_t)(a[x + r + 1] - a[x - r]) * share * steps[x];
+        float vb = (float)(int32_t)(b[x + r + 1] - b[x - r]) * base - TONEMAP__OCTAVES;
+        local[x] = tonemap__exp2(va + vb);
+    }
+}
+
+/* 1 / area of the boxes at pixel x, and where it changes: at each pixel beside the borders. */
+static inline int tonemap__guided_run(float *inverse, int x, int width, int rows)
+{
+    int x0 = sat__max_int(x - TONEMAP__RADIUS, 0), x1 = sat__min_int(x + TONEMAP__RADIUS + 1, width);
+    *inverse = 1 / (float)(rows * (x1 - x0));
+    return x1 - x0 < 2 * TONEMAP__RADIUS + 1 ? x + 1 : width - TONEMAP__RADIUS;
+}
+
+static inline int tonemap__guided_rows(const tonemap *map, int y)
+{
+    return sat__min_int(y + TONEMAP__RADIUS + 1, map->height) - sat__max_int(y - TONEMAP__RADIUS, 0);
+}
+
+/* Row m of a and b; first: the first row of them that this piece of work needs. */
+static inline void tonemap__guided_row(const tonemap *map, tonemap__worker *w, int m, int first)
+{
+    enum { R = TONEMAP__RADIUS };
+    int j = m > first ? m + R : sat__max_int(m - R, 0), begin = sat__max_int(first - R, 0), x = 0, end, which;
+    uint32_t *sum = tonemap__guided_ring(map, w, 3, 0), *square = tonemap__guided_ring(map, w, 3, 1);
+    float inverse;
+    if (m == first)
+        for (which = 0; which < 4; which++) memset(w->column[which], 0, (size_t)map->row * sizeof(uint32_t));
+    for (; j <= m + R; j++) {
+        int leaves = j - 2 * R - 1;
+        float *enters = (float *)(void *)tonemap__guided_ring(map, w, 0, j);
+        if (j < map->height) tonemap__steps_row(enters, map, j);
+        else memset(enters, 0, (size_t)map->row * sizeof *enters);
+        tonemap__move_steps(w->column[0], w->column[1], enters,
+                            leaves < begin ? w->nothing
+                                           : (const float *)(const void *)tonemap__guided_ring(map, w, 0, leaves),
+                            map->width);
+    }
+    tonemap__add_along(sum, square, w->column[0], w->column[1], map->width);
+    for (; x < map->width; x = end) {
+        end = tonemap__guided_run(&inverse, x, map->width, tonemap__guided_rows(map, m));
+        tonemap__guided_fit(tonemap__guided_ring(map, w, 1, m), tonemap__guided_ring(map, w, 2, m), sum, square, x, end,
+                            inverse, map->frame.edge2);
+    }
+}
+
+/* La of row y. */
+static inline void tonemap__guided_local_row(const tonemap *map, tonemap__worker *w, int y, int first)
+{
+    enum { R = TONEMAP__RADIUS };
+    int begin = sat__max_int(first - R, 0), m = y > first ? y + R : begin, x = 0, end, which;
+    uint32_t *sum[2];
+    float inverse;
+    for (; m <= y + R; m++) {
+        if (m < map->height) tonemap__guided_row(map, w, m, begin);
+        for (which = 0; which < 2; which++) {
+            uint32_t *enters = tonemap__guided_ring(map, w, 1 + which, m);
+            if (m >= map->height) memset(enters, 0, (size_t)map->row * sizeof *enters);
+            tonemap__move_sums(w->column[2 + which], enters,
+                               m - 2 * R - 1 < begin ? (const uint32_t *)(const void *)w->nothing
+                                                     : tonemap__guided_ring(map, w, 1 + which, m - 2 * R - 1),
+                               map->width);
+        }
+    }
+    for (which = 0; which < 2; which++) sum[which] = tonemap__guided_ring(map, w, 3, which);
+    tonemap__add_along(sum[0], sum[1], w->column[2], w->column[3], map->width);
+    for (; x < map->width; x = end) {
+        end = tonemap__guided_run(&inverse, x, map->width, tonemap__guided_rows(map, y));
+        tonemap__guided_local(w->local, (const float *)(const void *)tonemap__guided_ring(map, w, 0, y), sum[0], sum[1],
+                              x, end, inverse);
+    }
+}
+
 /* ---- La for one row */
 
 /* The pixel for itself: what the global operators take, and, capped as in the sums, pixels that are not worth a
@@ -1857,25 +1810,6 @@ static inline void tonemap__reset_flat(float *local, const float *luminance, con
         if (!(edge[x] > threshold)) local[x] = luminance[x] * scale < cap ? luminance[x] * scale : cap;
 }
 
-/* Tiles without a search get their constant; runs of the others are searched. */
-static inline void tonemap__search_tiles(tonemap *map, tonemap__worker *w, const float *luminance,
-                                         const tonemap__window *window, int y)
-{
-    const float *tile = map->tile_local + (size_t)(y / TONEMAP__TILE) * (size_t)map->tiles_x;
-    int t = 0, tiles = map->tiles_x, begin, x, end;
-    while (t < tiles) {
-        for (begin = t; t < tiles && tile[t] < 0; t++) {}
-        if (t > begin)
-            tonemap__search(w, luminance, window, &map->frame, 0, begin * TONEMAP__TILE,
-                            sat__min_int(t * TONEMAP__TILE, map->width));
-        for (; t < tiles && !(tile[t] < 0); t++) {
-            end = sat__min_int((t + 1) * TONEMAP__TILE, map->width);
-            for (x = t * TONEMAP__TILE; x < end; x++) w->local[x] = tile[t];
-            w->stats.skipped += (size_t)(end - t * TONEMAP__TILE);
-        }
-    }
-}
-
 static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const float *luminance,
                                          const tonemap__window *window, int y)
 {
@@ -1898,18 +1832,21 @@ static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const
     }
 }
 
-static inline void tonemap__local_row(tonemap *map, tonemap__worker *w, int y)
+static inline void tonemap__local_row(tonemap *map, tonemap__worker *w, int y, int first)
 {
     const tonemap_options *o = &map->options;
     const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
     tonemap__window window;
+    if (o->operation == TONEMAP_GUIDED) {
+        tonemap__guided_local_row(map, w, y, first);
+        return;
+    }
     if (map->frame.boxes < 2) {
         tonemap__own_luminance(w->local, luminance, map->frame.scale, FLT_MAX, 0, map->width);
         return;
     }
     tonemap__open_window(&window, map, w, y);
-    if (TONEMAP__HAS_SKIPPING && map->skipping) tonemap__search_tiles(map, w, luminance, &window, y);
-    else if (TONEMAP__HAS_SELECTIVE && o->selective > 0) tonemap__search_edges(map, w, luminance, &window, y);
+    if (TONEMAP__HAS_SELECTIVE && o->selective > 0) tonemap__search_edges(map, w, luminance, &window, y);
     else tonemap__search(w, luminance, &window, &map->frame, o->operation == TONEMAP_ASHIKHMIN, 0, map->width);
 }
 
@@ -2156,60 +2093,62 @@ static inline void tonemap__gamut4(sat__f32x4 *v, sat__f32x4 top, sat__f32x4 gre
 }
 #endif
 
-/* Pixels [x, x + n) times their gain, clipped to [floor, 1]. rho is NULL where nothing is mesopic. Comparisons are
-   written so that NaN becomes the floor: it comes from pixels that are black. */
-static inline void tonemap__shade_plain(tonemap__planes out, const float *pixels, int channels, const float *luminance,
-                                        const float *gain, const float *rho, float floor, float gamut, int x, int i,
-                                        int n, size_t *clamped)
+/* What the pixels of a row become their display values by. rho is NULL where nothing is mesopic. */
+typedef struct tonemap__shading {
+    const float *pixels, *luminance, *gain, *rho;
+    int channels;
+    float floor, gamut;
+    size_t clamped;
+} tonemap__shading;
+
+/* Pixels [x, x + n) times their gain, clipped to [floor, 1]. Comparisons are written so that NaN becomes the floor: it
+   comes from pixels that are black. */
+static inline void tonemap__shade_plain(tonemap__planes out, tonemap__shading *s, int x, int i, int n)
 {
     for (; i < n; i++) {
-        const float *p = pixels + (size_t)(x + i) * (size_t)channels;
-        float v[3];
-        float top = 1;
+        const float *p = s->pixels + (size_t)(x + i) * (size_t)s->channels;
+        float v[3], top = 1, gain = s->gain[x + i];
         int c;
         v[0] = p[0];
-        v[1] = p[channels > 1 ? 1 : 0];
-        v[2] = p[channels > 1 ? 2 : 0];
-        if (TONEMAP__HAS_MESOPIC && rho) tonemap__shift_red_plain(v, v + 1, v + 2, luminance[x + i], rho[x + i]);
+        v[1] = p[s->channels > 1 ? 1 : 0];
+        v[2] = p[s->channels > 1 ? 2 : 0];
+        if (TONEMAP__HAS_MESOPIC && s->rho)
+            tonemap__shift_red_plain(v, v + 1, v + 2, s->luminance[x + i], s->rho[x + i]);
         for (c = 0; c < 3; c++) {
-            float d = v[c] * gain[x + i];
-            v[c] = d > floor ? d : floor;
+            float d = v[c] * gain;
+            v[c] = d > s->floor ? d : s->floor;
             top = v[c] > top ? v[c] : top;
         }
-        *clamped += (size_t)(top > 1);
-        if (top > 1 && gamut >= 0) tonemap__gamut_plain(v, top, luminance[x + i] * gain[x + i], gamut, floor);
+        s->clamped += (size_t)(top > 1);
+        if (top > 1 && s->gamut >= 0) tonemap__gamut_plain(v, top, s->luminance[x + i] * gain, s->gamut, s->floor);
         for (c = 0; c < 3; c++) out[c][i] = v[c] < 1 ? v[c] : 1;
     }
 }
 
 #ifdef SAT__VECTOR
-static inline int tonemap__shade_vector(tonemap__planes out, const float *pixels, int channels, const float *luminance,
-                                        const float *gain, const float *rho, float floor, float gamut, int x, int n,
-                                        size_t *clamped)
+static inline int tonemap__shade_vector(tonemap__planes out, tonemap__shading *s, int x, int n)
 {
-    sat__f32x4 one = sat__f32x4_set1(1), least = sat__f32x4_set1(floor);
+    sat__f32x4 one = sat__f32x4_set1(1), least = sat__f32x4_set1(s->floor);
     sat__i32x4 over = sat__i32x4_set1(0);
     int32_t count[4];
-    int i;
+    int i, c;
     for (i = 0; i + 4 <= n; i += 4) {
-        sat__f32x4 r, g, b, v[3], top, factor = sat__f32x4_load(gain + x + i);
+        sat__f32x4 v[3], top, gain = sat__f32x4_load(s->gain + x + i),
+                              luminance = sat__f32x4_load(s->luminance + x + i);
         sat__i32x4 beyond;
-        int c;
-        tonemap__load_pixels(pixels + (size_t)(x + i) * (size_t)channels, channels, &r, &g, &b);
-        if (TONEMAP__HAS_MESOPIC && rho)
-            tonemap__shift_red4(&r, &g, &b, sat__f32x4_load(luminance + x + i), sat__f32x4_load(rho + x + i));
-        v[0] = sat__f32x4_max(sat__f32x4_mul(r, factor), least);
-        v[1] = sat__f32x4_max(sat__f32x4_mul(g, factor), least);
-        v[2] = sat__f32x4_max(sat__f32x4_mul(b, factor), least);
+        tonemap__load_pixels(s->pixels + (size_t)(x + i) * (size_t)s->channels, s->channels, v, v + 1, v + 2);
+        if (TONEMAP__HAS_MESOPIC && s->rho)
+            tonemap__shift_red4(v, v + 1, v + 2, luminance, sat__f32x4_load(s->rho + x + i));
+        for (c = 0; c < 3; c++) v[c] = sat__f32x4_max(sat__f32x4_mul(v[c], gain), least);
         top = sat__f32x4_max(sat__f32x4_max(v[0], v[1]), v[2]);
         beyond = sat__f32x4_less(one, top);
         over = sat__i32x4_sub(over, beyond);
-        if (gamut >= 0 && sat__i32x4_any(beyond))
-            tonemap__gamut4(v, top, sat__f32x4_mul(sat__f32x4_load(luminance + x + i), factor), gamut, least);
+        if (s->gamut >= 0 && sat__i32x4_any(beyond))
+            tonemap__gamut4(v, top, sat__f32x4_mul(luminance, gain), s->gamut, least);
         for (c = 0; c < 3; c++) sat__f32x4_store(out[c] + i, sat__f32x4_min(v[c], one));
     }
     sat__i32x4_store(count, over);
-    *clamped += (size_t)(count[0] + count[1] + count[2] + count[3]);
+    s->clamped += (size_t)(count[0] + count[1] + count[2] + count[3]);
     return i;
 }
 #endif
@@ -2264,18 +2203,26 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
     const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
     unsigned char *row = job->out + (ptrdiff_t)y * job->out_stride;
     int x, i, n, channels = job->hdr->channels;
-    float floor = job->as_float ? 0 : TONEMAP__CODE_FLOOR, gamut = channels > 1 ? map->frame.gamut : -1;
+    tonemap__shading shading;
     tonemap__planes v;
+    shading.pixels = pixels;
+    shading.luminance = luminance;
+    shading.gain = w->local;
+    shading.rho = rho;
+    shading.channels = channels;
+    shading.floor = job->as_float ? 0 : TONEMAP__CODE_FLOOR;
+    shading.gamut = channels > 1 ? map->frame.gamut : -1;
+    shading.clamped = 0;
     for (x = 0; x < map->width; x += n) {
         size_t at = (size_t)x * (size_t)channels;
         float *as_float = (float *)(void *)row + at;
         n = sat__min_int(TONEMAP__CHUNK, map->width - x);
 #ifdef SAT__VECTOR
-        i = tonemap__shade_vector(v, pixels, channels, luminance, w->local, rho, floor, gamut, x, n, &w->stats.clamped);
+        i = tonemap__shade_vector(v, &shading, x, n);
 #else
         i = 0;
 #endif
-        tonemap__shade_plain(v, pixels, channels, luminance, w->local, rho, floor, gamut, x, i, n, &w->stats.clamped);
+        tonemap__shade_plain(v, &shading, x, i, n);
         if (channels == 4) /* alpha: before the colours, which may overwrite the input */
             for (i = 0; i < n; i++) {
                 float alpha = tonemap__unit(pixels[at + 4 * (size_t)i + 3]);
@@ -2285,6 +2232,7 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
         if (job->as_float) tonemap__write_f32(as_float, channels, v, n);
         else tonemap__write_u8(map, row + at, channels, v, n);
     }
+    w->stats.clamped += shading.clamped;
 }
 
 static void tonemap__map_bands(int begin, int end, int worker, void *context)
@@ -2293,7 +2241,7 @@ static void tonemap__map_bands(int begin, int end, int worker, void *context)
     tonemap *map = job->map;
     tonemap__worker *w = &map->worker[worker];
     const tonemap__frame *f = &map->frame;
-    int y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height),
+    int y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, map->height), first = y,
         next = sat__max_int(y - f->reach, 0), x;
     int mesopic = TONEMAP__HAS_MESOPIC && map->options.mesopic != TONEMAP_MESOPIC_OFF && job->hdr->channels > 1;
     if (mesopic && map->options.mesopic == TONEMAP_MESOPIC_UNIFORM) {
@@ -2305,7 +2253,7 @@ static void tonemap__map_bands(int begin, int end, int worker, void *context)
         const float *pixels = tonemap__float_row(w->pixels, job->hdr, y);
         if (f->reach > 0)
             for (; next < sat__min_int(y + f->reach + 1, map->height); next++) tonemap__add_ring_row(map, w, next);
-        tonemap__local_row(map, w, y);
+        tonemap__local_row(map, w, y, first);
         if (mesopic && map->options.mesopic == TONEMAP_MESOPIC_LOCAL)
             tonemap__rho_row(w->rho, w->local, f->lux, map->width);
         tonemap__gain_row(map, w, y);
@@ -2360,24 +2308,22 @@ static void tonemap__fill_bands(int begin, int end, int worker, void *context)
 
 static inline void tonemap__carve(tonemap *map, sat__arena *arena)
 {
-    size_t row = (size_t)map->row, height = (size_t)map->height, tiles = (size_t)map->tiles_x * (size_t)map->tiles_y;
-    int i;
+    size_t row = (size_t)map->row, height = (size_t)map->height;
+    int i, k;
     map->worker = (tonemap__worker *)sat__carve(arena, (size_t)map->workers, sizeof *map->worker);
     map->luminance = (float *)sat__carve(arena, height, row * sizeof(float));
     map->row_sum = (float *)sat__carve(arena, height, sizeof(float));
     map->row_unusable = (unsigned char *)sat__carve(arena, height, 1);
-    map->tile_range = (tonemap__range *)sat__carve(arena, tiles, sizeof *map->tile_range);
-    map->tile_reached = (tonemap__range *)sat__carve(arena, tiles, sizeof *map->tile_reached);
-    map->tile_peak = (float *)sat__carve(arena, tiles, sizeof(float));
-    map->tile_local = (float *)sat__carve(arena, tiles, sizeof(float));
+    map->meter = (tonemap__meter *)sat__carve(arena, 1, sizeof *map->meter);
     for (i = 0; i < map->workers; i++) {
         tonemap__worker ignored, *w = arena->base ? &map->worker[i] : &ignored;
-        w->sums = (uint32_t *)sat__carve(arena, 2 * TONEMAP__BOXES + 2, (size_t)map->ring_row * sizeof(uint32_t));
+        w->sums = (uint32_t *)sat__carve(arena, TONEMAP__RINGS, (size_t)map->ring_row * sizeof(uint32_t));
+        for (k = 0; k < 4; k++) w->column[k] = (uint32_t *)sat__carve(arena, row, sizeof(uint32_t));
+        w->nothing = (const float *)sat__carve(arena, row, sizeof(float));
         w->pixels = (float *)sat__carve(arena, 4 * row, sizeof(float));
         w->local = (float *)sat__carve(arena, row, sizeof(float));
         w->rho = (float *)sat__carve(arena, row, sizeof(float));
         w->edge = (float *)sat__carve(arena, row, sizeof(float));
-        w->peak = (float *)sat__carve(arena, row, sizeof(float));
         w->bins = (uint32_t *)sat__carve(arena, TONEMAP__BINS, sizeof(uint32_t));
     }
 }
@@ -2400,8 +2346,6 @@ TONEMAP_DEF sat_result tonemap_create(tonemap **out, int width, int height, cons
     shape.height = height;
     shape.row = (width + 2 * TONEMAP__GROUP - 1) / TONEMAP__GROUP * TONEMAP__GROUP;
     shape.ring_row = shape.row + 2 * TONEMAP__BOXES + TONEMAP__GROUP + 8;
-    shape.tiles_x = (width + TONEMAP__TILE - 1) / TONEMAP__TILE;
-    shape.tiles_y = (height + TONEMAP__TILE - 1) / TONEMAP__TILE;
     shape.workers = sat__worker_count(&o.threads);
     memset(&arena, 0, sizeof arena);
     sat__carve(&arena, 1, sizeof shape);
@@ -2448,7 +2392,6 @@ static inline void tonemap__finish_stats(tonemap *map)
         map->stats.searched += s->searched;
         map->stats.skipped += s->skipped;
         for (k = 0; k < 10; k++) map->stats.scale[k] += s->scale[k];
-        if (s->worst_codes > map->stats.worst_codes) map->stats.worst_codes = s->worst_codes;
     }
 }
 
@@ -2470,7 +2413,6 @@ static inline sat_result tonemap__apply(tonemap__job *job, double dt, tonemap_st
     sat__parallel_for(threads, bands, tonemap__measure_bands, job);
     if (tonemap__measured_state(map, measured)) tonemap__adapt(map, measured, dt);
     tonemap__prepare_frame(map);
-    map->skipping = tonemap__skips(&map->options) && tonemap__plan_skipping(map, job);
     sat__parallel_for(threads, bands, tonemap__map_bands, job);
     if (map->stats.nan + map->stats.negative) sat__parallel_for(threads, bands, tonemap__fill_bands, job);
     tonemap__finish_stats(map);
@@ -2605,8 +2547,8 @@ static const char tonemap__glsl_luminance[] =
     "    value = bits > 0x7f800000u && bits != 0x80000000u ? -1.0 : tonemap_luminance(rgb);\n" /* -1: unusable */
     "}\n";
 
-/* Sums over 4 x 4 texels. Texel: whole and 2^-16 parts of the sum of log2, carried over; pixels; the float sum of the
-   luminances. Integers, so that the log-average is the CPU's. The polynomial is the CPU's, too. */
+/* Sums over 4 x 4 texels. Texel: whole and 2^-16 parts of the sum of log2, carried over; pixels. Integers, so that the
+ * log-average is the CPU's. The polynomial is the CPU's, too. */
 static const char tonemap__glsl_reduce[] =
     "#ifdef TONEMAP_FIRST\n"
     "uniform sampler2D source;\n"
@@ -2617,7 +2559,7 @@ static const char tonemap__glsl_reduce[] =
     "    float t = uintBitsToFloat((bits & 0x007fffffu) | 0x3f800000u) - 1.0;\n"
     "    float q = -0.0959564262 + t * 0.0258414329;\n"
     "    q = 0.442544943 + t * (-0.275600307 + t * (0.18194886 + t * q));\n"
-    "    return ivec4(int(bits >> 23) - 127, int((t + t * (1.0 - t) * q) * 65536.0 + 0.5), 1, floatBitsToInt(y));\n"
+    "    return ivec4(int(bits >> 23) - 127, int((t + t * (1.0 - t) * q) * 65536.0 + 0.5), 1, 0);\n"
     "}\n"
     "#else\n"
     "uniform highp isampler2D source;\n"
@@ -2628,14 +2570,11 @@ static const char tonemap__glsl_reduce[] =
     "void main() {\n"
     "    ivec2 low = 4 * ivec2(gl_FragCoord.xy), high = min(low + 4, size);\n"
     "    ivec3 sum = ivec3(0);\n"
-    "    float light = 0.0;\n"
     "    for (int y = low.y; y < high.y; y++)\n"
     "        for (int x = low.x; x < high.x; x++) {\n"
-    "            ivec4 v = tonemap_read(ivec2(x, y));\n"
-    "            sum += v.xyz;\n"
-    "            light += intBitsToFloat(v.w);\n"
+    "            sum += tonemap_read(ivec2(x, y)).xyz;\n"
     "        }\n"
-    "    value = ivec4(sum.x + (sum.y >> 16), sum.y & 65535, sum.z, floatBitsToInt(light));\n"
+    "    value = ivec4(sum.x + (sum.y >> 16), sum.y & 65535, sum.z, 0);\n"
     "}\n";
 
 /* The histogram: a point a pixel, added up by blending; bins as on the CPU, 64 in a row. */
@@ -2655,41 +2594,44 @@ static const char tonemap__glsl_count[] =
     "out float value;\n"
     "void main() { value = 1.0; }\n";
 
-/* The state, two texels: log2 of average, key and white, and 1; log2 of low and high, the mean, and what the meter
-   holds. An empty picture keeps the old one. */
+/* The state, two texels: log2 of average, key and white, and 1; log2 of low and high, what the meter and what the white
+   hold. An empty picture keeps the old one. */
 static const char tonemap__glsl_state[] =
     "uniform highp isampler2D sums;\n"
     "uniform sampler2D old, histogram;\n"
     "uniform float weight, weight_darker, key, white, pixels, exposure, lowest, highest, dead_band;\n" /* key and white as log2, or NaN bits: estimated */
     "out vec4 value;\n"
+    "float tonemap_value(int bin, float part) { return float(bin / 16 - 100) + log2(1.0 + (float(bin % 16) + part) / 16.0); }\n"
+    "float tonemap_count(int bin) { return texelFetch(histogram, ivec2(bin % 64, bin / 64), 0).x; }\n"
     "float tonemap_quantile(float share, float positive) {\n"
     "    float wanted = share * positive, seen = 0.0;\n"
     "    for (int bin = 0; bin < TONEMAP_BINS; bin++) {\n"
-    "        float count = texelFetch(histogram, ivec2(bin % 64, bin / 64), 0).x;\n"
-    "        if (count > 0.0 && seen + count >= wanted)\n"
-    "            return float(bin / 16 - 100) + log2(1.0 + (float(bin % 16) + max(wanted - seen, 0.0) / count) / 16.0);\n"
+    "        float count = tonemap_count(bin);\n"
+    "        if (count > 0.0 && seen + count >= wanted) return tonemap_value(bin, max(wanted - seen, 0.0) / count);\n"
     "        seen += count;\n"
     "    }\n"
     "    return 0.0;\n"
     "}\n"
-    "float tonemap_value(int bin) { return float(bin / 16 - 100) + log2(1.0 + (float(bin % 16) + 0.5) / 16.0); }\n"
-    "float tonemap_count(int bin) { return texelFetch(histogram, ivec2(bin % 64, bin / 64), 0).x; }\n"
-    "float tonemap_metered(float average, float positive) {\n"
-    "    float top = tonemap_quantile(0.99, positive), all = 0.0, whole = 0.0, inner = 0.0, sum = 0.0, seen = 0.0;\n"
+    "float tonemap_share(int bin, float top) { return tonemap_count(bin) * clamp((tonemap_value(bin, 0.5) - top + 24.0) / 6.0, 0.0, 1.0); }\n"
+    "float tonemap_between(float low, float high, float top) {\n" /* above top */
+    "    float all = 0.0, inner = 0.0, sum = 0.0, seen = 0.0;\n"
+    "    for (int bin = 0; bin < TONEMAP_BINS; bin++) all += tonemap_share(bin, top);\n"
     "    for (int bin = 0; bin < TONEMAP_BINS; bin++) {\n"
-    "        float n = tonemap_count(bin), v = tonemap_value(bin) - top;\n"
-    "        whole += n * v;\n"
-    "        all += n * clamp((v + 24.0) / 6.0, 0.0, 1.0);\n"
-    "    }\n"
-    "    for (int bin = 0; bin < TONEMAP_BINS; bin++) {\n"
-    "        float v = tonemap_value(bin) - top, next = seen + tonemap_count(bin) * clamp((v + 24.0) / 6.0, 0.0, 1.0);\n"
-    "        float n = max(min(next, TONEMAP_METER_HIGH * all) - max(seen, TONEMAP_METER_LOW * all), 0.0);\n"
+    "        float next = seen + tonemap_share(bin, top), n = max(min(next, high * all) - max(seen, low * all), 0.0);\n"
     "        inner += n;\n"
-    "        sum += n * v;\n"
+    "        sum += n * (tonemap_value(bin, 0.5) - top);\n"
     "        seen = next;\n"
     "    }\n"
-    "    if (inner > 0.0) average += sum / inner - whole / positive;\n"
-    "    return average;\n"
+    "    return sum / max(inner, 1e-30);\n"
+    "}\n"
+    "float tonemap_metered(float average, float positive, float top) {\n"
+    "    float whole = 0.0;\n"
+    "    for (int bin = 0; bin < TONEMAP_BINS; bin++) whole += tonemap_count(bin) * (tonemap_value(bin, 0.5) - top);\n"
+    "    average += tonemap_between(TONEMAP_METER_LOW, TONEMAP_METER_HIGH, top) - whole / positive;\n"
+    "    return max(average, top + tonemap_between(0.8, TONEMAP_METER_HIGH > 0.8 ? TONEMAP_METER_HIGH : 1.0, top) - 4.5);\n"
+    "}\n"
+    "float tonemap_hold(float held, bool fresh, float now, float steps) {\n"
+    "    return fresh || abs(now - held) * steps > dead_band ? floor(now * steps + 0.5) / steps : held;\n"
     "}\n"
     "void main() {\n"
     "    ivec4 sum = texelFetch(sums, ivec2(0), 0);\n"
@@ -2701,30 +2643,31 @@ static const char tonemap__glsl_state[] =
     "    if (lit) {\n"
     "        int whole = sum.x / sum.z;\n"
     "        float positive = float(sum.z), average = float(whole) + (float(sum.x - whole * sum.z) + float(sum.y) / 65536.0) / positive;\n"
-    "        vec4 range = vec4(0.0);\n"
+    "        vec2 range = vec2(0.0);\n"
+    "#if TONEMAP_HISTOGRAM\n"
+    "        float top = tonemap_quantile(0.99, positive);\n"
+    "#endif\n"
     "#if TONEMAP_METERING == 0\n"
-    "        average = tonemap_metered(average, positive);\n"
-    "        if (first.w <= 0.0 || abs(average - second.w) > dead_band) second.w = floor(average * 64.0 + 0.5) / 64.0;\n"
-    "        average = second.w;\n"
+    "        average = second.z = tonemap_hold(second.z, first.w <= 0.0, tonemap_metered(average, positive, top), 64.0);\n"
     "#endif\n"
     "        average = max(min(average, highest), lowest);\n"
-    "        range.w = second.w;\n"
     "        vec4 now = vec4(average, key, white, 1.0);\n"
     "#if TONEMAP_HISTOGRAM\n"
-    "        float low = tonemap_quantile(0.01, positive), high = tonemap_quantile(0.99, positive);\n"
+    "        float low = tonemap_quantile(0.01, positive), high = top;\n"
     "        float place = high - low > 0.125 ? clamp((2.0 * average - low - high) / (high - low), -1.0, 1.0) : 0.0;\n"
     "        if (TONEMAP_HISTOGRAM % 4 / 2 == 1) now.y = log2(0.18) + 2.0 * place;\n"
-    "        if (TONEMAP_HISTOGRAM % 8 / 4 == 1) now.z = max(log2(1.5) + high - low - 5.0, 0.0);\n"
-    "        range.xy = vec2(tonemap_quantile(0.0005, positive), tonemap_quantile(0.9995, positive));\n"
+    "        float scaled = top + tonemap_between(0.995, 0.9995, top) + (exposure > 0.0 ? log2(exposure) : now.y - average);\n"
+    "        float burn = max(min(log2(1.5) + high - low - 5.0, scaled), 0.0);\n"
+    "        if (TONEMAP_HISTOGRAM % 8 / 4 == 1) now.z = second.w = tonemap_hold(second.w, first.w <= 0.0, burn, 8.0);\n"
+    "        range = vec2(tonemap_quantile(0.0005, positive), tonemap_quantile(0.9995, positive));\n"
     "#endif\n"
     "        float share = first.w > 0.0 ? average < first.x ? weight_darker : weight : 1.0;\n"
     "        first = share < 1.0 ? mix(first, now, share) : now;\n"
-    "        second = share < 1.0 ? mix(second, range, share) : range;\n"
+    "        second.xy = share < 1.0 ? mix(second.xy, range, share) : range;\n"
     "        first.w = 1.0;\n"
     "    }\n"
     "    if (exposure > 0.0) first.x = first.y - log2(exposure);\n"
     "    if (TONEMAP_HISTOGRAM % 8 / 4 == 0) first.z = white;\n"
-    "    second.z = intBitsToFloat(sum.w) / pixels;\n"
     "    value = gl_FragCoord.x < 1.0 ? first : second;\n"
     "}\n";
 
@@ -2747,11 +2690,69 @@ static const char tonemap__glsl_quantise[] =
     "    value = uint(v * TONEMAP_STEPS + 0.5);\n"
     "}\n";
 
+/* The guided filter's passes, with the CPU's integers: steps; sums of 21 columns of steps and their squares, or of a
+   and b; of 21 rows of them, from which a and b come. The last sum is in the mapping pass. */
+static const char tonemap__glsl_steps[] =
+    "out float value;\n"
+    "float tonemap_next(ivec2 p, int step, int end) {\n" /* a pixel that is no measurement counts as the usable one beside it */
+    "    float y = -1.0;\n"
+    "    for (; p.x != end && y < 0.0; p.x += step) y = texelFetch(luminance, p, 0).x;\n"
+    "    return y;\n"
+    "}\n"
+    "void main() {\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+    "    float y = tonemap_next(p, -1, -1);\n"
+    "    if (y < 0.0) y = tonemap_next(p, 1, textureSize(luminance, 0).x);\n"
+    "    value = (log2(clamp(y * tonemap_scale(), 1.0 / 1024.0, 256.0)) + 10.0) * 64.0;\n"
+    "}\n";
+
+static const char tonemap__glsl_along[] =
+    "#ifdef TONEMAP_FIRST\n"
+    "uniform sampler2D source;\n"
+    "uvec2 tonemap_read(ivec2 p) { uint q = uint(texelFetch(source, p, 0).x); return uvec2(q, q * q); }\n"
+    "#else\n"
+    "uniform highp usampler2D source;\n"
+    "uvec2 tonemap_read(ivec2 p) { return texelFetch(source, p, 0).xy; }\n"
+    "#endif\n"
+    "out uvec2 value;\n"
+    "void main() {\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+    "    int end = min(p.x + 11, textureSize(source, 0).x);\n"
+    "    value = uvec2(0u);\n"
+    "    for (int x = max(p.x - 10, 0); x < end; x++) value += tonemap_read(ivec2(x, p.y));\n"
+    "}\n";
+
+/* The sums of 21 rows of such sums, as means. */
+static const char tonemap__glsl_down[] =
+    "vec2 tonemap_mean(highp usampler2D sums, ivec2 p) {\n"
+    "    ivec2 size = textureSize(sums, 0), low = max(p - 10, 0), high = min(p + 11, size);\n"
+    "    uvec2 sum = uvec2(0u);\n"
+    "    for (int y = low.y; y < high.y; y++) sum += texelFetch(sums, ivec2(p.x, y), 0).xy;\n"
+    "    return vec2(sum) / float((high.x - low.x) * (high.y - low.y));\n"
+    "}\n";
+
+static const char tonemap__glsl_fit[] =
+    "uniform highp usampler2D source;\n"
+    "out uvec2 value;\n"
+    "void main() {\n"
+    "    vec2 m = tonemap_mean(source, ivec2(gl_FragCoord.xy));\n"
+    "    float var = max(m.y - m.x * m.x, 0.0), share = var / (var + TONEMAP_EDGE2);\n"
+    "    value = uvec2(share * 1048576.0, (m.x + 0.5) * (1.0 - share) * 1024.0);\n"
+    "}\n";
+
 /* La. Soft scales and Ashikhmin's search are here, the plain search in the library. */
 static const char tonemap__glsl_search[] =
     "uniform highp usampler2D table;\n"
+    "#if TONEMAP_OPERATOR != 5\n"
     "float tonemap_box(ivec2 p, int reach) { return sat_mean(table, 1.0 / TONEMAP_STEPS, p - reach, p + reach + 1); }\n"
-    "#if TONEMAP_OPERATOR == 2\n"
+    "#endif\n"
+    "#if TONEMAP_OPERATOR == 5\n"
+    "uniform sampler2D steps;\n"
+    "float tonemap_find(ivec2 p, float own, float key) {\n"
+    "    vec2 m = tonemap_mean(table, p);\n"
+    "    return exp2((m.x / 1048576.0 * texelFetch(steps, p, 0).x + m.y / 1024.0) / 64.0 - 10.0);\n"
+    "}\n"
+    "#elif TONEMAP_OPERATOR == 2\n"
     "float tonemap_find(ivec2 p, float own, float key) {\n"
     "    const int reach[20] = int[20](0, 1, 2, 3, 4, 5, 6, 6, 7, 8, 9, 10, 11, 12, 12, 13, 14, 15, 16, 17);\n"
     "    float g = min(own, TONEMAP_CAP);\n"
@@ -2811,18 +2812,22 @@ static const char tonemap__glsl_map[] =
     "    vec4 first = texelFetch(state, ivec2(0), 0), second = texelFetch(state, ivec2(1, 0), 0);\n"
     "    float y = texelFetch(luminance, p, 0).x, scale = tonemap_scale(), key = tonemap_key(), own = y * scale, la = own, beyond = 1.0;\n"
     "    float cd = cd_per_unit > 0.0 ? cd_per_unit : 10.0 * exp2(-first.x);\n"
+    "    float lux = (cd_per_unit > 0.0 ? cd_per_unit : exp2(-first.x)) * lux_per_cd;\n"
     "    float gain;\n"
     "    if (!(y > 0.0)) return vec3(0.0);\n"
-    "#if TONEMAP_OPERATOR == 0 || TONEMAP_OPERATOR == 2\n"
+    "#if TONEMAP_OPERATOR == 5\n"
+    "    la = tonemap_find(p, own, key);\n"
+    "    beyond = max(own / TONEMAP_CAP, 1.0);\n"
+    "#elif TONEMAP_OPERATOR == 0 || TONEMAP_OPERATOR == 2\n"
     "    if (TONEMAP_SELECTIVE <= 0.0 || tonemap_is_edge(p, scale)) {\n"
     "        la = tonemap_find(p, own, key);\n"
     "        beyond = max(own / TONEMAP_CAP, 1.0);\n"
     "    }\n"
     "#endif\n"
     "#if TONEMAP_MESOPIC == 1\n"
-    "    rgb = tonemap_mesopic(rgb, y, tonemap_rho(second.z * cd * lux_per_cd));\n"
+    "    rgb = tonemap_mesopic(rgb, y, tonemap_rho(exp2(first.x) * lux));\n"
     "#elif TONEMAP_MESOPIC == 2\n"
-    "    rgb = tonemap_mesopic(rgb, y, tonemap_rho(la / scale * cd * lux_per_cd));\n"
+    "    rgb = tonemap_mesopic(rgb, y, tonemap_rho(la / scale * lux));\n"
     "#endif\n"
     "#if TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 3\n"
     "    float low = tonemap_capacity(cd * exp2(second.x)), high = tonemap_capacity(cd * exp2(second.y)), display = key;\n"
@@ -2847,7 +2852,7 @@ static const char tonemap__glsl_map[] =
     "    value = vec4(sum.rgb / max(sum.a, 1.0), 1.0);\n"
     "}\n";
 
-enum { TONEMAP__LEVELS = 14, TONEMAP__BIN_ROWS = (TONEMAP__BINS + 63) / 64, TONEMAP__GL_UNITS = 4 };
+enum { TONEMAP__LEVELS = 14, TONEMAP__BIN_ROWS = (TONEMAP__BINS + 63) / 64, TONEMAP__GL_UNITS = 5 };
 
 struct tonemap_gl {
     sat__gl gl;
@@ -2856,9 +2861,10 @@ struct tonemap_gl {
     sat_gl *sat;                /* NULL for the global operators */
     int width, height, levels, current, histogram; /* histogram: 0, or the estimates it serves, see the state shader */
     unsigned luminance_program, first_program, reduce_program, scatter_program, state_program, quantise_program,
-        map_program;
-    unsigned luminance, quanta, out, bins, state[2], level[TONEMAP__LEVELS]; /* textures */
-    unsigned luminance_target, quanta_target, out_target, bins_target, state_target[2], level_target[TONEMAP__LEVELS];
+        steps_program, along_program[2], fit_program, map_program;
+    unsigned luminance, quanta, out, bins, steps, pair[2], state[2], level[TONEMAP__LEVELS]; /* textures */
+    unsigned luminance_target, quanta_target, out_target, bins_target, steps_target, pair_target[2], state_target[2],
+        level_target[TONEMAP__LEVELS];
 };
 
 TONEMAP_DEF const char *tonemap_gl_message(const tonemap_gl *gl)
@@ -2888,6 +2894,7 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define_float(gl, "TONEMAP_PHI_TERM", (float)(o->epsilon * exp2(o->phi)));
     sat__gl_define_float(gl, "TONEMAP_GAMUT", o->gamut < 0 ? -1.0f : (float)o->gamut);
     sat__gl_define_float(gl, "TONEMAP_SOFTNESS", (float)o->soft);
+    sat__gl_define_float(gl, "TONEMAP_EDGE2", (float)(o->edge * o->edge) * (TONEMAP__STEPS * TONEMAP__STEPS));
     sat__gl_define_float(gl, "TONEMAP_SELECTIVE", (float)o->selective);
     sat__gl_define_float(gl, "TONEMAP_CAP", ashikhmin ? 1.0f : TONEMAP__LOCAL_CAP);
     sat__gl_define_float(gl, "TONEMAP_STEPS", ashikhmin ? TONEMAP__ASHIKHMIN_QUANTUM : TONEMAP__QUANTUM);
@@ -2896,7 +2903,7 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
 static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, const char *name, const char *vertex,
                                              const char *frame, const char *search, const char *body)
 {
-    const char *library[3], *fragment[4], *points[2];
+    const char *library[3], *fragment[5], *points[2];
     sat__gl_shaders shaders;
     int n = 0;
     memset(&shaders, 0, sizeof shaders);
@@ -2904,6 +2911,7 @@ static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, c
     library[1] = tonemap_gl_glsl();
     library[2] = NULL;
     if (frame) fragment[n++] = frame;
+    if (search) fragment[n++] = tonemap__glsl_down;
     if (search) fragment[n++] = search;
     fragment[n++] = body;
     fragment[n] = NULL;
@@ -2934,7 +2942,22 @@ static inline sat_result tonemap__gl_programs(tonemap_gl *g)
     if (r == SAT_OK && g->sat)
         r = tonemap__gl_program(g, &g->quantise_program, "tonemap: rounding", NULL, tonemap__glsl_frame, NULL,
                                 tonemap__glsl_quantise);
-    if (r == SAT_OK) r = tonemap__gl_program(g, &g->map_program, "tonemap: mapping", NULL, tonemap__glsl_frame, g->sat ? tonemap__glsl_search : NULL, tonemap__glsl_map);
+    return r;
+}
+
+static inline sat_result tonemap__gl_guided_programs(tonemap_gl *g)
+{
+    sat_result r = tonemap__gl_program(g, &g->steps_program, "tonemap: steps", NULL, tonemap__glsl_frame, NULL,
+                                       tonemap__glsl_steps);
+    sat__gl_define(&g->gl, "TONEMAP_FIRST", 1);
+    if (r == SAT_OK)
+        r = tonemap__gl_program(g, &g->along_program[0], "tonemap: sums of steps", NULL, NULL, NULL, tonemap__glsl_along);
+    if (r == SAT_OK)
+        r = tonemap__gl_program(g, &g->along_program[1], "tonemap: sums of a and b", NULL, NULL, NULL,
+                                tonemap__glsl_along);
+    if (r == SAT_OK)
+        r = tonemap__gl_program(g, &g->fit_program, "tonemap: a and b", NULL, tonemap__glsl_down, NULL,
+                                tonemap__glsl_fit);
     return r;
 }
 
@@ -2949,6 +2972,9 @@ static inline sat_result tonemap__gl_targets(tonemap_gl *g)
 {
     int i, width = g->width, height = g->height;
     sat_result r = tonemap__gl_target(g, &g->luminance, &g->luminance_target, SAT__GL_R32F, width, height);
+    for (i = 0; g->options.operation == TONEMAP_GUIDED && i < 3 && r == SAT_OK; i++)
+        r = i < 2 ? tonemap__gl_target(g, &g->pair[i], &g->pair_target[i], SAT__GL_RG32UI, width, height)
+                  : tonemap__gl_target(g, &g->steps, &g->steps_target, SAT__GL_R32F, width, height);
     if (r == SAT_OK && g->sat) r = tonemap__gl_target(g, &g->quanta, &g->quanta_target, SAT__GL_R32UI, width, height);
     if (r == SAT_OK) r = tonemap__gl_target(g, &g->out, &g->out_target, SAT__GL_RGBA8, width, height);
     if (r == SAT_OK && g->histogram)
@@ -2986,6 +3012,10 @@ static inline sat_result tonemap__gl_make(tonemap_gl *g, sat_gl_get_proc *get_pr
     sat__gl_begin(&g->gl, &state, TONEMAP__GL_UNITS);
     r = tonemap__gl_targets(g);
     if (r == SAT_OK) r = tonemap__gl_programs(g);
+    if (r == SAT_OK && o->operation == TONEMAP_GUIDED) r = tonemap__gl_guided_programs(g);
+    if (r == SAT_OK)
+        r = tonemap__gl_program(g, &g->map_program, "tonemap: mapping", NULL, tonemap__glsl_frame,
+                                g->sat || g->steps ? tonemap__glsl_search : NULL, tonemap__glsl_map);
     sat__gl_end(&g->gl, &state);
     return r;
 }
@@ -3019,7 +3049,7 @@ static inline int tonemap__gl_same_programs(const tonemap_options *a, const tone
     return a->operation == b->operation && a->mesopic == b->mesopic && a->metering == b->metering &&
            a->scales == b->scales && !(a->phi < b->phi || a->phi > b->phi) &&
            !(a->epsilon < b->epsilon || a->epsilon > b->epsilon) && !(a->soft < b->soft || a->soft > b->soft) &&
-           !(a->gamut < b->gamut || a->gamut > b->gamut) &&
+           !(a->gamut < b->gamut || a->gamut > b->gamut) && !(a->edge < b->edge || a->edge > b->edge) &&
            !(a->selective < b->selective || a->selective > b->selective) &&
            !(a->meter_low < b->meter_low || a->meter_low > b->meter_low) &&
            !(a->meter_high < b->meter_high || a->meter_high > b->meter_high) && (a->key > 0) == (b->key > 0) &&
@@ -3044,22 +3074,28 @@ TONEMAP_DEF void tonemap_gl_destroy(tonemap_gl *gl)
     allocator = gl->allocator;
     sat_gl_destroy(gl->sat);
     if (t->vertex_array) { /* deleting 0 is fine */
-        const unsigned programs[7] = {gl->luminance_program, gl->first_program, gl->reduce_program, gl->scatter_program,
-                                      gl->state_program, gl->quantise_program, gl->map_program};
+        const unsigned programs[11] = {gl->luminance_program, gl->first_program, gl->reduce_program,
+                                       gl->scatter_program,   gl->state_program, gl->quantise_program,
+                                       gl->map_program,       gl->steps_program, gl->along_program[0],
+                                       gl->along_program[1],  gl->fit_program};
         int i;
-        for (i = 0; i < 7; i++) t->DeleteProgram(programs[i]);
+        for (i = 0; i < 11; i++) t->DeleteProgram(programs[i]);
         t->DeleteFramebuffers(TONEMAP__LEVELS, gl->level_target);
         t->DeleteFramebuffers(2, gl->state_target);
         t->DeleteFramebuffers(1, &gl->luminance_target);
         t->DeleteFramebuffers(1, &gl->quanta_target);
         t->DeleteFramebuffers(1, &gl->out_target);
         t->DeleteFramebuffers(1, &gl->bins_target);
+        t->DeleteFramebuffers(1, &gl->steps_target);
+        t->DeleteFramebuffers(2, gl->pair_target);
         t->DeleteTextures(TONEMAP__LEVELS, gl->level);
         t->DeleteTextures(2, gl->state);
         t->DeleteTextures(1, &gl->luminance);
         t->DeleteTextures(1, &gl->quanta);
         t->DeleteTextures(1, &gl->out);
         t->DeleteTextures(1, &gl->bins);
+        t->DeleteTextures(1, &gl->steps);
+        t->DeleteTextures(2, gl->pair);
         sat__gl_close(t);
     }
     sat__release(&allocator, gl, sizeof *gl);
@@ -3116,11 +3152,28 @@ static inline void tonemap__gl_adapt(tonemap_gl *g, double dt)
     sat__gl_set_float(gl, program, "exposure", (float)o->exposure);
     sat__gl_set_float(gl, program, "lowest", (float)tonemap__limited(-200, o));
     sat__gl_set_float(gl, program, "highest", (float)tonemap__limited(200, o));
-    sat__gl_set_float(gl, program, "dead_band", o->adapt_seconds > 0 ? 1 / 64.0f : -1.0f);
+    sat__gl_set_float(gl, program, "dead_band", o->adapt_seconds > 0 ? 1.0f : -1.0f);
     sat__gl_set_float(gl, program, "key", o->key > 0 ? (float)log2(o->key) : 0);
     sat__gl_set_float(gl, program, "white", o->white > 0 && !tonemap__is_infinite(o->white) ? (float)log2(o->white) : 0);
     sat__gl_set_float(gl, program, "pixels", (float)((double)g->width * g->height));
     sat__gl_draw(gl);
+}
+
+static inline void tonemap__gl_guide(tonemap_gl *g)
+{
+    sat__gl *gl = &g->gl;
+    const unsigned program[3] = {g->along_program[0], g->fit_program, g->along_program[1]},
+                   source[3] = {g->steps, g->pair[0], g->pair[1]};
+    int i;
+    sat__gl_pass(gl, g->steps_program, g->steps_target, g->width, g->height);
+    sat__gl_set_texture(gl, g->steps_program, "luminance", 0, g->luminance);
+    sat__gl_set_texture(gl, g->steps_program, "state", 1, g->state[g->current]);
+    sat__gl_draw(gl);
+    for (i = 0; i < 3; i++) {
+        sat__gl_pass(gl, program[i], g->pair_target[i & 1], g->width, g->height);
+        sat__gl_set_texture(gl, program[i], "source", 0, source[i]);
+        sat__gl_draw(gl);
+    }
 }
 
 static inline sat_result tonemap__gl_map(tonemap_gl *g, unsigned ldr, unsigned hdr)
@@ -3135,6 +3188,7 @@ static inline sat_result tonemap__gl_map(tonemap_gl *g, unsigned ldr, unsigned h
         sat__gl_draw(gl);
         result = sat_gl_build(g->sat, 0, g->quanta, g->width, g->height);
     }
+    if (g->steps) tonemap__gl_guide(g);
     if (result == SAT_OK && ldr) result = sat__gl_attach(gl, gl->framebuffer, &ldr, 1, 0);
     if (result != SAT_OK) return result;
     sat__gl_pass(gl, program, ldr ? gl->framebuffer : g->out_target, g->width, g->height);
@@ -3142,6 +3196,8 @@ static inline sat_result tonemap__gl_map(tonemap_gl *g, unsigned ldr, unsigned h
     sat__gl_set_texture(gl, program, "luminance", 1, g->luminance);
     sat__gl_set_texture(gl, program, "state", 2, g->state[g->current]);
     if (g->sat) sat__gl_set_texture(gl, program, "table", 3, sat_gl_table(g->sat));
+    if (g->steps) sat__gl_set_texture(gl, program, "table", 3, g->pair[0]);
+    if (g->steps) sat__gl_set_texture(gl, program, "steps", 4, g->steps);
     sat__gl_set_float(gl, program, "cd_per_unit", (float)g->options.cd_per_unit);
     sat__gl_set_float(gl, program, "lux_per_cd", (float)g->options.lux_per_cd);
     sat__gl_draw(gl);

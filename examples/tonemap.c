@@ -77,8 +77,7 @@ static void print_stats(const tonemap_stats *s, const image *picture, double sec
     printf("key, white     %.4g, %.4g\n", s->key, s->white);
     printf("replaced       %zu NaN, %zu infinite, %zu negative; %zu black; %zu clipped to white\n", s->nan, s->infinite, s->negative,
            (size_t)pixels - s->positive - s->nan - s->negative, s->clamped);
-    printf("searched       %.1f %%, skipped %.1f %%", 100 * (double)s->searched / pixels, 100 * (double)s->skipped / pixels);
-    printf(s->worst_codes > 0 ? " with an error below %.2f codes\n" : "\n", s->worst_codes);
+    printf("searched       %.1f %%, skipped %.1f %%\n", 100 * (double)s->searched / pixels, 100 * (double)s->skipped / pixels);
     while (last > 0 && !s->scale[last]) --last;
     printf("neighbourhoods");
     for (k = 0; k <= last && s->searched; ++k) printf(" %.1f %%", 100 * (double)s->scale[k] / (double)s->searched);
@@ -175,18 +174,18 @@ int main(int argc, char **argv)
     const char *in = NULL;
     const common_option options[] = {
         {"in", 'P', (void *)&in, 0, 0, "picture to map; without one a scene is drawn"},
-        {"operator", 'w', &operation, 0, 0, "local|global|ashikhmin|ashikhmin-global|linear"},
+        {"operator", 'w', &operation, 0, 0, "local|global|ashikhmin|ashikhmin-global|linear|guided"},
         {"key", 'd', &o.key, 0, 10, "display value of the log-average; 0: estimated"},
         {"white", 'd', &o.white, 0, INFINITY, "smallest luminance shown as white; 0: estimated; inf: none"},
         {"phi", 'd', &o.phi, -16, 16, "sharpening of the scale test"},
         {"epsilon", 'd', &o.epsilon, 1e-6, 1e6, "threshold of the scale test"},
+        {"edge", 'd', &o.edge, 0.01, 10, "guided: octaves of light that are half an edge"},
         {"scales", 'i', &o.scales, 1, 8, "neighbourhoods tried"},
         {"soft", 'd', &o.soft, 0, 1, "mix neighbourhoods, against flicker"},
         {"gamut", 'd', &o.gamut, -1, 1, "colours beyond the display: 0 fades them, 1 dims them, -1 cuts each channel"},
         {"mesopic", 'w', &mesopic, 0, 0, "off|uniform|local reds fade in dim light"},
         {"cd", 'd', &o.cd_per_unit, 0, 1e9, "cd/m2 of a luminance of 1; 0: the log-average is 10"},
         {"lux", 'd', &o.lux_per_cd, 1e-6, 1e6, "illuminance of a luminance of 1 cd/m2"},
-        {"tolerance", 'd', &o.tolerance_codes, 0, 255, "8-bit codes by which a skipped search may be wrong"},
         {"selective", 'd', &o.selective, 0, 1e6, "search only where the gradient exceeds this; 0: everywhere"},
         {"compare", 'b', &compare, 0, 0, "all operators on a contact sheet"},
         {"size", 'z', size, 1, 16384, "of the scene drawn when no picture is given"},

@@ -45,7 +45,6 @@ static tonemap_options take_options(fuzz_input *in)
     if (take_byte(in) & 1) o.soft = take_number(in, 0, 1);
     if (take_byte(in) & 1) o.cd_per_unit = take_number(in, 0, 100);
     if (take_byte(in) & 1) o.lux_per_cd = take_number(in, 0, 10);
-    if (take_byte(in) & 1) o.tolerance_codes = take_number(in, 0, 10);
     if (take_byte(in) & 1) o.selective = take_number(in, 0, 2);
     if (take_byte(in) & 1) o.adapt_seconds = take_number(in, 0, 2);
     return o;

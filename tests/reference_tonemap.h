@@ -108,6 +108,33 @@ static inline void reference_local(double *la, const double *scaled, int width, 
     free(done);
 }
 
+/* ---- the guided filter (He 2013) of log2 of the scaled luminance by itself, over 21 x 21 pixels */
+
+static inline void reference_guided(double *la, const double *scaled, int width, int height, double edge)
+{
+    size_t n = (size_t)width * (size_t)height, i;
+    double *q = metrics_alloc(n), *a = metrics_alloc(n), *b = metrics_alloc(n), *mean = metrics_alloc(n);
+    q[0] = b[0] = 0; /* n > 0, which compilers do not know */
+    for (i = 0; i < n; ++i) {
+        q[i] = log2(fmin(fmax(scaled[i], 1 / 1024.0), 256));
+        b[i] = q[i] * q[i];
+    }
+    reference_box(mean, q, width, height, 10);
+    reference_box(a, b, width, height, 10);
+    for (i = 0; i < n; ++i) {
+        double var = fmax(a[i] - mean[i] * mean[i], 0);
+        a[i] = var / (var + edge * edge);
+        b[i] = (1 - a[i]) * mean[i];
+    }
+    reference_box(la, a, width, height, 10);
+    reference_box(mean, b, width, height, 10);
+    for (i = 0; i < n; ++i) la[i] = exp2(la[i] * q[i] + mean[i]) * fmax(scaled[i] / 256, 1);
+    free(q);
+    free(a);
+    free(b);
+    free(mean);
+}
+
 /* ---- colour as the thesis has it: RGB -> XYZ -> Lab -> La'b -> XYZ -> Yxy -> Y'xy -> XYZ -> RGB (section A.5.3) */
 
 static inline double reference_rho(double lux)

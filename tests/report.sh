@@ -270,8 +270,6 @@ case_row sat "Bright and dark pixels in one picture, 14 decades: a float table d
     "$(pick "$f" "picture:14 decades;box:3;representation:float" median_relative last)" "$(pick "$f" "picture:14 decades;box:3;default:1" median_relative last)" 1e-4
 case_row sat "Sums of 3 x 3 boxes below zero, where all pixels are positive (share of boxes)" \
     "$(pick "$f" "picture:14 decades;box:3;representation:float" negative_share last)" "$(pick "$f" "picture:14 decades;box:3;default:1" negative_share last)" 0
-f=$(rows tonemap "Guaranteed skipping")
-case_row tonemap "Searches left out within a tolerance of 4 codes: largest error against what was proven" "" "$(pick "$f" tolerance:4 real_codes)" "$(pick "$f" tolerance:4 proven_codes)"
 f=$(rows tonemap "Ashikhmin's operator")
 case_row tonemap "One firefly of a million times the largest luminance: root mean square change elsewhere, codes" "" "$(pick "$f" "" firefly_rms last)" 0.5
 f=$(rows ssao_sat "The same against the range of depth")
@@ -293,9 +291,6 @@ echo '</table></div>'
 
 echo '<h2 id=left>What is left out</h2><p>Work that the default, or one option, does not do: what it saves and what it costs.</p><div class=wide><table>'
 echo '<tr><th>header<th class=text>what is left out<th>share left out<th>time saved or kept<th>error caused</tr>'
-f=$(rows tonemap "Guaranteed skipping")
-left_row tonemap "Searches of pixels whose result is known to within 2 codes (tolerance_codes 2)" "$(percent "$(pick "$f" tolerance:2 skipped)")" \
-    "$(pick "$f" tolerance:2 time_ratio) times the time" "$(pick "$f" tolerance:2 real_codes) codes (proven: $(pick "$f" tolerance:2 proven_codes))"
 f=$(rows tonemap "Michael 2010, tables 11")
 left_row tonemap "Searches away from edges (selective 0.1, photographic)" "$(percent "$(pick "$f" operator:photographic searched | awk '{ print 1 - $1 }')")" \
     "$(pick "$f" operator:photographic 'STM/LTM') times the frames" "SSIM $(pick "$f" operator:photographic ssim)"

@@ -67,21 +67,31 @@ static uint64_t shot_hash(const shot *s, const sat_image *picture)
     return support_hash_add(support_hash(s->u8, n), s->f32, n * sizeof(float));
 }
 
+/* The photographic local operator without burn-out, as in the thesis; its other options are the defaults. */
+static tonemap_options local_options(void)
+{
+    tonemap_options o = tonemap_defaults();
+    o.operation = TONEMAP_PHOTOGRAPHIC_LOCAL;
+    o.white = (double)INFINITY;
+    return o;
+}
+
 /* ---- arguments */
 
 TEST(defaults_are_as_written)
 {
     tonemap_options o = tonemap_defaults();
-    EXPECT_EQ(o.operation, TONEMAP_PHOTOGRAPHIC_LOCAL);
+    EXPECT_EQ(o.operation, TONEMAP_GUIDED);
+    EXPECT_NEAR(o.edge, 0.45, 0);
     EXPECT_NEAR(o.key, 0.18, 0);
-    EXPECT(o.white > 1e300);
+    EXPECT_NEAR(o.white, 0, 0);
     EXPECT_NEAR(o.phi, 8, 0);
     EXPECT_NEAR(o.epsilon, 0.05, 0);
     EXPECT_EQ(o.scales, 8);
     EXPECT_EQ(o.mesopic, TONEMAP_MESOPIC_OFF);
     EXPECT_NEAR(o.lux_per_cd, 1, 0);
     EXPECT_NEAR(o.gamut, 0.5, 0);
-    EXPECT(o.soft == 1 && o.cd_per_unit == 0 && o.tolerance_codes == 0 && o.selective == 0 && o.adapt_seconds == 0);
+    EXPECT(o.soft == 1 && o.cd_per_unit == 0 && o.selective == 0 && o.adapt_seconds == 0);
     EXPECT_EQ(tonemap_version(), TONEMAP_VERSION);
 }
 
@@ -94,11 +104,11 @@ static void refuses(const tonemap_options *o)
 
 TEST(bad_options_are_refused)
 {
-    const tonemap_options good = tonemap_defaults();
+    const tonemap_options good = local_options();
     const double bad[4] = {(double)NAN, (double)INFINITY, -1, 1e31};
     tonemap_options o;
     int i;
-    o = good, o.operation = (tonemap_operator)(TONEMAP_LINEAR + 1), refuses(&o);
+    o = good, o.operation = (tonemap_operator)(TONEMAP_GUIDED + 1), refuses(&o);
     o = good, o.mesopic = (tonemap_mesopic)3, refuses(&o);
     o = good, o.scales = 0, refuses(&o);
     o = good, o.scales = 9, refuses(&o);
@@ -114,7 +124,6 @@ TEST(bad_options_are_refused)
     for (i = 0; i < 4; ++i) {
         o = good, o.cd_per_unit = bad[i], refuses(&o);
         o = good, o.lux_per_cd = bad[i], refuses(&o);
-        o = good, o.tolerance_codes = bad[i], refuses(&o);
         o = good, o.selective = bad[i], refuses(&o);
         o = good, o.adapt_seconds = bad[i], refuses(&o);
         o = good, o.phi = i == 2 ? -17 : bad[i], refuses(&o);
@@ -128,7 +137,7 @@ TEST(bad_calls_are_refused_and_touch_nothing)
     unsigned char out[8 * 8 * 3];
     sat_image view = sat_image_f32(pixels, 8, 8, 3), bad;
     tonemap *map = NULL;
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     memset(out, 77, sizeof out);
     EXPECT_EQ(tonemap_create(NULL, 8, 8, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(tonemap_create(&map, 0, 8, NULL), SAT_ERR_ARGUMENT);
@@ -149,7 +158,7 @@ TEST(bad_calls_are_refused_and_touch_nothing)
     EXPECT_EQ(tonemap_apply_u8(map, out, 24, &bad, 0, NULL), SAT_ERR_ARGUMENT);
     o.epsilon = -1;
     EXPECT_EQ(tonemap_set_options(map, &o), SAT_ERR_ARGUMENT);
-    o = tonemap_defaults();
+    o = local_options();
     o.threads = support_threads(3);
     EXPECT_EQ(tonemap_set_options(map, &o), SAT_ERR_ARGUMENT);
     EXPECT_EQ(tonemap_set_options(NULL, NULL), SAT_ERR_ARGUMENT);
@@ -162,14 +171,13 @@ TEST(bad_calls_are_refused_and_touch_nothing)
 TEST(one_allocation_and_none_a_frame)
 {
     support_memory memory;
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     tonemap *map = NULL;
     float *pixels = hdr_pixels(50, 40, 3, 1);
     unsigned char *out = (unsigned char *)malloc(50 * 40 * 3);
     sat_image view = sat_image_f32(pixels, 50, 40, 3);
     tonemap_stats stats;
     o.allocator = support_allocator(&memory);
-    o.tolerance_codes = 1;
     o.threads = support_odd_threads(3);
     EXPECT_EQ(tonemap_create(&map, 50, 40, &o), SAT_OK);
     EXPECT_EQ(memory.calls, 1);
@@ -207,7 +215,7 @@ static void check_global(double white)
     float *pixels = hdr_pixels(W, H, 3, 2);
     sat_image view = sat_image_f32(pixels, W, H, 3);
     double *luminance = metrics_alloc(W * H), average, worst = 0;
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     shot s;
     int i, c;
     o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
@@ -244,7 +252,7 @@ static void check_local(int width, int height, int scales, double epsilon)
     size_t n = (size_t)width * (size_t)height, i, flips = 0, total = 0;
     double *scaled = metrics_alloc(n), *rounded = metrics_alloc(n), *la = metrics_alloc(n), average;
     reference_photographic r = reference_photographic_defaults(0);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     shot s;
     int k;
     o.scales = r.scales = scales;
@@ -291,6 +299,48 @@ TEST(local_operator_on_small_and_thin_pictures)
 TEST(local_operator_with_a_strict_threshold) { check_local(100, 70, 8, 0.0025); }
 
 #ifdef SAT__VECTOR
+/* ---- the guided filter */
+
+static void check_guided(int width, int height, double edge)
+{
+    size_t n = (size_t)width * (size_t)height, i;
+    float *pixels = room_pixels(width, height, 4);
+    sat_image view = sat_image_f32(pixels, width, height, 3);
+    tonemap_options o = tonemap_defaults();
+    double *scaled = metrics_alloc(n), *la = metrics_alloc(n), worst = 0;
+    shot s;
+    o.edge = edge;
+    o.gamut = -1;
+    o.white = (double)INFINITY;
+    s = shoot(&view, &o);
+    reference_luminance(scaled, pixels, n);
+    for (i = 0; i < n; ++i) scaled[i] *= 0.18 / s.stats.adapted;
+    reference_guided(la, scaled, width, height, edge);
+    for (i = 0; i < n; ++i) {
+        double gain = 0.18 / s.stats.adapted / (1 + la[i]),
+               off = fabs(metrics_code((double)pixels[3 * i + 1] * gain) - metrics_code((double)s.f32[3 * i + 1]));
+        if (!(off <= worst)) worst = off;
+    }
+    EXPECT(worst < 0.12);
+    shot_free(&s);
+    free(scaled);
+    free(la);
+    free(pixels);
+}
+
+TEST(guided_operator_is_he_2013)
+{
+    check_guided(150, 131, 0.45);
+    check_guided(97, 66, 0.05);
+    check_guided(61, 190, 3);
+}
+TEST(guided_operator_on_small_and_thin_pictures)
+{
+    int sizes[][2] = {{1, 1}, {1, 40}, {40, 1}, {7, 5}, {20, 20}, {21, 21}, {22, 64}, {25, 129}, {10, 300}, {300, 11}},
+        i;
+    for (i = 0; i < 10; ++i) check_guided(sizes[i][0], sizes[i][1], 0.45);
+}
+
 /* Four pixels at a time give the bits of one at a time. */
 TEST(vector_and_plain_code_give_the_same_bits)
 {
@@ -301,7 +351,7 @@ TEST(vector_and_plain_code_give_the_same_bits)
     tonemap *map = NULL;
     int kind, y, differ = 0, x, j;
     for (kind = 0; kind < 3; ++kind) {
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         tonemap__window window;
         tonemap__worker *w;
         size_t scale[2][10];
@@ -359,9 +409,9 @@ TEST(same_bits_for_any_number_of_workers)
     sat_image view = sat_image_f32(pixels, W, H, 3);
     int counts[] = {1, 2, 3, 7}, kind, i;
     for (kind = 0; kind < 5; ++kind) {
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         uint64_t hash = 0;
-        if (kind == 1) o.tolerance_codes = 2, o.mesopic = TONEMAP_MESOPIC_UNIFORM;
+        if (kind == 1) o.mesopic = TONEMAP_MESOPIC_UNIFORM;
         if (kind == 2) o.operation = TONEMAP_ASHIKHMIN;
         if (kind == 3) o.selective = 0.1, o.mesopic = TONEMAP_MESOPIC_LOCAL;
         if (kind == 4) o.soft = 1, o.key = 0, o.white = 0;
@@ -386,7 +436,7 @@ TEST(units_that_are_powers_of_two_change_no_bit)
     for (operation = 0; operation < 5; ++operation) {
         uint64_t hash = 0;
         for (k = -20; k <= 20; k += 5) {
-            tonemap_options o = tonemap_defaults();
+            tonemap_options o = local_options();
             shot s;
             o.operation = (tonemap_operator)operation;
             o.key = operation & 1 ? 0 : 0.18;
@@ -427,7 +477,7 @@ TEST(a_bad_pixel_stays_in_its_window)
     sat_image view = sat_image_f32(pixels, W, H, 3);
     int operation, i, c;
     for (operation = 0; operation < 4; ++operation) {
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         shot clean;
         o.operation = (tonemap_operator)operation;
         centre[0] = centre[1] = centre[2] = 0;
@@ -465,14 +515,13 @@ TEST(any_bits_give_values_from_0_to_1)
     uint64_t seed = 11;
     int round, i, bad = 0;
     for (round = 0; round < 60; ++round) {
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         sat_image view = sat_image_f32(pixels, W, H, round % 3 == 0 ? 1 : round % 3 == 1 ? 3 : 4);
         shot s;
         for (i = 0; i < N; ++i) pixels[i] = sat__float_from_bits((uint32_t)support_random(&seed));
         o.operation = (tonemap_operator)(round % 5);
         o.mesopic = (tonemap_mesopic)(round / 5 % 3);
         o.soft = round & 1;
-        o.tolerance_codes = round & 2;
         o.selective = round & 4;
         o.key = round & 8 ? 0.18 : 0;
         o.white = round & 16 ? 0 : (double)INFINITY;
@@ -493,7 +542,7 @@ TEST(black_is_black_and_constant_is_the_key)
     int operation, i, automatic;
     for (operation = 0; operation < 5; ++operation)
         for (automatic = 0; automatic < 2; ++automatic) {
-            tonemap_options o = tonemap_defaults();
+            tonemap_options o = local_options();
             double expected;
             shot s;
             o.operation = (tonemap_operator)operation;
@@ -524,7 +573,8 @@ TEST(fourteen_decades_and_one_hot_pixels)
     enum { W = 256, H = 256 };
     float *pixels = hdr_pixels(W, H, 3, 12);
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    shot s = shoot(&view, NULL);
+    tonemap_options o = local_options();
+    shot s = shoot(&view, &o);
     int y, rising = 0;
     EXPECT_NEAR(log10(s.stats.high / s.stats.low), 12.9, 0.5);
     for (y = 8; y < H; ++y)
@@ -533,7 +583,7 @@ TEST(fourteen_decades_and_one_hot_pixels)
     shot_free(&s);
     for (y = 0; y < W * H * 3; ++y) pixels[y] = 0;
     for (y = 0; y < 3; ++y) pixels[3 * (100 * W + 50) + y] = 1e8f;
-    s = shoot(&view, NULL);
+    s = shoot(&view, &o);
     EXPECT(s.f32[3 * (100 * W + 50) + 1] > 0.15f &&
            s.f32[3 * (100 * W + 50) + 1] <= 0.18f); /* the only light there is: the key */
     EXPECT(s.f32[3 * (100 * W + 51)] == 0);
@@ -591,7 +641,7 @@ TEST(formats_channels_and_strides)
     shot_free(&a);
     /* integers keep their value */
     for (i = 0; i < W * H * 3; ++i) {
-        shorts[i] = (uint16_t)(rgb[i] * 10 + 1);
+        shorts[i] = (uint16_t)(rgb[i] < 6000 ? rgb[i] * 10 + 1 : 60001); /* beyond 65535 a conversion says nothing */
         floats[i] = (float)shorts[i];
     }
     view = sat_image_f32(floats, W, H, 3);
@@ -634,7 +684,7 @@ TEST(codes_are_srgb)
     float ramp[4096], out[4096];
     unsigned char codes[4096];
     sat_image view = sat_image_f32(ramp, 4096, 1, 1);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     tonemap *map = NULL;
     int i, off = 0;
     o.operation = TONEMAP_LINEAR;
@@ -657,137 +707,13 @@ TEST(codes_are_srgb)
 
 static double code_of(float linear) { return metrics_code((double)linear); }
 
-/* The proven error holds on every value, and is not far too large. */
-static void check_skipping(const sat_image *view, double tolerance, double *share)
-{
-    tonemap_options o = tonemap_defaults();
-    shot full = shoot(view, &o), fast;
-    size_t n = (size_t)view->width * (size_t)view->height * (size_t)view->channels, i;
-    double worst = 0;
-    int worst8 = 0;
-    o.tolerance_codes = tolerance;
-    fast = shoot(view, &o);
-    for (i = 0; i < n; ++i) {
-        double off = fabs(code_of(full.f32[i]) - code_of(fast.f32[i]));
-        if (!(off <= worst)) worst = off;
-        if (abs((int)full.u8[i] - (int)fast.u8[i]) > worst8) worst8 = abs((int)full.u8[i] - (int)fast.u8[i]);
-    }
-    EXPECT(worst <= fast.stats.worst_codes && fast.stats.worst_codes <= tolerance);
-    EXPECT(worst8 <= (int)ceil(tolerance) + 1); /* the table may add one */
-    EXPECT_EQ(fast.stats.searched + fast.stats.skipped, n / (size_t)view->channels);
-    *share = (double)fast.stats.skipped / (double)(n / (size_t)view->channels);
-    shot_free(&full);
-    shot_free(&fast);
-}
-
-TEST(skipping_keeps_its_promise)
-{
-    enum { W = 211, H = 180 };
-    float *pixels = room_pixels(W, H, 21);
-    sat_image view = sat_image_f32(pixels, W, H, 3), grey;
-    double tolerance, share = 0, before = 0;
-    int i;
-    for (tolerance = 0.25; tolerance <= 8; tolerance *= 2) {
-        check_skipping(&view, tolerance, &share);
-        EXPECT(share >= before);
-        before = share;
-    }
-    EXPECT(share > 0.3);
-    for (i = 0; i < W * H; ++i) pixels[i] = pixels[3 * i + 1];
-    grey = sat_image_f32(pixels, W, H, 1);
-    check_skipping(&grey, 2, &share);
-    EXPECT(share > 0.1);
-    support_fill(pixels, W * H * 3, 0.01, 1, 5);
-    check_skipping(&view, 2, &share);
-    EXPECT(share == 0);
-    support_hdr_image(pixels, W, H, 3, 3);
-    check_skipping(&view, 2, &share);
-    free(pixels);
-}
-
-TEST(skipping_keeps_its_promise_with_other_options)
-{
-    enum { W = 100, H = 90 };
-    float *pixels = room_pixels(W, H, 22);
-    sat_image view = sat_image_f32(pixels, W, H, 3);
-    int kind, i;
-    for (kind = 0; kind < 5; ++kind) {
-        tonemap_options o = tonemap_defaults();
-        shot full, fast;
-        double worst = 0;
-        if (kind == 0) o.white = 2;
-        if (kind == 1) o.epsilon = 0.01, o.phi = 2; /* first steps fail */
-        if (kind == 2) o.scales = 3;
-        if (kind == 3) o.key = 3;
-        if (kind == 4) o.soft = 1;
-        full = shoot(&view, &o);
-        o.tolerance_codes = kind == 3 ? 12 : 3;
-        fast = shoot(&view, &o);
-        for (i = 0; i < W * H * 3; ++i) {
-            double off = fabs(code_of(full.f32[i]) - code_of(fast.f32[i]));
-            if (!(off <= worst)) worst = off;
-        }
-        EXPECT(fast.stats.skipped > 0);
-        EXPECT(worst <= fast.stats.worst_codes && fast.stats.worst_codes <= o.tolerance_codes);
-        shot_free(&full);
-        shot_free(&fast);
-    }
-    free(pixels);
-}
-
-#ifdef SAT__VECTOR
-TEST(tile_ranges_hold_every_box_mean)
-{
-    enum { W = 75, H = 61 };
-    float *pixels = room_pixels(W, H, 23);
-    sat_image view = sat_image_f32(pixels, W, H, 3);
-    unsigned char *out = (unsigned char *)malloc(W * H * 3);
-    double *plane = metrics_alloc(W * H), *mean = metrics_alloc(W * H);
-    tonemap_options o = tonemap_defaults();
-    tonemap *map = NULL;
-    int x, y, k, tx, ty, outside = 0, differ = 0;
-    o.tolerance_codes = 1;
-    tonemap_create(&map, W, H, &o);
-    EXPECT_EQ(tonemap_apply_u8(map, out, W * 3, &view, 0, NULL), SAT_OK);
-    for (y = 0; y < H; ++y)
-        for (x = 0; x < W; ++x) plane[y * W + x] = (double)map->luminance[y * map->row + x];
-    for (k = 1; k < 8; ++k) {
-        reference_box(mean, plane, W, H, reference_length[k] / 2);
-        for (y = 0; y < H; ++y)
-            for (x = 0; x < W; ++x) {
-                tonemap__range r = map->tile_range[y / 8 * map->tiles_x + x / 8];
-                for (ty = y / 8 - 3; ty <= y / 8 + 3; ++ty)
-                    if (ty >= 0 && ty < map->tiles_y)
-                        tonemap__merge_range(&r, &map->tile_reached[ty * map->tiles_x + x / 8]);
-                outside +=
-                    mean[y * W + x] < (double)r.low * (1 - 1e-6) || mean[y * W + x] > (double)r.high * (1 + 1e-6);
-            }
-    }
-    EXPECT_EQ(outside, 0);
-    for (ty = 0; ty < map->tiles_y; ++ty)
-        for (tx = 0; tx < map->tiles_x; ++tx) {
-            tonemap__range a, b;
-            const float *rows = tonemap__gather_tiles(map, &map->worker[0], ty) + tx * 8;
-            tonemap__tile_range_plain(&a, rows, map->row, sat__min_int(8, H - ty * 8));
-            tonemap__tile_range_vector(&b, rows, map->row, sat__min_int(8, H - ty * 8));
-            differ += memcmp(&a, &b, sizeof a) != 0;
-        }
-    EXPECT_EQ(differ, 0);
-    tonemap_destroy(map);
-    free(out);
-    free(plane);
-    free(mean);
-    free(pixels);
-}
-#endif
-
 /* Michael 2010, section 4.4: where the Sobel gradient is small La is the pixel itself. */
 TEST(selective_searches_only_edges)
 {
     enum { W = 97, H = 66 };
     float *pixels = room_pixels(W, H, 24);
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     shot full = shoot(&view, &o), global, selective;
     double *lr = metrics_alloc(W * H), average = full.stats.adapted;
     int x, y, wrong = 0, marked = 0;
@@ -838,8 +764,8 @@ static void check_mesopic(tonemap_mesopic mode, double cd)
     enum { W = 64, H = 64 };
     float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    tonemap_options o = tonemap_defaults();
-    double *luminance = metrics_alloc(W * H), mean = 0, worst = 0;
+    tonemap_options o = local_options();
+    double *luminance = metrics_alloc(W * H), worst = 0;
     shot s;
     int i, c;
     support_fill(pixels, W * H * 3, 0, 1, 31);
@@ -851,11 +777,10 @@ static void check_mesopic(tonemap_mesopic mode, double cd)
     o.lux_per_cd = 2;
     s = shoot(&view, &o);
     reference_luminance(luminance, pixels, W * H);
-    for (i = 0; i < W * H; ++i) mean += luminance[i] / (W * H);
-    EXPECT_REL(s.stats.mean, mean, 1e-5);
     for (i = 0; i < W * H; ++i) {
         double rgb[3], lr = 0.18 * luminance[i] / s.stats.adapted;
-        double rho = reference_rho(2 * cd * (mode == TONEMAP_MESOPIC_UNIFORM ? mean : luminance[i]));
+        double rho = reference_rho(2 * (cd > 0 ? cd : 1 / s.stats.adapted) *
+                                   (mode == TONEMAP_MESOPIC_UNIFORM ? s.stats.adapted : luminance[i]));
         reference_colour(rgb, pixels + 3 * i, lr / (1 + lr), rho, 0);
         for (c = 0; c < 3; ++c) {
             double off = fabs(metrics_code(rgb[c]) - code_of(s.f32[3 * i + c]));
@@ -863,7 +788,7 @@ static void check_mesopic(tonemap_mesopic mode, double cd)
         }
     }
     REPORT("mesopic filter against Lab, largest", worst, "codes");
-    EXPECT(worst <= 0.75); /* 8-bit codes */
+    EXPECT(worst <= 1); /* 8-bit codes */
     shot_free(&s);
     free(luminance);
     free(pixels);
@@ -872,6 +797,8 @@ static void check_mesopic(tonemap_mesopic mode, double cd)
 TEST(mesopic_filter_is_eq_A10_to_A14)
 {
     double lux;
+    check_mesopic(TONEMAP_MESOPIC_UNIFORM, 0);
+    check_mesopic(TONEMAP_MESOPIC_LOCAL, 0);
     check_mesopic(TONEMAP_MESOPIC_UNIFORM, 0.01);
     check_mesopic(TONEMAP_MESOPIC_UNIFORM, 3);
     check_mesopic(TONEMAP_MESOPIC_LOCAL, 1e-6);
@@ -889,7 +816,7 @@ TEST(bright_scenes_and_greys_are_not_mesopic)
     enum { W = 60, H = 40 };
     float *pixels = room_pixels(W, H, 32);
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     shot plain = shoot(&view, &o), bright;
     int i, mode;
     for (mode = 1; mode <= 2; ++mode) {
@@ -917,7 +844,7 @@ TEST(a_red_lamp_stays_red_only_with_the_local_filter)
     enum { W = 80, H = 80, LAMP = 3 * (40 * W + 40), WALL = 3 * (5 * W + 5) };
     float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     shot off, uniform, local;
     int x, y;
     for (y = 0; y < H; ++y)
@@ -963,7 +890,7 @@ static void check_ashikhmin(tonemap_operator operation, double cd)
     enum { W = 140, H = 111, N = W * H };
     float *pixels = room_pixels(W, H, 41);
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     double *luminance = metrics_alloc(N), *rounded = metrics_alloc(N), *la = metrics_alloc(N), low, high, unit, octave;
     int i, k, off = 0;
     shot s;
@@ -1015,7 +942,7 @@ TEST(a_firefly_does_not_darken_ashikhmin)
     enum { W = 200, H = 160 };
     float *pixels = room_pixels(W, H, 42), *centre = pixels + 3 * (H / 2 * W + W / 2);
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     shot clean, firefly;
     o.operation = TONEMAP_ASHIKHMIN;
     clean = shoot(&view, &o);
@@ -1034,8 +961,9 @@ TEST(key_and_white_are_reinhards_estimate)
     enum { W = 200, H = 150, N = W * H };
     float *pixels = hdr_pixels(W, H, 3, 51);
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    tonemap_options o = tonemap_defaults();
-    double *sorted = metrics_alloc(N), low, high, average;
+    tonemap_options o = local_options();
+    double *sorted = metrics_alloc(N), low, high, average, bright = 0;
+    int i;
     shot s;
     o.key = o.white = 0;
     o.metering = TONEMAP_METERING_LOG_AVERAGE;
@@ -1048,7 +976,8 @@ TEST(key_and_white_are_reinhards_estimate)
     EXPECT_NEAR(log2(s.stats.low), low, 1.0 / 16);
     EXPECT_NEAR(log2(s.stats.high), high, 1.0 / 16);
     EXPECT_REL(s.stats.key, 0.18 * pow(4, (2 * average - low - high) / (high - low)), 0.02);
-    EXPECT_NEAR(log2(s.stats.white), log2(1.5) + high - low - 5, 2.0 / 16);
+    for (i = N - N / 200; i < N - N / 2000; ++i) bright += log2(sorted[i]) / (N / 200 - N / 2000);
+    EXPECT_NEAR(log2(s.stats.white), fmin(log2(1.5) + high - low - 5, bright + log2(s.stats.key) - average), 0.3);
     shot_free(&s);
     free(sorted);
     free(pixels);
@@ -1058,7 +987,7 @@ TEST(key_and_white_are_reinhards_estimate)
 
 static tonemap *adapting(int width, int height, double seconds)
 {
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     tonemap *map = NULL;
     o.adapt_seconds = seconds;
     o.metering = TONEMAP_METERING_LOG_AVERAGE;
@@ -1146,14 +1075,14 @@ TEST(a_pan_leaves_no_trail)
 TEST(options_change_between_frames)
 {
     tonemap *map = adapting(16, 16, 10);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     double steady = frame(map, 1, 0);
     o.adapt_seconds = 10;
     o.metering = TONEMAP_METERING_LOG_AVERAGE;
     o.operation = TONEMAP_ASHIKHMIN;
     EXPECT_EQ(tonemap_set_options(map, &o), SAT_OK);
     EXPECT_NEAR(frame(map, 1, 0.1), steady, 1e-4);
-    o = tonemap_defaults(), o.metering = TONEMAP_METERING_LOG_AVERAGE;
+    o = local_options(), o.metering = TONEMAP_METERING_LOG_AVERAGE;
     EXPECT_EQ(tonemap_set_options(map, &o), SAT_OK);
     EXPECT_NEAR(frame(map, 100, 0), steady, 1e-4);  /* without adaptation each picture is for itself */
     tonemap_destroy(map);
@@ -1166,7 +1095,7 @@ static void flicker(double soft, double *rms, double *largest)
     enum { W = 160, H = 120, N = W * H };
     float *pixels = room_pixels(W, H, 71), *noisy = (float *)malloc(N * 3 * sizeof(float));
     sat_image view = sat_image_f32(pixels, W, H, 3), other = sat_image_f32(noisy, W, H, 3);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     uint64_t seed = 5;
     double *a = metrics_alloc(N), *b = metrics_alloc(N);
     metrics_codes m;
@@ -1229,7 +1158,7 @@ TEST(every_option_is_checked_and_named)
     tonemap *map = NULL;
     for (i = 0; i < SAT__COUNT(tonemap__fields); ++i) {
         const sat__field *f = &tonemap__fields[i];
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         const double good[3] = {f->low, f->high, f->initial};
         if (f->type == 't' || f->type == 'a') continue;
         for (k = 0; k < 3; ++k) {
@@ -1275,7 +1204,7 @@ TEST(bright_colours_keep_their_hue)
         for (c = 0; c < 3; ++c) pixels[3 * i + c] = (float)(light * (0.02 + support_uniform(&seed)));
     }
     for (k = 0; k < 4; ++k) {
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         shot s;
         o.operation = TONEMAP_LINEAR;
         o.gamut = k < 3 ? exponent[k] : -1;
@@ -1354,7 +1283,7 @@ TEST(metering_ignores_residue_and_bad_texels)
     const float residue[3] = {0, 1e-30f, 1e-8f};
     float *pixels = room_pixels(W, H, 8);
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     unsigned char *out = (unsigned char *)malloc(W * H * 3);
     tonemap *map = NULL;
     tonemap_stats stats;
@@ -1365,7 +1294,7 @@ TEST(metering_ignores_residue_and_bad_texels)
     for (k = 0; k < 3; ++k) {
         for (i = 0; i < 3; ++i) pixels[i] = k == 0 ? 1e30f : k == 1 ? NAN : 0;
         s = shoot(&view, &o);
-        EXPECT_NEAR(s.stats.adapted / clean.stats.adapted, 1, 0);
+        EXPECT_NEAR(s.stats.adapted, clean.stats.adapted, 0);
         for (i = 3 * 22 * W; i < 3 * W * H && s.u8[i] == clean.u8[i]; ++i) {}
         EXPECT_EQ(i, 3 * W * H);
         shot_free(&s);
@@ -1390,10 +1319,78 @@ TEST(metering_ignores_residue_and_bad_texels)
     free(out);
 }
 
+/* A tenth of the picture in light, the rest nearly dark: the light is worth more than eq A.1 gives it. */
+TEST(highlights_are_not_washed_out)
+{
+    enum { W = 100, H = 60 };
+    float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    int i, k;
+    for (k = 0; k < 2; ++k) {
+        shot s;
+        double lit;
+        for (i = 0; i < W * H * 3; ++i) pixels[i] = i / 3 % W < 70 ? 0.001f : 1;
+        if (k == 1) o.metering = TONEMAP_METERING_LOG_AVERAGE;
+        s = shoot(&view, &o);
+        lit = 0.18 / s.stats.adapted;
+        if (k == 0) EXPECT_NEAR(log2(lit), 4.5 + log2(0.18), 1.0 / 16); /* a bin of the histogram */
+        else EXPECT(lit > 20);
+        shot_free(&s);
+    }
+    free(pixels);
+}
+
+/* A picture of low range reaches white; with infinity it ends at a light grey. */
+TEST(low_range_is_not_dull)
+{
+    enum { W = 100, H = 60 };
+    float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    int i, k;
+    for (i = 0; i < W * H * 3; ++i) pixels[i] = (float)exp2(6 * (double)(i / 3 % W) / W);
+    for (k = 0; k < 2; ++k) {
+        shot s;
+        if (k == 1) o.white = (double)INFINITY;
+        s = shoot(&view, &o);
+
+        if (k == 0) EXPECT(s.u8[3 * W - 3] >= 250 && s.stats.clamped < W * H / 25);
+        else EXPECT(s.u8[3 * W - 3] < 220);
+        shot_free(&s);
+    }
+    free(pixels);
+}
+
+/* With nothing said about units the filter does what it was asked for, and a lamp does not switch it off. */
+TEST(mesopic_vision_needs_no_units)
+{
+    enum { W = 60, H = 40 };
+    float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    int i, k, mode;
+    for (mode = TONEMAP_MESOPIC_UNIFORM; mode <= TONEMAP_MESOPIC_LOCAL; ++mode)
+        for (k = 0; k < 3; ++k) {
+            shot s, off;
+            for (i = 0; i < W * H * 3; ++i) pixels[i] = i % 3 ? 0.1f : 0.5f;
+            if (k) pixels[0] = 1e6f;
+            o.mesopic = TONEMAP_MESOPIC_OFF;
+            o.cd_per_unit = k == 2 ? 2 : 0;
+            off = shoot(&view, &o);
+            o.mesopic = (tonemap_mesopic)mode;
+            s = shoot(&view, &o);
+            EXPECT(s.u8[3 * (30 * W + 40)] + 4 < off.u8[3 * (30 * W + 40)]);
+            shot_free(&s);
+            shot_free(&off);
+        }
+    free(pixels);
+}
+
 /* Light that wavers by less than a step moves no code, also where it crosses a step; a real change does. */
 TEST(metering_holds_while_light_wavers)
 {
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     tonemap *map = NULL;
     double first, other;
     int i;
@@ -1411,7 +1408,7 @@ TEST(metering_holds_while_light_wavers)
 
 TEST(eyes_are_quicker_in_light)
 {
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     tonemap *map = NULL;
     double steady;
     o.metering = TONEMAP_METERING_LOG_AVERAGE;
@@ -1427,7 +1424,7 @@ TEST(eyes_are_quicker_in_light)
 
 TEST(adaptation_has_limits)
 {
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     tonemap *map = NULL;
     double steady;
     o.adapt_low = 0.5;
@@ -1446,7 +1443,7 @@ TEST(a_fixed_exposure_is_not_metered)
     enum { W = 40, H = 30 };
     float *pixels = room_pixels(W, H, 3);
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     int i, k;
     o.operation = TONEMAP_LINEAR;
     o.gamut = -1;
@@ -1472,7 +1469,7 @@ TEST(other_options_start_from_what_is_measured)
     sat_image view = sat_image_f32(pixels, W, H, 3);
     unsigned char *out = (unsigned char *)malloc(W * H * 3);
     tonemap *map = NULL;
-    tonemap_options o = tonemap_defaults(), other;
+    tonemap_options o = local_options(), other;
     tonemap_stats stats;
     int i, k;
     shot fresh;
@@ -1528,7 +1525,7 @@ TEST(bright_places_keep_their_colour)
     enum { W = 60, H = 50 };
     float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
     sat_image view = sat_image_f32(pixels, W, H, 3);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     int kind, i;
     for (i = 0; i < W * H; ++i) { /* a dark room with a blue sky 100000 times brighter */
         float light = i % W < 40 ? 0.1f : 10000.0f;
@@ -1538,10 +1535,11 @@ TEST(bright_places_keep_their_colour)
     }
     for (kind = 0; kind < 5; ++kind) {
         shot s;
-        o = tonemap_defaults();
-        o.tolerance_codes = kind == 1 ? 2 : 0;
+        o = local_options();
+        o.metering = TONEMAP_METERING_LOG_AVERAGE;
+        o.soft = kind == 1 ? 0.5 : 1;
         o.selective = kind == 2 ? 0.1 : 0;
-        o.soft = kind == 3;
+        if (kind == 3) o.operation = TONEMAP_GUIDED;
         if (kind == 4) o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
         s = shoot(&view, &o);
         EXPECT_NEAR(s.f32[3 * (20 * W + 58)], 0.5 / 0.7722, 0.01);
@@ -1566,13 +1564,15 @@ TEST(boxes_are_close_to_gaussians_on_photographs)
         sat_image view;
         shot s;
         size_t n;
+        tonemap_options o = local_options();
         double *scaled, *la, *a, *b, ssim;
         reference_photographic r = reference_photographic_defaults(1);
         if (!path) SKIP("needs ../shared/data/hdr");
         if (!EXPECT(image_load(&picture, path))) return;
         view = image_view(&picture);
         n = (size_t)picture.width * (size_t)picture.height;
-        s = shoot(&view, NULL);
+        o.gamut = -1;
+        s = shoot(&view, &o);
         scaled = metrics_alloc(n);
         la = metrics_alloc(n);
         a = metrics_alloc(n);

@@ -40,6 +40,15 @@ static void screen_read(screen *s, unsigned char *rgba, unsigned texture, int wi
     sat__gl_end(&s->gl, &state);
 }
 
+/* The photographic local operator without burn-out, as in the thesis; its other options are the defaults. */
+static tonemap_options local_options(void)
+{
+    tonemap_options o = tonemap_defaults();
+    o.operation = TONEMAP_PHOTOGRAPHIC_LOCAL;
+    o.white = (double)INFINITY;
+    return o;
+}
+
 /* Light and shadow, even and busy places, bad pixels: RGBA. */
 static float *lit_pixels(int width, int height, int bad)
 {
@@ -116,35 +125,37 @@ static void compare(screen *s, const tonemap_options *options, int width, int he
 TEST(gl_gives_the_cpus_picture)
 {
     screen s;
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     if (!screen_open(&s)) return;
+    compare(&s, NULL, 200, 150, 0, 0.0005, "default");
+    compare(&s, NULL, 123, 77, 1, 0.0005, "default, bad pixels");
     compare(&s, &o, 200, 150, 0, 0.0005, "local");
     compare(&s, &o, 123, 77, 1, 0.001, "local, bad pixels");
     o.scales = 5;
     compare(&s, &o, 100, 90, 0, 0.001, NULL);
-    o = tonemap_defaults(), o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL, o.white = 4;
+    o = local_options(), o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL, o.white = 4;
     compare(&s, &o, 100, 90, 0, 0, "global with burn-out");
-    o = tonemap_defaults(), o.key = o.white = 0;
+    o = local_options(), o.key = o.white = 0;
     compare(&s, &o, 100, 90, 0, 0.001, "estimated key and white");
-    o = tonemap_defaults(), o.soft = 0.8;
+    o = local_options(), o.soft = 0.8;
     compare(&s, &o, 100, 90, 0, 0, "soft scales");
-    o = tonemap_defaults(), o.metering = TONEMAP_METERING_LOG_AVERAGE;
+    o = local_options(), o.metering = TONEMAP_METERING_LOG_AVERAGE;
     compare(&s, &o, 100, 90, 1, 0.001, "metering by the log-average");
-    o = tonemap_defaults(), o.exposure = 0.3;
+    o = local_options(), o.exposure = 0.3;
     compare(&s, &o, 100, 90, 0, 0.001, "fixed exposure");
-    o = tonemap_defaults(), o.adapt_high = 0.01;
+    o = local_options(), o.adapt_high = 0.01;
     compare(&s, &o, 100, 90, 0, 0.001, "limits of adaptation");
-    o = tonemap_defaults(), o.selective = 0.1;
+    o = local_options(), o.selective = 0.1;
     compare(&s, &o, 100, 90, 0, 0.001, "selective");
-    o = tonemap_defaults(), o.mesopic = TONEMAP_MESOPIC_LOCAL, o.cd_per_unit = 2;
+    o = local_options(), o.mesopic = TONEMAP_MESOPIC_LOCAL, o.cd_per_unit = 2;
     compare(&s, &o, 100, 90, 1, 0.001, "mesopic, local");
     o.mesopic = TONEMAP_MESOPIC_UNIFORM, o.cd_per_unit = 0;
     compare(&s, &o, 100, 90, 0, 0.001, "mesopic, uniform");
-    o = tonemap_defaults(), o.operation = TONEMAP_ASHIKHMIN;
+    o = local_options(), o.operation = TONEMAP_ASHIKHMIN;
     compare(&s, &o, 160, 120, 0, 0.005, "Ashikhmin");
     o.operation = TONEMAP_ASHIKHMIN_GLOBAL;
     compare(&s, &o, 100, 90, 0, 0.001, "Ashikhmin global");
-    o = tonemap_defaults(), o.operation = TONEMAP_LINEAR, o.white = 2;
+    o = local_options(), o.operation = TONEMAP_LINEAR, o.white = 2;
     compare(&s, &o, 100, 90, 0, 0, "linear");
     screen_close(&s);
 }
@@ -160,7 +171,7 @@ TEST(gl_takes_every_corner_of_the_options)
             for (a = 0; a < 2; ++a)
                 for (b = 0; b < 2; ++b) {
                     const sat__field *f = &tonemap__fields[i], *g = &tonemap__fields[j];
-                    tonemap_options o = tonemap_defaults();
+                    tonemap_options o = local_options();
                     tonemap_gl *gl = NULL;
                     tonemap *map = NULL;
                     if (strchr("at", f->type) || strchr("at", g->type)) continue;
@@ -175,12 +186,12 @@ TEST(gl_takes_every_corner_of_the_options)
                     tonemap_gl_destroy(gl);
                 }
     {
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         o.scales = 1;
         compare(&s, &o, 40, 30, 1, 0.001, "one scale");
         o.selective = 0.1;
         compare(&s, &o, 16, 16, 0, 0.001, NULL);
-        o = tonemap_defaults(), o.gamut = 0;
+        o = local_options(), o.gamut = 0;
         compare(&s, &o, 100, 90, 1, 0.001, "gamut by fading");
         o.gamut = 1;
         compare(&s, &o, 100, 90, 1, 0.001, "gamut by dimming");
@@ -194,16 +205,16 @@ TEST(gl_takes_every_corner_of_the_options)
 TEST(gl_shaders_are_es)
 {
     screen s;
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     if (!screen_open(&s)) return;
     s.context.get_proc = gl_es_pretend(s.context.get_proc);
     o.key = o.white = 0, o.mesopic = TONEMAP_MESOPIC_LOCAL, o.soft = 0.8;
     compare(&s, &o, 100, 90, 1, 0.002, NULL);
-    o = tonemap_defaults(), o.operation = TONEMAP_ASHIKHMIN, o.mesopic = TONEMAP_MESOPIC_UNIFORM, o.cd_per_unit = 0;
+    o = local_options(), o.operation = TONEMAP_ASHIKHMIN, o.mesopic = TONEMAP_MESOPIC_UNIFORM, o.cd_per_unit = 0;
     compare(&s, &o, 160, 120, 0, 0.005, NULL);
-    o = tonemap_defaults(), o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL, o.white = 4;
+    o = local_options(), o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL, o.white = 4;
     compare(&s, &o, 100, 90, 0, 0, NULL);
-    o = tonemap_defaults(), o.selective = 0.1;
+    o = local_options(), o.selective = 0.1;
     compare(&s, &o, 100, 90, 0, 0.001, NULL);
     s.context.get_proc = gl_es_real;
     screen_close(&s);
@@ -228,6 +239,7 @@ TEST(gl_sums_are_the_cpus_integers)
     unsigned char *out = (unsigned char *)malloc(W * H * 4);
     uint32_t *quanta = (uint32_t *)malloc(W * H * 4);
     int32_t row[W], sums[4];
+    tonemap_options o = local_options();
     tonemap *map = NULL;
     tonemap_gl *gl = NULL;
     sat__gl_state state;
@@ -236,9 +248,9 @@ TEST(gl_sums_are_the_cpus_integers)
     int64_t log_sum;
     if (!screen_open(&s)) { free(pixels); free(out); free(quanta); return; }
     hdr = screen_texture(&s, SAT__GL_RGBA32F, W, H, pixels);
-    EXPECT_EQ(tonemap_create(&map, W, H, NULL), SAT_OK);
+    EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
     EXPECT_EQ(tonemap_apply_u8(map, out, W * 4, &view, 0, NULL), SAT_OK);
-    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, NULL), SAT_OK);
+    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
     EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, 0), SAT_OK);
     sat__gl_begin(&s.gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&s.gl, quanta, gl->quanta, SAT__GL_R32UI, W, H), SAT_OK);
@@ -266,7 +278,7 @@ TEST(gl_state_comes_back)
     enum { W = 33, H = 20 };
     screen s;
     float *pixels = lit_pixels(W, H, 0);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     sat__gl_state before, after;
     tonemap_gl *gl = NULL;
     unsigned hdr, other;
@@ -312,7 +324,7 @@ TEST(gl_adapts_as_the_cpu_does)
     float *pixels = lit_pixels(W, H, 0), *scaled = (float *)malloc(W * H * 16);
     unsigned char cpu[W * H * 4], gpu[W * H * 4];
     sat_image view = sat_image_f32(scaled, W, H, 4);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     tonemap *map = NULL;
     tonemap_gl *gl = NULL;
     unsigned hdr;
@@ -352,7 +364,7 @@ TEST(gl_options_change_between_pictures)
     float *pixels = lit_pixels(W, H, 0);
     unsigned char cpu[W * H * 4], gpu[W * H * 4];
     sat_image view = sat_image_f32(pixels, W, H, 4);
-    tonemap_options o = tonemap_defaults(), other;
+    tonemap_options o = local_options(), other;
     tonemap *map = NULL;
     tonemap_gl *gl = NULL;
     unsigned hdr;
@@ -410,7 +422,7 @@ TEST(gl_failures_have_a_message)
 {
     tonemap_gl *gl = NULL;
     support_memory memory;
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     screen s;
     EXPECT_EQ(tonemap_gl_create(&gl, NULL, 8, 8, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(tonemap_gl_create(&gl, no_proc, 0, 8, NULL), SAT_ERR_ARGUMENT);

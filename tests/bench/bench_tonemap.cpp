@@ -242,7 +242,6 @@ static void times(scene *still)
     o.key = o.white = 0, add("local, estimated key and white");
     o.soft = 0, add("local, hard scales");
     o.metering = TONEMAP_METERING_LOG_AVERAGE, add("local, metered by the log-average");
-    o.tolerance_codes = 2, add("local, tolerance 2");
     o.selective = 0.1, add("local, selective 0.1");
     o.operation = TONEMAP_ASHIKHMIN, add("Ashikhmin");
     o.operation = TONEMAP_ASHIKHMIN_GLOBAL, add("Ashikhmin global");
@@ -445,7 +444,6 @@ static void pareto(const scene *s)
         o = tonemap_defaults();
     };
     for (int k = 1; k <= 8; ++k) o.scales = k, add("scales", k);
-    for (double t = 0.5; t <= 8; t *= 2) o.tolerance_codes = t, add("tolerance_codes", t);
     for (double t = 0.05; t < 2; t *= 2) o.selective = t, add("selective", t);
     o.soft = 0.5, add("soft", 0.5);
     o.soft = 1, add("soft", 1);
@@ -470,36 +468,6 @@ static void pareto(const scene *s)
     }
     free_work(&base);
     free(full);
-}
-
-static void skipping(scene *scenes, int count)
-{
-    scene noise;
-    bench_table("Guaranteed skipping", "picture\ttolerance\tskipped\tproven_codes\treal_codes\ttime_ratio\tdefault");
-    bench_note("time_ratio: to the full search; noise: every pixel another uniform value");
-    image_create(&noise.picture, 1024, 768, 3);
-    support_fill(noise.picture.pixels, 1024 * 768 * 3, 0.001, 1, 3);
-    settle(&noise, "noise");
-    for (int i = 0; i <= count; ++i) {
-        const scene *s = i < count ? &scenes[i] : &noise;
-        tonemap_options o = tonemap_defaults();
-        double *full = codes_of(s, &o, NULL);
-        work base = make_work(s, &o);
-        for (double tolerance = 1; tolerance <= 4; tolerance *= 2) {
-            tonemap_stats stats;
-            o.tolerance_codes = tolerance;
-            double *codes = codes_of(s, &o, &stats);
-            metrics_codes m = metrics_compare_codes(codes, full, s->n * 3);
-            work w = make_work(s, &o);
-            bench_times t = bench_ratio(run_work, &w, run_work, &base, bench_rounds(9));
-            bench_row("%s\t%g\t%.3f\t%.2f\t%.2f\t%.3f\t%d", s->name, tolerance, (double)stats.skipped / (double)s->n, stats.worst_codes, m.largest, t.ratio, 0);
-            free(codes);
-            free_work(&w);
-        }
-        free_work(&base);
-        free(full);
-    }
-    image_free(&noise.picture);
 }
 
 static void mesopic(scene *scenes, int count)
@@ -837,7 +805,6 @@ int main(int argc, char **argv)
     if (wanted_table(argc, argv, "accuracy")) accuracy(scenes, count);
     if (wanted_table(argc, argv, "range")) luminance_range(&scenes[0]);
     if (wanted_table(argc, argv, "pareto")) pareto(&scenes[0]);
-    if (wanted_table(argc, argv, "skipping")) skipping(scenes, count);
     if (wanted_table(argc, argv, "mesopic")) mesopic(scenes, count);
     if (wanted_table(argc, argv, "ashikhmin")) ashikhmin(scenes, count);
     if (wanted_table(argc, argv, "flicker")) flicker(scenes, count);
