@@ -402,6 +402,7 @@ static inline ssao_sat__f ssao_sat__sub(ssao_sat__f a, ssao_sat__f b) { return s
 static inline ssao_sat__f ssao_sat__mul(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_mul(a, b); }
 static inline ssao_sat__f ssao_sat__div(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_div(a, b); }
 static inline ssao_sat__f ssao_sat__max(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_max(a, b); }
+static inline ssao_sat__f ssao_sat__min(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_min(a, b); }
 static inline ssao_sat__f ssao_sat__sqrt(ssao_sat__f a) { return sat__f32x4_sqrt(a); }
 static inline ssao_sat__f ssao_sat__abs(ssao_sat__f a) { return sat__f32x4_abs(a); }
 static inline ssao_sat__f ssao_sat__if_positive(ssao_sat__f a, ssao_sat__f b) /* a > 0 ? b : 0 */
@@ -457,6 +458,10 @@ static inline ssao_sat__f ssao_sat__div(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT
 static inline ssao_sat__f ssao_sat__max(ssao_sat__f a, ssao_sat__f b)
 {
     SSAO_SAT__EACH(ssao_sat__f, a.v[k] > b.v[k] ? a.v[k] : b.v[k]);
+}
+static inline ssao_sat__f ssao_sat__min(ssao_sat__f a, ssao_sat__f b)
+{
+    SSAO_SAT__EACH(ssao_sat__f, a.v[k] < b.v[k] ? a.v[k] : b.v[k]);
 }
 static inline ssao_sat__f ssao_sat__sqrt(ssao_sat__f a) { SSAO_SAT__EACH(ssao_sat__f, sqrtf(a.v[k])); }
 static inline ssao_sat__f ssao_sat__abs(ssao_sat__f a) { SSAO_SAT__EACH(ssao_sat__f, fabsf(a.v[k])); }
@@ -520,15 +525,46 @@ enum {
    range: SLABS: occluders count less with their distance, to nothing at this many radii; PLANE: heights h (in radii)
    count as h / (1 + range h^2). */
 typedef struct ssao_sat__fit { float reach, range, bias, gain, power; } ssao_sat__fit;
-static const float ssao_sat__ring_weights[4] = {1.6f, 1.0f, 0.37f, 0.37f}; /* outermost first */
 static const ssao_sat__fit ssao_sat__fits[6] = {
-    {0.91f, 1.8f, 0.06f, 1.10f, 3.0f}, /* SLABS */
+    {0.91f, 1.8f, 0.06f, 1.0f, 3.0f},  /* SLABS: see ssao_sat__kernels */
     {0.3f, 8.0f, 0.00f, 3.3f, 1.0f},   /* PLANE, 2 x 2 boxes */
     {0.6f, 0.0f, 0.00f, 0.1f, 1.0f},   /* MINIMALIST: the fit wants no more than this; artists may */
     {1.5f, 0.0f, 0.00f, 0.1f, 1.0f},   /* NORMAL_GUIDED */
     {0.3f, 0.0f, 0.00f, 0.06f, 1.0f},  /* REFINED */
     {0.3f, 16.0f, 0.00f, 1.6f, 2.0f}   /* PLANE, one box */
 };
+/* SLABS: what an occluder counts, by its sine s over the tangent plane (less the bias) and its distance d in radii, in
+   each ring, outermost first: sum of term[4 i + j] s^(i + 1) d^j. And what all of them count on surfaces seen at a
+   grazing angle and face on, linear in n.v between these and 1 at n.v = 1/2. For 1 to 4 rings, fitted by
+   tests/bench/fit_ssao_sat.c to four ray-traced scenes, with changes from frame to frame and of a crease at the border
+   of the picture as penalties. */
+enum { SSAO_SAT__TERMS = 12 };
+typedef struct ssao_sat__kernel { float term[4][SSAO_SAT__TERMS], grazing, facing; } ssao_sat__kernel;
+static const ssao_sat__kernel ssao_sat__kernels[4] = {
+    {{{0.1625f, -0.0067f, -0.0875f, -0.0332f, -0.0911f, -0.0306f,
+       0.0788f, 0.2081f, 0.1180f, -0.0654f, -0.0915f, -0.0080f}, {0}, {0}, {0}},
+     1.320f, 0.607f},
+    {{{0.1587f, -0.0488f, -0.0977f, 0.0110f, -0.0772f, -0.0400f,
+       0.0432f, 0.1863f, -0.0203f, 0.1073f, -0.0017f, -0.1147f},
+      {0.0801f, -0.0148f, -0.0690f, -0.0063f, -0.1307f, 0.1243f,
+       0.0695f, 0.1122f, 0.1299f, 0.0266f, -0.2068f, -0.0776f}, {0}, {0}},
+     1.185f, 0.563f},
+    {{{0.1648f, -0.0545f, -0.0977f, 0.0098f, -0.0830f, -0.0492f,
+       0.0569f, 0.1922f, -0.0179f, 0.1095f, 0.0192f, -0.1392f},
+      {0.0547f, 0.0221f, -0.0626f, -0.0044f, -0.1230f, 0.1090f,
+       0.0300f, 0.0973f, 0.0991f, 0.0972f, -0.1832f, -0.0885f},
+      {0.0355f, -0.0650f, -0.0876f, 0.0504f, 0.0455f, 0.0312f,
+       0.0380f, 0.0523f, -0.0499f, -0.0525f, 0.0426f, -0.0714f}, {0}},
+     1.163f, 0.560f},
+    {{{0.1646f, -0.0555f, -0.0989f, 0.0110f, -0.0823f, -0.0477f,
+       0.0565f, 0.1934f, -0.0204f, 0.1130f, 0.0186f, -0.1422f},
+      {0.0568f, 0.0070f, -0.0532f, -0.0075f, -0.1150f, 0.1135f,
+       0.0384f, 0.0992f, 0.0920f, 0.0889f, -0.1915f, -0.0851f},
+      {-0.0138f, 0.0144f, -0.1426f, 0.0520f, 0.0955f, 0.1238f,
+       -0.0486f, 0.0862f, -0.0662f, -0.0508f, -0.0639f, -0.0225f},
+      {0.0692f, -0.1379f, 0.1410f, -0.0462f, -0.0568f, -0.1758f,
+       0.0963f, 0.0460f, -0.0085f, 0.1553f, 0.0398f, -0.1124f}},
+     1.179f, 0.567f}};
 
 /* View position of table pixel (i, j) at distance z along the axis: ((ax i + bx) s, (ay j + by) s, z), s = z in
    perspective and 1 in orthographic views. z points forward here, away from the camera. */
@@ -1352,8 +1388,10 @@ static inline float ssao_sat__accessibility(const ssao_sat *s, float occlusion, 
 /* ------------------------------------------------------------------------------------------------
    SLABS: in every cell of every ring, what each slab holds is one occluder at its exact centroid
 
-       occlusion = sum over cells and slabs of coverage max(0, n.d / |d| - bias) max(0, 1 - |d|^2 / range^2)
+       occlusion = f(n.v) sum over cells and slabs of coverage k(max(0, n.d / |d| - bias), |d| / radius)
+                                                      max(0, 1 - |d|^2 / range^2)
 
+   with the polynomials k and the factor f of ssao_sat__kernels.
    The eight cells around a pixel are two vectors: corners and sides. The four words of a table entry are one load.
    ------------------------------------------------------------------------------------------------ */
 
@@ -1370,15 +1408,24 @@ typedef struct ssao_sat__point {
 typedef struct ssao_sat__cells {
     int column[4], row[4];
     ssao_sat__f weight[2];
+    ssao_sat__f term[SSAO_SAT__TERMS]; /* of the kernel, the same in all lanes */
 } ssao_sat__cells;
+
+/* Horner in the distance, for one power of the sine. */
+static inline ssao_sat__f ssao_sat__cubic(const ssao_sat__f *c, ssao_sat__f d)
+{
+    ssao_sat__f sum = ssao_sat__add(c[2], ssao_sat__mul(d, c[3]));
+    sum = ssao_sat__add(c[1], ssao_sat__mul(d, sum));
+    return ssao_sat__add(c[0], ssao_sat__mul(d, sum));
+}
 
 /* The occluders of one slab in four cells, given the sums over each. */
 static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__slab *slab,
-                                           ssao_sat__f *sums, int group, ssao_sat__f weight)
+                                           ssao_sat__f *sums, int group, const ssao_sat__cells *c)
 {
     const ssao_sat__f one = ssao_sat__set(1), zero = ssao_sat__set(0),
                       falloff = ssao_sat__set(1 / (s->range * s->range));
-    ssao_sat__f count, affine, r, z, dx, dy, dz, square, height, share, inverse, part;
+    ssao_sat__f count, affine, r, z, dx, dy, dz, square, height, share, length, inverse, sine, part;
     ssao_sat__transpose(sums); /* count, level, x, y of the four cells */
     count = sums[0];
     affine = ssao_sat__add(ssao_sat__mul(ssao_sat__set(slab->low), count),
@@ -1398,9 +1445,15 @@ static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s
     share = ssao_sat__sub(one, ssao_sat__mul(square, falloff));
     share = ssao_sat__if_positive(height, ssao_sat__mul(ssao_sat__max(zero, share), count));
     if (!ssao_sat__any_positive(share)) return;
-    inverse = ssao_sat__div(one, ssao_sat__sqrt(ssao_sat__max(square, p->least)));
-    part = ssao_sat__max(zero, ssao_sat__sub(ssao_sat__mul(height, inverse), ssao_sat__set(s->fit.bias)));
-    part = ssao_sat__mul(ssao_sat__mul(part, share), weight);
+    length = ssao_sat__sqrt(ssao_sat__max(square, p->least));
+    inverse = ssao_sat__div(one, length);
+    sine = ssao_sat__max(zero, ssao_sat__sub(ssao_sat__mul(height, inverse), ssao_sat__set(s->fit.bias)));
+    length = ssao_sat__mul(length, ssao_sat__set(1 / s->radius));
+    length = ssao_sat__min(length, ssao_sat__set(2)); /* the share is 0 from fit.range on: no overflow beyond */
+    part = ssao_sat__mul(sine, ssao_sat__cubic(c->term + 8, length));
+    part = ssao_sat__mul(sine, ssao_sat__add(part, ssao_sat__cubic(c->term + 4, length)));
+    part = ssao_sat__mul(sine, ssao_sat__add(part, ssao_sat__cubic(c->term, length)));
+    part = ssao_sat__mul(ssao_sat__mul(part, share), c->weight[group]);
     p->occlusion[group] = ssao_sat__add(p->occlusion[group], part);
 #ifndef SSAO_SAT_NO_BENT
     if (s->bent_wanted) {
@@ -1443,8 +1496,8 @@ static inline void ssao_sat__add_slab(ssao_sat__point *p, const ssao_sat *s, con
     sides[2] = SSAO_SAT__CELL(1, 2);
     sides[3] = SSAO_SAT__CELL(2, 1);
 #undef SSAO_SAT__CELL
-    ssao_sat__add_occluders(p, s, &s->slabs[k], corners, 0, c->weight[0]);
-    ssao_sat__add_occluders(p, s, &s->slabs[k], sides, 1, c->weight[1]);
+    ssao_sat__add_occluders(p, s, &s->slabs[k], corners, 0, c);
+    ssao_sat__add_occluders(p, s, &s->slabs[k], sides, 1, c);
 }
 
 /* Borders of the cells along one axis: [at - outer, at - inner) [at - inner, at + inner] (at + inner, at + outer], and
@@ -1472,8 +1525,7 @@ static inline void ssao_sat__cut_axis(int *border, float *weight, int at, int in
     weight[2] *= last;
 }
 
-static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, int y, const int *inner, const int *outer,
-                                float weight)
+static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, int y, const int *inner, const int *outer)
 {
     float u[3], v[3], corners[4], sides[4];
     ssao_sat__cut_axis(c->column, u, x, inner[0], outer[0], s->columns, s->step, s->width);
@@ -1486,8 +1538,8 @@ static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, in
     sides[1] = u[0] * v[1];
     sides[2] = u[2] * v[1];
     sides[3] = u[1] * v[2];
-    c->weight[0] = ssao_sat__mul(ssao_sat__load(corners), ssao_sat__set(weight));
-    c->weight[1] = ssao_sat__mul(ssao_sat__load(sides), ssao_sat__set(weight));
+    c->weight[0] = ssao_sat__load(corners);
+    c->weight[1] = ssao_sat__load(sides);
 }
 
 /* Can anything of the slab within the ring rise above the tangent plane by more than the bias? Its height is at most
@@ -1505,13 +1557,23 @@ static inline int ssao_sat__may_occlude(const ssao_sat__point *p, const ssao_sat
     return height > s->fit.bias * distance;
 }
 
+/* The kernel of rings [first, end), which are looked up at once: the sum of theirs. */
+static void ssao_sat__add_terms(ssao_sat__cells *c, const ssao_sat__kernel *kernel, int first, int end)
+{
+    int i, ring;
+    for (i = 0; i < SSAO_SAT__TERMS; i++) {
+        float term = kernel->term[first][i];
+        for (ring = first + 1; ring < end; ring++) term += kernel->term[ring][i];
+        c->term[i] = ssao_sat__set(term);
+    }
+}
+
 /* All rings around the point; those that round to the same pixels are looked up once. */
 static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, float half_side, int first_slab, int end_slab)
 {
-    float r = half_side, weight = 0, total = 0;
-    int inner[2], outer[2], next[2][2], ring, k;
+    float r = half_side;
+    int inner[2], outer[2], next[2][2], ring, first = 0, k;
     ssao_sat__cells cells;
-    for (ring = 0; ring < s->options.scales; ring++) total += 8 * ssao_sat__ring_weights[ring];
     for (ring = 0; ring <= s->options.scales; ring++, r *= 1 / 3.0f) {
         next[0][0] = sat__max_int(1, (int)(r / 3 + 0.5f));
         next[1][0] = sat__max_int(next[0][0] + 1, (int)(r + 0.5f));
@@ -1519,16 +1581,26 @@ static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, float hal
         next[1][1] = sat__max_int(next[0][1] + 1, (int)(r * s->camera.aspect + 0.5f));
         if (ring > 0 && (ring == s->options.scales || memcmp(next[0], inner, sizeof inner) ||
                          memcmp(next[1], outer, sizeof outer))) {
-            ssao_sat__cut_cells(&cells, s, p->x, p->y, inner, outer, weight / total);
+            ssao_sat__cut_cells(&cells, s, p->x, p->y, inner, outer);
+            ssao_sat__add_terms(&cells, &ssao_sat__kernels[s->options.scales - 1], first, ring);
             for (k = first_slab; k < end_slab; k++)
                 if (s->used_slabs >> k & 1 && ssao_sat__may_occlude(p, s, outer, k))
                     ssao_sat__add_slab(p, s, &cells, k);
-            weight = 0;
+            first = ring;
         }
         memcpy(inner, next[0], sizeof inner);
         memcpy(outer, next[1], sizeof outer);
-        if (ring < s->options.scales) weight += ssao_sat__ring_weights[ring];
     }
+}
+
+/* The kernel's factor by n.v. */
+static inline float ssao_sat__by_facing(const ssao_sat *s, const ssao_sat__point *p)
+{
+    const ssao_sat__kernel *kernel = &ssao_sat__kernels[s->options.scales - 1];
+    float x = s->camera.ax * (float)p->x + s->camera.bx, y = s->camera.ay * (float)p->y + s->camera.by;
+    float cosine = s->camera.orthographic ? -p->facing : -p->facing / sqrtf(1 + x * x + y * y);
+    cosine = cosine > 0 ? cosine < 1 ? cosine : 1 : 0;
+    return cosine < 0.5f ? 1 + (kernel->grazing - 1) * (1 - 2 * cosine) : 1 + (kernel->facing - 1) * (2 * cosine - 1);
 }
 
 static inline float ssao_sat__sum_lanes(ssao_sat__f a, ssao_sat__f b)
@@ -1607,6 +1679,7 @@ static void ssao_sat__estimate_slabs(ssao_sat *s, int x, int y, ssao_sat_stats *
         stats->border += x < side_x || y < side_y || x + side_x >= s->columns || y + side_y >= s->rows;
         stats->estimated++;
         ssao_sat__add_rings(&p, s, half_side, first, end);
+        fade *= ssao_sat__by_facing(s, &p);
         s->open[at] =
             ssao_sat__accessibility(s, ssao_sat__sum_lanes(p.occlusion[0], p.occlusion[1]), fade * s->fit.gain);
     }
@@ -1960,7 +2033,7 @@ static void ssao_sat__upsample_lanes(const ssao_sat *s, const ssao_sat__picture_
             alike = ssao_sat__mul(alike, alike);
             weight = ssao_sat__add(ssao_sat__mul(on_plane, ssao_sat__mul(alike, alike)), ssao_sat__set(1e-4f));
             weight =
-                ssao_sat__if_positive(tz, ssao_sat__mul(weight, ssao_sat__set(1 / (1 + (float)(dx * dx + dy * dy)))));
+                ssao_sat__if_positive(tz, ssao_sat__mul(weight, ssao_sat__set(1 / (float)((1 + dx * dx) * (1 + dy * dy)))));
             total = ssao_sat__add(total, weight);
             sum = ssao_sat__add(sum, ssao_sat__mul(weight, ssao_sat__load(s->open + t)));
             if (s->bent_wanted)
@@ -2711,14 +2784,18 @@ static const char ssao_sat__gl_slabs[] =
     "uvec4 corner(ivec2 tile, int x, int y) {\n"
     "    return x > 0 && y > 0 ? texelFetch(table, tile + ivec2(x - 1, y - 1), 0) : uvec4(0u);\n"
     "}\n"
-    "float occluder(uvec4 sums, vec4 edge, vec3 p, vec3 n) {\n" /* of one slab in one cell, times its pixels */
+    "uniform vec4 kernel[13];\n" /* three a ring, then the factors by n.v: see ssao_sat__kernel */
+    "float occluder(uvec4 sums, vec4 edge, vec3 p, vec3 n, int ring) {\n" /* of one slab in one cell, times its pixels */
     "    vec4 s = vec4(ivec4(sums));\n"
     "    if (s.x < 0.5) return 0.0;\n"
     "    float mean = (edge.y * s.x + edge.z * s.y) / s.x, z = orthographic() ? mean : 1.0 / max(mean, 1e-30);\n"
     "    vec3 d = vec3((view[0].xz * (s.zw / s.x + 0.5) + view[0].yw) * (orthographic() ? 1.0 : z), z) - p;\n"
     "    float square = dot(d, d), height = dot(d, n), share = 1.0 - square / (fit.y * fit.y);\n"
     "    if (height <= 0.0 || share <= 0.0) return 0.0;\n"
-    "    return max(height * inversesqrt(max(square, p.z * p.z * 1e-12 + 1e-37)) - fit.z, 0.0) * share * s.x;\n"
+    "    float away = sqrt(max(square, p.z * p.z * 1e-12 + 1e-37)), sine = max(height / away - fit.z, 0.0), r = min(away / region.x, 2.0);\n"
+    "    vec4 powers = vec4(1.0, r, r * r, r * r * r);\n"
+    "    vec3 k = vec3(dot(kernel[3 * ring], powers), dot(kernel[3 * ring + 1], powers), dot(kernel[3 * ring + 2], powers));\n"
+    "    return sine * (k.x + sine * (k.y + sine * k.z)) * share * s.x;\n"
     "}\n"
     /* What a pixel weighs in each third of an axis: see ssao_sat__cut_axis. */
     "vec3 cut(ivec4 border, int outer, int inner, bool whole, int pixels) {\n"
@@ -2727,7 +2804,7 @@ static const char ssao_sat__gl_slabs[] =
     "    if (!whole) share = vec3(a, 1.0 + BEYOND * (2.0 - a - b), b);\n"
     "    return vec3(count.x > 0.0 ? share.x / count.x : 0.0, count.y > 0.0 ? share.y / count.y : 0.0, count.z > 0.0 ? share.z / count.z : 0.0);\n"
     "}\n"
-    "float slab(int k, ivec2 x[4], vec3 u, vec3 v, vec3 p, vec3 n) {\n" /* x[t] = borders along both axes; weights of
+    "float slab(int k, ivec2 x[4], vec3 u, vec3 v, vec3 p, vec3 n, int ring) {\n" /* x[t] = borders along both axes; weights of
                                                                            the thirds */
     "    ivec2 tile = ivec2(k % TILES, k / TILES) * size;\n"
     "    vec4 edge = texelFetch(edges, ivec2(k, 0), 0);\n"
@@ -2740,7 +2817,7 @@ static const char ssao_sat__gl_slabs[] =
     "        for (int t = 0; t < 4; t++) {\n"
     "            uvec4 below = corner(tile, x[t].x, x[j + 1].y), band = below - row[t];\n"
     "            row[t] = below;\n"
-    "            if (t > 0 && !(t == 2 && j == 1)) sum += occluder(band - last, edge, p, n) * u[t - 1] * v[j];\n"
+    "            if (t > 0 && !(t == 2 && j == 1)) sum += occluder(band - last, edge, p, n, ring) * u[t - 1] * v[j];\n"
     "            last = band;\n"
     "        }\n"
     "    }\n"
@@ -2748,14 +2825,13 @@ static const char ssao_sat__gl_slabs[] =
     "}\n"
     "void main() {\n"
     "    ivec2 work = ivec2(gl_FragCoord.xy), x[4];\n"
-    "    float z = distance_at(STEP * work), side = half_side(z), strength = fade(side), sum = 0.0, total = 0.0, r = side;\n"
+    "    float z = distance_at(STEP * work), side = half_side(z), strength = fade(side), sum = 0.0, r = side;\n"
     "    result = vec4(1.0);\n"
     "    if (!(z > 0.0) || !(strength > 0.0)) return;\n"
     "    vec3 n = normal_at(STEP * work, z), p = vec3(ray(vec2(work)) * (orthographic() ? 1.0 : z), z);\n"
     "    int slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);\n"
     "    for (int ring = 0; ring < RINGS; ring++, r /= 3.0) {\n"
     "        ivec2 inner = max(ivec2(vec2(r, r * aspect()) / 3.0 + 0.5), 1), outer = max(ivec2(vec2(r, r * aspect()) + 0.5), inner + 1);\n"
-    "        float weight = ring == 0 ? WEIGHT0 : ring == 1 ? WEIGHT1 : WEIGHT2, part = 0.0;\n"
     "        x[0] = max(work - outer, 0);\n"
     "        x[1] = max(work - inner, 0);\n"
     "        x[2] = min(work + inner + 1, size);\n"
@@ -2765,12 +2841,12 @@ static const char ssao_sat__gl_slabs[] =
     "        for (int k = 0; k < slabs; k++) {\n"
     "            float low = texelFetch(edges, ivec2(k, 0), 0).x, high = texelFetch(edges, ivec2(k + 1, 0), 0).x;\n"
     "            if ((k < slabs - 1 && high < z - fit.y) || (k > 0 && low > z + fit.y)) continue;\n"
-    "            part += slab(k, x, u, v, p, n);\n"
+    "            sum += slab(k, x, u, v, p, n, ring);\n"
     "        }\n"
-    "        sum += weight * part;\n"
-    "        total += 8.0 * weight;\n"
     "    }\n"
-    "    result.r = open(sum / total, strength * fit.w);\n"
+    "    float cosine = clamp(-dot(n, orthographic() ? vec3(0.0, 0.0, 1.0) : normalize(p)), 0.0, 1.0);\n"
+    "    strength *= cosine < 0.5 ? mix(1.0, kernel[12].x, 1.0 - 2.0 * cosine) : mix(1.0, kernel[12].y, 2.0 * cosine - 1.0);\n"
+    "    result.r = open(sum, strength * fit.w);\n"
     "}\n";
 
 static const char ssao_sat__gl_single[] =
@@ -2874,7 +2950,7 @@ static const char ssao_sat__gl_upsample[] =
     "            if (!(zt > 0.0)) continue;\n"
     "            alike = max(dot(n, normal_at(2 * t, zt)), 0.0);\n"
     "            float plane = max(0.0, 1.0 - abs(dot(n, ssao_sat_position(view, 2 * t, zt) - p)) * SHARPNESS / z);\n"
-    "            float weight = (plane * alike * alike * alike * alike + 1e-4) / (1.0 + float(off.x * off.x + off.y * off.y));\n"
+    "            float weight = (plane * alike * alike * alike * alike + 1e-4) / float((1 + off.x * off.x) * (1 + off.y * off.y));\n"
     "            total += weight;\n"
     "            sum += weight * texelFetch(coarse, t, 0).r;\n"
     "        }\n"
@@ -2966,9 +3042,6 @@ static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *co
     sat__gl_define_float(&g->gl, "BEYOND", SSAO_SAT__BEYOND);
     sat__gl_define_float(&g->gl, "MARGIN", SSAO_SAT__MARGIN);
     sat__gl_define_float(&g->gl, "SHARPNESS", SSAO_SAT__SHARPNESS);
-    sat__gl_define_float(&g->gl, "WEIGHT0", ssao_sat__ring_weights[0]);
-    sat__gl_define_float(&g->gl, "WEIGHT1", ssao_sat__ring_weights[1]);
-    sat__gl_define_float(&g->gl, "WEIGHT2", ssao_sat__ring_weights[2]);
     return sat__gl_build(&g->gl, &g->programs[normals][which], &shaders);
 }
 
@@ -3195,6 +3268,15 @@ static void ssao_sat__gl_estimate(ssao_sat_gl *g, unsigned depth, unsigned norma
     v[1] = (float)o->refine_threshold;
     v[2] = (float)o->depth_gain;
     sat__gl_set_float4(gl, program, "published", v);
+    if (o->method == SSAO_SAT_SLABS) {
+        const ssao_sat__kernel *kernel = &ssao_sat__kernels[o->scales - 1];
+        float k[52];
+        memset(k, 0, sizeof k);
+        memcpy(k, kernel->term, sizeof kernel->term);
+        k[48] = kernel->grazing;
+        k[49] = kernel->facing;
+        gl->Uniform4fv(gl->GetUniformLocation(program, "kernel"), 13, k);
+    }
     sat__gl_set_texture(gl, program, "table", 3, g->table[table].texture);
     sat__gl_draw(gl);
 }
