@@ -2032,8 +2032,8 @@ static void ssao_sat__upsample_lanes(const ssao_sat *s, const ssao_sat__picture_
             alike = ssao_sat__max(zero, alike);
             alike = ssao_sat__mul(alike, alike);
             weight = ssao_sat__add(ssao_sat__mul(on_plane, ssao_sat__mul(alike, alike)), ssao_sat__set(1e-4f));
-            weight =
-                ssao_sat__if_positive(tz, ssao_sat__mul(weight, ssao_sat__set(1 / (float)((1 + dx * dx) * (1 + dy * dy)))));
+            weight = ssao_sat__mul(weight, ssao_sat__set(1 / (float)((1 + dx * dx) * (1 + dy * dy))));
+            weight = ssao_sat__if_positive(tz, weight);
             total = ssao_sat__add(total, weight);
             sum = ssao_sat__add(sum, ssao_sat__mul(weight, ssao_sat__load(s->open + t)));
             if (s->bent_wanted)

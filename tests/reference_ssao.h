@@ -257,8 +257,8 @@ static inline void ref_hall(ref_scene *s)
     s->at = ref_make(0, 1.25f, -6);
 }
 
-/* 6: for fits alone, so that 3 to 5 stay what nothing was fitted to: posts, a fence and wires of 1 to 6 cm before a wall
-   and on open ground, leaves in the air, steps, a knot. */
+/* 6: for fits alone, so that 3 to 5 stay what nothing was fitted to: posts, a fence and wires of 1 to 6 cm before a
+   wall and on open ground, leaves in the air, steps, a knot. */
 static inline void ref_yard(ref_scene *s)
 {
     uint32_t state = 4242;
@@ -281,8 +281,8 @@ static inline void ref_yard(ref_scene *s)
                               -0.6f + 0.9f * ref_random(&state)),
                 a = ref_make(ref_random(&state) - 0.5f, ref_random(&state) - 0.5f, ref_random(&state) - 0.5f),
                 b = ref_make(ref_random(&state) - 0.5f, ref_random(&state) - 0.5f, ref_random(&state) - 0.5f);
-        int first = ref_add_vertex(s, at), second = ref_add_vertex(s, ref_add(at, ref_scale(a, 0.12f)));
-        mesh_add_triangle(&s->m, first, second, ref_add_vertex(s, ref_add(at, ref_scale(b, 0.12f))));
+        int u = ref_add_vertex(s, at), v = ref_add_vertex(s, ref_add(at, ref_scale(a, 0.12f)));
+        mesh_add_triangle(&s->m, u, v, ref_add_vertex(s, ref_add(at, ref_scale(b, 0.12f))));
     }
     for (i = 0; i < 4; i++)
         ref_box(s, -0.6f, 0.09f * (float)i, -1.5f, 0.2f, 0.09f * (float)(i + 1), -1.1f - 0.1f * (float)i);
