@@ -5,15 +5,15 @@
 
    USE
 
-       #define SAT_IMPLEMENTATION      in exactly one C or C++ file, with sat.h beside this file; link with -lm
+       #define SAT_IMPLEMENTATION             // in exactly one C or C++ file; sat.h lies beside; link with -lm
        #define FIV_IMPLEMENTATION
        #include "fiv.h"
 
        fiv_environment_create(&sky, &equirect, NULL, NULL);
-       fiv_occluder_create(&bunny, positions, vertex_count, indices, triangle_count, NULL, NULL);    once: seconds
-       fiv_occluder_light(bunny, sky, rotation);                              new light or orientation: milliseconds
-       instance.occluder = bunny, instance.scale = 1, ...                                              any placement
-       fiv_irradiance(rgb, points, normals, count, sky, &instance, 1, NULL, NULL);                       every frame
+       fiv_occluder_create(&bunny, positions, vertex_count, indices, triangle_count, NULL, NULL); // once: seconds
+       fiv_occluder_light(bunny, sky, rotation);                   // new light or orientation: milliseconds
+       instance.occluder = bunny, instance.scale = 1;              // and its position
+       fiv_irradiance(rgb, points, normals, count, sky, &instance, 1, NULL, NULL);                // every frame
        fiv_occluder_destroy(bunny), fiv_environment_destroy(sky);
 
    Radiance of a diffuse receiver is colour / pi times rgb.

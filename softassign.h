@@ -5,7 +5,7 @@
 
    USE
 
-       #define SAT_IMPLEMENTATION            in exactly one C or C++ file, as the next line
+       #define SAT_IMPLEMENTATION             // in exactly one C or C++ file, as the next line
        #define SOFTASSIGN_IMPLEMENTATION
        #include "softassign.h"
 

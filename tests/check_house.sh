@@ -138,6 +138,21 @@ check_shape() {
     offences words "$(code "$lib.h" | grep -owE '[a-z_]*_(statistics|report)|vertical_fov|fov_vertical|[a-z_]*_?quantize[a-z]*|dt_seconds|near_distance|depth_range' | sort -u)"
 }
 
+# The programs under USE in the first comment are C: each block of lines that are set in by seven blanks, in a function of its own
+check_snippets() {
+    awk -v include="$dir/include.h" '
+        /^   USE/ { on = 1; next }
+        on && /^   [A-Z][A-Z ,]+[A-Z]( |$)/ { exit }
+        on && /^       #/ { print substr($0, 8) >include; next }
+        on && /^       / { if (!code) print "int block_" ++blocks "(void)\n{"; code = 1; print substr($0, 4); next }
+        on && /[^ ]/ && code { print "    return 0;\n}\n"; code = 0 }
+        END { if (code) print "    return 0;\n}" }' "$lib.h" >"$dir/blocks.c"
+    { cat "$dir/include.h"; echo '#include "tests/snippets.h"'; echo 'int block_1(void), block_2(void);'; cat "$dir/blocks.c"; } >"$dir/snippet.c"
+    grep -q "block_1(void)$" "$dir/blocks.c" || fail "there is no program under USE"
+    ok "the programs under USE compile" gcc -std=c99 -fsyntax-only -Wall -Wextra -Werror -Wno-unused-variable -Wno-unused-but-set-variable $DEFS "$dir/snippet.c"
+    ok "and as C++" g++ -std=c++11 -fsyntax-only -Wall -Wextra -Werror -Wno-unused-variable -Wno-unused-but-set-variable -Wno-missing-field-initializers $DEFS -x c++ "$dir/snippet.c"
+}
+
 # The list of contents: a line "CONTENTS" in the comments, then lines "   >> name   what it holds". Each name stands once more, as
 # the mark of its section, in the same order, and no section has more than 700 lines.
 check_contents() {
@@ -177,5 +192,6 @@ check_used
 check_gl
 check_comments
 check_shape
+check_snippets
 check_contents
 finish
