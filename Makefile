@@ -216,7 +216,7 @@ size:
 
 BENCH_SOURCES := $(wildcard tests/bench/bench_*.c tests/bench/bench_*.cpp)
 BENCH_NAMES   := $(sort $(patsubst tests/bench/bench_%.c,%,$(patsubst tests/bench/bench_%.cpp,%,$(BENCH_SOURCES))))
-BENCHES       := $(foreach l,$(PICK),$(filter $l $l_%,$(BENCH_NAMES)))
+BENCHES       := $(foreach l,$(PICK) $(if $(LIB),,frame),$(filter $l $l_%,$(BENCH_NAMES)))
 PEERS          = $(OPENCV) $(EMBREE)
 OUT           ?= out/bench
 REPORT        ?= report
@@ -288,7 +288,7 @@ help:
 	@echo 'make web       the demo in a browser: out/web/index.html  [needs emscripten]'
 	@echo 'make check-view the window and the page against the demo: Xvfb, headless Chromium'
 	@echo 'make report    all tables and plots in report/index.html  [QUICK=1, SMOKE=1]'
-	@echo 'make docs      put the programs of tests/test_readme.h and the plots of the last bench into README.md'
+	@echo 'make docs      put the programs of tests/test_readme.h into README.md and docs/, and the plots of the last bench'
 	@echo 'make data      fetch free environment maps and meshes into data/'
 	@echo 'make dist      one-file editions in dist/: each header with what it needs of sat.h inside'
 	@echo 'make install   headers, lightscan.pc, CMake files                 [PREFIX=/usr/local] [DESTDIR=]'
@@ -303,10 +303,10 @@ dist/%.h: %.h sat.h tests/make_dist.awk
 	@mkdir -p dist
 	awk -f tests/make_dist.awk sat.h $< >$@
 
-# README.md: its programs from tests/test_readme.h, its plots from the tables of the last `make bench` or `make report`
+# README.md and docs/*.md: programs from tests/test_readme.h, plots from the tables of the last `make bench` or `make report`
 docs:
 	@mkdir -p build
-	sh tests/readme.sh >build/README.md && cp build/README.md README.md
+	for page in README.md docs/*.md; do sh tests/readme.sh $$page out/bench >build/page.md && cp build/page.md $$page; done
 	PLOTS=docs bash tests/report.sh $(wildcard $(FAMILY:%=out/bench/%.tsv)) >build/report.html
 
 # inputs for examples, into data/

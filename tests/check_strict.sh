@@ -251,7 +251,13 @@ check_dist() {
 . tests/check_examples.sh
 examples() {
     check_examples
-    empty "README.md shows other programs than tests/test_readme.h (make docs)" "$(diff README.md <(sh tests/readme.sh))"
+    local page target
+    for page in README.md docs/*.md; do
+        empty "$page shows other programs than tests/test_readme.h (make docs)" "$(diff "$page" <(sh tests/readme.sh "$page"))"
+        # every link to a file leads somewhere
+        empty "$page: links to nothing" "$(grep -oE '\]\([^)#]+' "$page" | sed 's/^](//' | grep -v '^http' | while read -r target; do
+            [ -e "$(dirname "$page")/$target" ] || echo "$target"; done)"
+    done
     finish
 }
 

@@ -1,4 +1,4 @@
-/* The programs of README.md: `make docs` puts the text between the marks there, and tests/readme.sh compares. */
+/* The programs of README.md and docs/: `make docs` puts the text between the marks there, tests/check_strict.sh compares. */
 
 #include "expect.h"
 
@@ -153,4 +153,138 @@ TEST(readme_softassign)
     for (i = 0; i < ROWS; ++i) ++used[tile_of_patch[i]];
     for (i = 0; i < COLUMNS; ++i) EXPECT(used[i] <= 1);
     EXPECT(report.gap < 1e-6);
+}
+
+/* ---- docs/engine.md and docs/faq.md ---- */
+
+/* README: engine_threads */
+/* a job system of yours: `count` pieces, each called with the number of the worker that runs it */
+static void run_on_jobs(int count, sat_range_fn *body, void *context, void *user)
+{
+    int i;
+    (void)user;
+    for (i = 0; i < count; i++) body(i, i + 1, 0, context); /* here: one after the other, by worker 0 */
+}
+/* README end */
+
+/* README: engine_memory */
+/* an arena of yours: one piece at create, given back at destroy, nothing in a frame */
+static void *take(size_t size, void *user)
+{
+    size_t *taken = (size_t *)user;
+    *taken += size;
+    return malloc(size);
+}
+
+static void give(void *memory, size_t size, void *user)
+{
+    size_t *taken = (size_t *)user;
+    *taken -= size;
+    free(memory);
+}
+/* README end */
+
+TEST(engine_objects)
+{
+    int width = SIDE, height = SIDE;
+    size_t taken = 0, most = 0;
+    ssao_sat *ao = NULL;
+    sat_result result;
+    {
+        /* README: engine_create */
+        ssao_sat_options options = ssao_sat_defaults();
+        options.radius = 0.5;
+        options.threads.parallel_for = run_on_jobs;
+        options.threads.workers = 4; /* scratch memory for so many; the same bits for any number */
+        options.allocator.alloc = take;
+        options.allocator.release = give;
+        options.allocator.user = &taken;
+        result = ssao_sat_create(&ao, width, height, &options);
+        if (result != SAT_OK) {
+            char why[120];
+            puts(ssao_sat_explain(why, sizeof why, width, height, &options));
+        }
+        /* README end */
+        most = taken;
+    }
+    EXPECT_EQ(result, SAT_OK);
+    ssao_sat_destroy(ao);
+    EXPECT(most > 0 && taken == 0);
+}
+
+TEST(engine_depth)
+{
+    static float depth[READINGS], normals[3 * READINGS], open[READINGS];
+    static const float projection[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, -1, 0, 0, 0.1f, 0}; /* infinite, reversed */
+    int width = SIDE, height = SIDE, i;
+    ssao_sat *ao = NULL;
+    ssao_sat_stats stats;
+    for (i = 0; i < READINGS; i++) depth[i] = 0.1f / (i % SIDE < SIDE / 2 ? 2.0f : 2.2f); /* near / distance */
+    for (i = 0; i < READINGS; i++) normals[3 * i + 2] = 1;
+    EXPECT_EQ(ssao_sat_create(&ao, width, height, NULL), SAT_OK);
+    {
+        /* README: engine_depth */
+        ssao_sat_input input;
+        memset(&input, 0, sizeof input);
+        input.depth = depth;
+        input.normals = normals;
+        input.width = width;
+        input.height = height;
+        input.depth_kind = SSAO_SAT_DEPTH_REVERSED; /* 1 at the near plane, cleared to 0 */
+        input.clip_zero_to_one = 1;                 /* the matrix is Vulkan's, Direct3D's or glClipControl's */
+        memcpy(input.projection, projection, sizeof input.projection); /* the one that drew the picture, jitter and all */
+        ssao_sat_apply(ao, open, 0, &input, &stats);
+        if (10 * stats.normals_off > stats.normals_compared) puts("are these normals in view space?");
+        /* README end */
+    }
+    EXPECT_NEAR(stats.nearest, 2, 1e-5);
+    EXPECT_NEAR(stats.farthest, 2.2, 1e-5);
+    EXPECT(open[SIDE / 2 - 1 + SIDE * 20] > 0.9f && open[SIDE / 2 + SIDE * 20] < 0.95f);
+    ssao_sat_destroy(ao);
+}
+
+TEST(engine_options)
+{
+    static unsigned char screen[3 * READINGS];
+    int width = SIDE, height = SIDE;
+    tonemap *map = NULL;
+    sat_image hdr = sat_image_f32(pixels, width, height, 3);
+    double dt = 1 / 60.0;
+    fill(0, 4);
+    {
+        /* README: engine_options */
+        tonemap_options options = tonemap_defaults();
+        options.adapt_seconds = 0.4;  /* to brighter pictures; */
+        options.darker_seconds = 2;   /* to darker ones */
+        tonemap_create(&map, width, height, &options);
+        tonemap_apply_u8(map, screen, 0, &hdr, dt, NULL);
+        options.key = 0.25;           /* a slider moved: the adaptation goes on */
+        tonemap_set_options(map, &options);
+        tonemap_apply_u8(map, screen, 0, &hdr, dt, NULL);
+        /* README end */
+    }
+    EXPECT(screen[0] > 0);
+    tonemap_destroy(map);
+}
+
+TEST(faq_bottom_up)
+{
+    int width = SIDE, height = SIDE;
+    float below, above;
+    sat_table *table = NULL;
+    fill(0, 1);
+    pixels[0] = 50;
+    {
+        /* README: faq_bottom_up */
+        /* rows from the bottom, as glReadPixels gives them: point at the top row, and count backwards */
+        sat_image image = sat_image_f32(pixels + 3 * width * (height - 1), width, height, 3);
+        image.stride = -(ptrdiff_t)sizeof(float) * 3 * width;
+        /* README end */
+        EXPECT_EQ(sat_create(&table, width, height, 3, NULL), SAT_OK);
+        EXPECT_EQ(sat_build(table, &image), SAT_OK);
+    }
+    above = sat_restore(table, 0, 0, 0);
+    below = sat_restore(table, 0, 0, height - 1);
+    EXPECT(above <= 1 && below > 49);
+    sat_destroy(table);
 }
