@@ -1,4 +1,4 @@
-/* The programs of README.md and docs/: `make docs` puts the text between the marks there, tests/check_strict.sh compares. */
+/* The programs of README.md and docs/: `make docs` puts the text between the marks there; tests/check_strict.sh looks. */
 
 #include "expect.h"
 
@@ -232,7 +232,7 @@ TEST(engine_depth)
         input.height = height;
         input.depth_kind = SSAO_SAT_DEPTH_REVERSED; /* 1 at the near plane, cleared to 0 */
         input.clip_zero_to_one = 1;                 /* the matrix is Vulkan's, Direct3D's or glClipControl's */
-        memcpy(input.projection, projection, sizeof input.projection); /* the one that drew the picture, jitter and all */
+        memcpy(input.projection, projection, sizeof input.projection); /* what drew it, jitter and all */
         ssao_sat_apply(ao, open, 0, &input, &stats);
         if (10 * stats.normals_off > stats.normals_compared) puts("are these normals in view space?");
         /* README end */

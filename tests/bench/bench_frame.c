@@ -69,7 +69,8 @@ static void run_shadows(void *user)
     frame *f = (frame *)user;
     fiv_instance ball = {NULL, {0, 1, 0}, 1};
     ball.occluder = f->ball;
-    if (fiv_irradiance(f->irradiance, f->points, f->normals, RECEIVERS, f->light, &ball, 1, NULL, NULL) != SAT_OK) abort();
+    if (fiv_irradiance(f->irradiance, f->points, f->normals, RECEIVERS, f->light, &ball, 1, NULL, NULL) != SAT_OK)
+        abort();
 }
 
 static void run_rain(void *user)
@@ -136,7 +137,8 @@ static void make(frame *f)
     global.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
     f->camera = raindrop_camera_defaults();
     f->camera.fov_y = 1;
-    if (sat_create(&f->table, WIDTH, HEIGHT, 3, NULL) != SAT_OK || tonemap_create(&f->map, WIDTH, HEIGHT, NULL) != SAT_OK ||
+    if (sat_create(&f->table, WIDTH, HEIGHT, 3, NULL) != SAT_OK ||
+        tonemap_create(&f->map, WIDTH, HEIGHT, NULL) != SAT_OK ||
         tonemap_create(&f->global, WIDTH, HEIGHT, &global) != SAT_OK ||
         ssao_sat_create(&f->ao, WIDTH, HEIGHT, NULL) != SAT_OK ||
         fiv_environment_create(&f->light, &sky, NULL, NULL) != SAT_OK || make_ball(&f->ball) != SAT_OK ||
