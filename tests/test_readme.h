@@ -1,4 +1,4 @@
-/* The programs of README.md and docs/: `make docs` puts the text between the marks there; tests/check_strict.sh looks. */
+/* The programs of README.md and docs/: `make docs` puts the text between the marks there, check_strict compares. */
 
 #include "expect.h"
 

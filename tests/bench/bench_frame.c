@@ -1,4 +1,4 @@
-/* What each default costs in a frame: times of one megapixel over a memcpy of its float RGB. The table of docs/engine.md.
+/* What each default costs in a frame: a megapixel over a memcpy of its float RGB. The table of docs/engine.md.
    SPDX-License-Identifier: MIT-0 OR Unlicense */
 
 #define LIGHTSCAN_IMPLEMENTATION
