@@ -187,13 +187,16 @@ RAINDROP_DEF int raindrop_trace_spheroid(raindrop_ray *out, const float directio
    44.7 MB for a base of 1024. A texel is reflected xyz, F, refracted xyz, alpha; all 0 outside the drop. */
 typedef struct raindrop_map raindrop_map;
 typedef struct raindrop_map_options {
-    int resolution;          /* 1024; 1..4096, a power of two: width of level 0 */
+    int resolution;          /* 1024; 1..4096; a power of two: width of level 0 */
     int alpha_samples;       /* 32; 1..4096; rays a texel for alpha, random, from a fixed seed */
-    float n;                 /* 1.33; index of the drops */
+    float n;                 /* 1.33; 0.1..10; index of the drops */
     sat_allocator allocator; /* malloc; used by create and destroy only */
 } raindrop_map_options;
 RAINDROP_DEF raindrop_map_options raindrop_map_defaults(void);
 RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, const raindrop_map_options *options);
+/* One sentence that names the first argument that raindrop_map_create refuses, and its range; "" when it takes them.
+   Written into the caller's memory, cut where that ends; returns `text`. So do all raindrop_explain_... */
+RAINDROP_DEF const char *raindrop_explain_map(char *text, size_t size, const raindrop_map_options *options);
 RAINDROP_DEF int raindrop_map_levels(const raindrop_map *map);
 /* Rows from the bottom (t = -1) up, 8 floats a texel; NULL outside 0..levels-1. resolution may be NULL. */
 RAINDROP_DEF const float *raindrop_map_level(int *resolution, const raindrop_map *map, int level);
@@ -223,17 +226,20 @@ typedef enum raindrop_filter {
 
 typedef struct raindrop_environment_options {
     raindrop_layout layout;       /* RAINDROP_LAYOUT_EQUIRECT */
-    raindrop_filter filter;       /* RAINDROP_FILTER_MIPS: 5 to 20 times faster, and closer; see COST */
-    int resolution;               /* 0: from the picture; a power of two, 16..4096: side of the octahedral picture */
-    int far_resolution, far_samples; /* 64, 256: the far drops' prefilter; 8..256 (power of two) and 16..65536 */
-    int far_orders;               /* 1; 0..3: internal reflections that the prefilter knows */
-    float n;                      /* 1.33; index of the drops */
-    float scale;                  /* 1; 1/255.f for 8-bit input */
-    int decode_srgb;              /* 0; 1: scaled values are sRGB, for LDR pictures */
-    float max_radiance;           /* 0: none; otherwise brighter values become this one, and are counted */
-    float sun_direction[3];       /* 0, 1, 0; towards the sun, which lights the bows */
+    raindrop_filter filter;       /* RAINDROP_FILTER_MIPS; 5 to 20 times faster, and closer; see COST */
+    int resolution;               /* 0; 0..4096; 0: from the picture; a power of two of at least 16: side of the
+                                     octahedral picture */
+    int far_resolution;           /* 64; 8..256; a power of two: side of the far drops' prefilter */
+    int far_samples;              /* 256; 16..65536; of each of its texels */
+    int far_orders;               /* 1; 0..3; internal reflections that it knows */
+    float n;                      /* 1.33; 0.1..10; index of the drops */
+    float scale;                  /* 1; 1e-18..1e18; 1/255.f for 8-bit input */
+    int decode_srgb;              /* 0; 0..1; 1: scaled values are sRGB, for LDR pictures */
+    float max_radiance;           /* 0; 0..1e38; 0: none; otherwise brighter values become this one, and are
+                                     counted */
+    float sun_direction[3];       /* 0, 1, 0: a unit vector towards the sun, which lights the bows */
     float sun_irradiance[3];      /* 1, 1, 1 */
-    float bow_optical_depth;      /* 0: no bows; 0..10: share of the sun's light that the rain in view scatters */
+    float bow_optical_depth;      /* 0; 0..10; 0: no bows; share of the sun's light that the rain in view scatters */
     sat_allocator allocator;      /* malloc */
     sat_threads threads;          /* serial; used by create; same bits for any worker count */
 } raindrop_environment_options;
@@ -251,6 +257,8 @@ typedef struct raindrop_environment raindrop_environment;
 RAINDROP_DEF sat_result raindrop_environment_create(raindrop_environment **out, const sat_image *image,
                                                     const raindrop_environment_options *options,
                                                     raindrop_environment_stats *stats);
+RAINDROP_DEF const char *raindrop_explain_environment(char *text, size_t size, const sat_image *image,
+                                                      const raindrop_environment_options *options);
 RAINDROP_DEF void raindrop_environment_destroy(raindrop_environment *environment); /* NULL is fine */
 /* Radiance from a direction (any length but 0), averaged over a cone of `footprint` radians. */
 RAINDROP_DEF void raindrop_environment_sample(float rgb[3], const raindrop_environment *environment,
@@ -297,15 +305,16 @@ RAINDROP_DEF sat_result raindrop_fall(raindrop_drop *drop, const float wind[3], 
 #endif
 
 typedef struct raindrop_rain_options {
-    double rate_mm_h;            /* 10; 0.01..500: sizes and number of the drops */
-    int count;                   /* 0: from rate_mm_h and the box; otherwise this many, 1..33554432 */
-    double diameter_mm;          /* 0: Marshall-Palmer; otherwise of all drops, 0.001..6 */
-    double diameter_min_mm, diameter_max_mm; /* 0.1, 6 */
+    double rate_mm_h;            /* 10; 0.01..500; sizes and number of the drops */
+    int count;                   /* 0; 0..33554432; 0: from rate_mm_h and the box */
+    double diameter_mm;          /* 0; 0.001..6; or 0: Marshall-Palmer; otherwise of all drops */
+    double diameter_min_mm;      /* 0.1; 0.001..6 */
+    double diameter_max_mm;      /* 6; 0.001..6; above the smallest */
     float box_size[3];           /* 8, 8, 8: edges of the rain box. The published scene: 2.05 each, 1e6 drops of 2 mm */
     float centre[3];             /* 0, 0, 0: of the box */
     float wind[3];               /* 0, 0, 0 */
-    float speed;                 /* 0: terminal; otherwise all drops fall with it, as published */
-    int oblate;                  /* 0; 1: Beard-Chuang shapes */
+    float speed;                 /* 0; 0..1e18; 0: terminal; otherwise all drops fall with it, as published */
+    int oblate;                  /* 0; 0..1; 1: Beard-Chuang shapes */
     uint32_t seed;               /* 1 */
     const raindrop_drop *drops;  /* NULL; otherwise `count` drops of your own, copied; they never wrap */
     sat_allocator allocator;     /* malloc; used by create and destroy only */
@@ -316,6 +325,7 @@ RAINDROP_DEF raindrop_rain_options raindrop_rain_defaults(void);
 /* 100 bytes a drop, one allocation. Holds the scratch memory of raindrop_render too: one render at a time a rain. */
 typedef struct raindrop_rain raindrop_rain;
 RAINDROP_DEF sat_result raindrop_rain_create(raindrop_rain **out, const raindrop_rain_options *options);
+RAINDROP_DEF const char *raindrop_explain_rain(char *text, size_t size, const raindrop_rain_options *options);
 RAINDROP_DEF void raindrop_rain_destroy(raindrop_rain *rain); /* NULL is fine */
 RAINDROP_DEF const raindrop_drop *raindrop_rain_drops(int *count, const raindrop_rain *rain); /* count may be NULL */
 /* Replaces the drops by at most as many of your own, which never wrap: particles of another simulation. */
@@ -337,18 +347,19 @@ typedef struct raindrop_camera {
     float position[3];               /* 0, 0, 0 */
     float right[3], up[3], back[3];  /* x, y, z: orthonormal, looks along -back */
     float velocity[3];               /* 0, 0, 0: streaks are relative to it */
-    float fov_y;                     /* pi/2; full vertical angle in radians, 0.001..3 */
-    float depth_near;                /* 0.01: drops that reach nearer are left out */
-    float depth_far;                 /* 0; raindrop_gl_render: > depth_near: the depth test is on, against a depth
-                                        buffer of the usual perspective with these two planes */
-    float exposure;                  /* 0 s: still drops; otherwise streaks around the drops' positions */
-    float aperture;                  /* 0 m: all in focus; otherwise diameter of a thin lens */
-    float focus_distance;            /* 3 m; along the viewing axis */
+    float fov_y;                     /* 1.5707963267948966; 0.001..3; full vertical angle in radians */
+    float depth_near;                /* 0.01; 0..1e18; drops that reach nearer are left out */
+    float depth_far;                 /* 0; 0..1e18; raindrop_gl_render: > depth_near: the depth test is on, against a
+                                        depth buffer of the usual perspective with these two planes */
+    float exposure;                  /* 0; 0..1e18; seconds; 0: still drops; otherwise streaks around their positions */
+    float aperture;                  /* 0; 0..1e18; metres; 0: all in focus; otherwise diameter of a thin lens */
+    float focus_distance;            /* 3; 1e-18..1e18; metres along the viewing axis */
 } raindrop_camera;
 RAINDROP_DEF raindrop_camera raindrop_camera_defaults(void);
 /* The defaults, placed and turned: `up` only fixes the roll and may be parallel to the view. */
 RAINDROP_DEF raindrop_camera raindrop_camera_look(const float position[3], const float target[3], const float up[3],
                                                   float fov_y);
+RAINDROP_DEF const char *raindrop_explain_camera(char *text, size_t size, const raindrop_camera *camera);
 
 typedef enum raindrop_look {
     RAINDROP_LOOK_MAP,    /* as published: square sprites of at least a pixel from the hierarchical map */
@@ -360,13 +371,14 @@ typedef enum raindrop_look {
 typedef struct raindrop_render_options {
     raindrop_look look;        /* RAINDROP_LOOK_AUTO */
     const raindrop_map *map;   /* NULL; needed by RAINDROP_LOOK_MAP */
-    float far_radius;          /* 1.5 px; 0..64: AUTO takes smaller drops for far; more is faster and coarser. RAY and
-                                  AUTO do so with all below 1.4, of which a ray a pixel would see too little */
-    float coverage_threshold;  /* 0.0001; 0..1: drops that cover less of a pixel are left out and counted */
-    int orders;                /* 1; 0..3: internal reflections, RAY and AUTO */
-    int exit_fresnel;          /* 0: the last order carries what later ones would (0 orders: eq 2.5); 1: only its own */
-    float orders_radius;       /* 8 px; smaller drops do with order 0, and one ray a pixel at the rim too */
-    int sort;                  /* 1: far to near; 0: in the order of the array, as published */
+    float far_radius;          /* 1.5; 0..64; pixels: AUTO takes smaller drops for far; more is faster and coarser. RAY
+                                  and AUTO do so with all below 1.4, of which a ray a pixel would see too little */
+    float coverage_threshold;  /* 0.0001; 0..1; drops that cover less of a pixel are left out and counted */
+    int orders;                /* 1; 0..3; internal reflections, RAY and AUTO */
+    int exit_fresnel;          /* 0; 0..1; 0: the last order carries what later ones would (0 orders: eq 2.5); 1: only
+                                  its own */
+    float orders_radius;       /* 8; 0..1e18; pixels: smaller drops do with order 0, and one ray a pixel at the rim */
+    int sort;                  /* 1; 0..1; 1: far to near; 0: in the order of the array, as published */
 } raindrop_render_options;
 RAINDROP_DEF raindrop_render_options raindrop_render_defaults(void);
 
@@ -392,6 +404,11 @@ RAINDROP_DEF sat_result raindrop_render(float *rgb, ptrdiff_t stride, int width,
                                         const raindrop_camera *camera, const raindrop_rain *rain,
                                         const raindrop_environment *environment, const raindrop_render_options *options,
                                         raindrop_render_stats *stats);
+/* For raindrop_render, and with a stride of 0 for raindrop_gl_render: "" when rgb, rain and environment are the
+   only arguments left that could be refused. */
+RAINDROP_DEF const char *raindrop_explain_render(char *text, size_t size, ptrdiff_t stride, int width, int height,
+                                                 const raindrop_camera *camera,
+                                                 const raindrop_render_options *options);
 
 /* The environment as a background picture for that camera. */
 RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride, int width, int height,
@@ -417,9 +434,9 @@ extern "C" {
 
 typedef struct raindrop_gl_options {
     const raindrop_map *map; /* NULL; needed by RAINDROP_LOOK_MAP, copied to the GPU */
-    int half_map;            /* 1: half floats, 22 MB for a base of 1024; 0: floats */
-    int quads;               /* 0: point sprites, as published, which vanish when their centre leaves the picture and
-                                are cut at the context's largest point; 1: instanced quads, without these limits */
+    int half_map;            /* 1; 0..1; 1: half floats, 22 MB for a base of 1024; 0: floats */
+    int quads;               /* 1; 0..1; 1: instanced quads; 0: point sprites, as published, which vanish when their
+                                centre leaves the picture and are cut at the context's largest point */
     sat_allocator allocator; /* malloc; used by create, destroy and set_environment only */
 } raindrop_gl_options;
 RAINDROP_DEF raindrop_gl_options raindrop_gl_defaults(void);
@@ -430,6 +447,7 @@ typedef struct raindrop_gl raindrop_gl;
 /* On an OpenGL error *out only answers raindrop_gl_message, and is to be destroyed; on the others it is NULL. */
 RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *get_proc,
                                            const raindrop_gl_options *options);
+RAINDROP_DEF const char *raindrop_explain_gl(char *text, size_t size, const raindrop_gl_options *options);
 RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *gl); /* NULL is fine */
 /* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl);
@@ -517,6 +535,40 @@ static inline float raindrop__clamp(float v, float low, float high)
 static inline int raindrop__finite3(const float v[3])
 {
     return sat__is_finite(v[0]) && sat__is_finite(v[1]) && sat__is_finite(v[2]);
+}
+
+/* ---- sentences: each function writes one about what is wrong and returns whether nothing is */
+
+static inline int raindrop__fields_are_valid(sat__text *t, const void *options, const sat__field *fields, int count)
+{
+    const sat__field *wrong = sat__fields_check(options, fields, count);
+    if (wrong) sat__text_field(t, wrong, options);
+    return !wrong;
+}
+
+static inline int raindrop__vector_is_valid(sat__text *t, const char *name, const float v[3], double low, double high)
+{
+    int i;
+    for (i = 0; i < 3; i++) {
+        if (sat__is_finite(v[i]) && (double)v[i] >= low && (double)v[i] <= high) continue;
+        sat__text_add(t, name);
+        sat__text_range(t, i == 0 ? "[0]" : i == 1 ? "[1]" : "[2]", (double)v[i], low, high, ' ');
+        return 0;
+    }
+    return 1;
+}
+
+static inline int raindrop__say(sat__text *t, const char *words)
+{
+    sat__text_add(t, words);
+    return 0;
+}
+
+static inline int raindrop__int_is_valid(sat__text *t, const char *name, int v, int low, int high, char also)
+{
+    if (v >= low && v <= high && (also != '2' || !(v & (v - 1)))) return 1;
+    sat__text_range(t, name, v, low, high, also);
+    return 0;
 }
 
 /* Random bits for the i-th number of a stream: the same on CPU and GPU, in any order (a mixing of 32-bit words by
@@ -959,14 +1011,25 @@ static inline void raindrop__map_fill(float *texels, int resolution, int level, 
     }
 }
 
+static const sat__field raindrop__map_fields[] = {
+    SAT__FIELD(raindrop_map_options, 'i', resolution, 1024, 1, 4096, '2'),
+    SAT__FIELD(raindrop_map_options, 'i', alpha_samples, 32, 1, 4096, ' '),
+    SAT__FIELD(raindrop_map_options, 'f', n, 1.33, 0.1, 10, ' '),
+    SAT__FIELD(raindrop_map_options, 'a', allocator, 0, 0, 0, ' '),
+};
+
 RAINDROP_DEF raindrop_map_options raindrop_map_defaults(void)
 {
     raindrop_map_options o;
-    memset(&o, 0, sizeof o);
-    o.resolution = 1024;
-    o.alpha_samples = 32;
-    o.n = RAINDROP_WATER;
+    sat__fields_default(&o, sizeof o, raindrop__map_fields, SAT__COUNT(raindrop__map_fields));
     return o;
+}
+
+RAINDROP_DEF const char *raindrop_explain_map(char *text, size_t size, const raindrop_map_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (options) raindrop__fields_are_valid(&t, options, raindrop__map_fields, SAT__COUNT(raindrop__map_fields));
+    return text;
 }
 
 RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, const raindrop_map_options *options)
@@ -982,8 +1045,7 @@ RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, const raindrop_m
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (o.resolution < 1 || o.resolution > 4096 || (o.resolution & (o.resolution - 1))) return SAT_ERR_ARGUMENT;
-    if (o.alpha_samples < 1 || o.alpha_samples > 4096 || !sat__is_finite(o.n) || !(o.n > 0)) return SAT_ERR_ARGUMENT;
+    if (sat__fields_check(&o, raindrop__map_fields, SAT__COUNT(raindrop__map_fields))) return SAT_ERR_ARGUMENT;
     if (!sat__resolve_allocator(&memory, &o.allocator)) return SAT_ERR_ARGUMENT;
     for (r = o.resolution; r; r >>= 1) count += (size_t)r * (size_t)r;
     sat__carve(&arena, 1, sizeof *map);
@@ -1525,47 +1587,74 @@ static void raindrop__prefilter_rows(int begin, int end, int worker, void *conte
     }
 }
 
+static const sat__field raindrop__environment_fields[] = {
+    SAT__FIELD(raindrop_environment_options, 'i', layout, RAINDROP_LAYOUT_EQUIRECT, 0, RAINDROP_LAYOUT_CUBE, ' '),
+    SAT__FIELD(raindrop_environment_options, 'i', filter, RAINDROP_FILTER_MIPS, 0, RAINDROP_FILTER_SAT, ' '),
+    SAT__FIELD(raindrop_environment_options, 'i', resolution, 0, 0, 4096, '2'),
+    SAT__FIELD(raindrop_environment_options, 'i', far_resolution, 64, 8, 256, '2'),
+    SAT__FIELD(raindrop_environment_options, 'i', far_samples, 256, 16, 65536, ' '),
+    SAT__FIELD(raindrop_environment_options, 'i', far_orders, 1, 0, 3, ' '),
+    SAT__FIELD(raindrop_environment_options, 'f', n, 1.33, 0.1, 10, ' '),
+    SAT__FIELD(raindrop_environment_options, 'f', scale, 1, 1e-18, 1e18, ' '),
+    SAT__FIELD(raindrop_environment_options, 'i', decode_srgb, 0, 0, 1, ' '),
+    SAT__FIELD(raindrop_environment_options, 'f', max_radiance, 0, 0, 1e38, ' '),
+    SAT__FIELD(raindrop_environment_options, 'f', bow_optical_depth, 0, 0, 10, ' '),
+    SAT__FIELD(raindrop_environment_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(raindrop_environment_options, 't', threads, 0, 0, 0, ' '),
+};
+
 RAINDROP_DEF raindrop_environment_options raindrop_environment_defaults(void)
 {
     raindrop_environment_options o;
-    memset(&o, 0, sizeof o);
-    o.layout = RAINDROP_LAYOUT_EQUIRECT;
-    o.filter = RAINDROP_FILTER_MIPS;
-    o.far_resolution = 64;
-    o.far_samples = 256;
-    o.far_orders = 1;
-    o.n = RAINDROP_WATER;
-    o.scale = 1;
+    sat__fields_default(&o, sizeof o, raindrop__environment_fields, SAT__COUNT(raindrop__environment_fields));
     o.sun_direction[1] = 1;
     o.sun_irradiance[0] = o.sun_irradiance[1] = o.sun_irradiance[2] = 1;
     return o;
 }
 
-static inline int raindrop__is_power_of_two(int v, int low, int high)
-{
-    return v >= low && v <= high && !(v & (v - 1));
-}
-
-static inline int raindrop__environment_is_valid(const sat_image *image, const raindrop_environment_options *o)
+static inline int raindrop__sun_is_valid(sat__text *t, const raindrop_environment_options *o)
 {
     float sun2 = raindrop__dot(o->sun_direction, o->sun_direction);
-    if (!sat__image_is_valid(image) || image->channels == 2 || image->width > 32768 || image->height > 65536) return 0;
-    if ((unsigned)o->layout > RAINDROP_LAYOUT_CUBE || (unsigned)o->filter > RAINDROP_FILTER_SAT) return 0;
-    if (o->layout == RAINDROP_LAYOUT_CUBE && (image->height != 6 * image->width || o->filter == RAINDROP_FILTER_SAT))
-        return 0;
-    if (o->resolution && !raindrop__is_power_of_two(o->resolution, 16, 4096)) return 0;
-    if (!raindrop__is_power_of_two(o->far_resolution, 8, 256) || o->far_samples < 16 || o->far_samples > 65536)
-        return 0;
-    if (o->far_orders < 0 || o->far_orders > 3 || !sat__is_finite(o->n) || !(o->n > 0.1f) || !(o->n < 10)) return 0;
-    if (!sat__is_finite(o->scale) || !(o->scale > 0)) return 0;
-    if (!sat__is_finite(o->max_radiance) || o->max_radiance < 0) return 0;
-    if (!raindrop__finite3(o->sun_direction) || !raindrop__finite3(o->sun_irradiance)) return 0;
-    if (!(o->bow_optical_depth >= 0 && o->bow_optical_depth <= 10)) return 0;
-    if (o->bow_optical_depth > 0 && !(sun2 > 0.99f && sun2 < 1.01f)) return 0;
+    if (!raindrop__vector_is_valid(t, "sun_direction", o->sun_direction, -1e18, 1e18)) return 0;
+    if (!raindrop__vector_is_valid(t, "sun_irradiance", o->sun_irradiance, -1e30, 1e30)) return 0;
+    if (o->bow_optical_depth > 0 && !(sun2 > 0.99f && sun2 < 1.01f))
+        return raindrop__say(t, "sun_direction is no unit vector, which bow_optical_depth needs");
 #ifdef RAINDROP_NO_BOW
-    if (o->bow_optical_depth > 0) return 0;
+    if (o->bow_optical_depth > 0) return raindrop__say(t, "bow_optical_depth is above 0; RAINDROP_NO_BOW left it out");
 #endif
-    return sat__threads_are_valid(&o->threads);
+    return 1;
+}
+
+static inline int raindrop__environment_is_valid(sat__text *t, const sat_image *image,
+                                                 const raindrop_environment_options *o)
+{
+    if (!sat__image_is_valid(image)) {
+        sat_explain_image(t->at, t->size, image);
+        return 0;
+    }
+    if (image->channels == 2) return raindrop__say(t, "image.channels is 2; 1, 3 or 4");
+    if (!raindrop__int_is_valid(t, "image.width", image->width, 1, 32768, ' ')) return 0;
+    if (!raindrop__int_is_valid(t, "image.height", image->height, 1, 65536, ' ')) return 0;
+    if (!raindrop__fields_are_valid(t, o, raindrop__environment_fields, SAT__COUNT(raindrop__environment_fields)))
+        return 0;
+    if (o->resolution && o->resolution < 16) {
+        sat__text_range(t, "resolution", o->resolution, 16, 4096, '0');
+        return 0;
+    }
+    if (o->layout == RAINDROP_LAYOUT_CUBE && image->height != 6 * image->width)
+        return raindrop__say(t, "image.height is not 6 times its width, as layout says");
+    if (o->layout == RAINDROP_LAYOUT_CUBE && o->filter == RAINDROP_FILTER_SAT)
+        return raindrop__say(t, "filter is RAINDROP_FILTER_SAT, which takes RAINDROP_LAYOUT_EQUIRECT only");
+    return raindrop__sun_is_valid(t, o);
+}
+
+RAINDROP_DEF const char *raindrop_explain_environment(char *text, size_t size, const sat_image *image,
+                                                      const raindrop_environment_options *options)
+{
+    const raindrop_environment_options o = options ? *options : raindrop_environment_defaults();
+    sat__text t = sat__text_begin(text, size);
+    raindrop__environment_is_valid(&t, image, &o);
+    return text;
 }
 
 /* A texel a quarter of the picture's at the equator: lookups of level 0 then add no blur of their own. */
@@ -1658,6 +1747,7 @@ RAINDROP_DEF sat_result raindrop_environment_create(raindrop_environment **out, 
     raindrop_environment *e = NULL;
     raindrop__picture picture;
     sat_allocator memory;
+    sat__text ignored = sat__text_begin(NULL, 0);
     sat_result result;
     size_t bytes;
     float *bow = NULL;
@@ -1665,7 +1755,7 @@ RAINDROP_DEF sat_result raindrop_environment_create(raindrop_environment **out, 
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (!raindrop__environment_is_valid(image, &o) || !sat__resolve_allocator(&memory, &o.allocator))
+    if (!raindrop__environment_is_valid(&ignored, image, &o) || !sat__resolve_allocator(&memory, &o.allocator))
         return SAT_ERR_ARGUMENT;
     if (!sat__multiply_size(&bytes, (size_t)image->width * 3 * sizeof(float), (size_t)image->height))
         return SAT_ERR_SIZE;
@@ -2173,36 +2263,47 @@ RAINDROP_DEF sat_result raindrop_rain_set_centre(raindrop_rain *rain, const floa
 }
 #endif
 
+#define RAINDROP__MAX_DROPS 33554432
+
+static const sat__field raindrop__rain_fields[] = {
+    SAT__FIELD(raindrop_rain_options, 'd', rate_mm_h, 10, 0.01, 500, ' '),
+    SAT__FIELD(raindrop_rain_options, 'i', count, 0, 0, RAINDROP__MAX_DROPS, ' '),
+    SAT__FIELD(raindrop_rain_options, 'd', diameter_mm, 0, 0.001, 6, '0'),
+    SAT__FIELD(raindrop_rain_options, 'd', diameter_min_mm, 0.1, 0.001, 6, ' '),
+    SAT__FIELD(raindrop_rain_options, 'd', diameter_max_mm, 6, 0.001, 6, ' '),
+    SAT__FIELD(raindrop_rain_options, 'f', speed, 0, 0, 1e18, ' '),
+    SAT__FIELD(raindrop_rain_options, 'i', oblate, 0, 0, 1, ' '),
+    SAT__FIELD(raindrop_rain_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(raindrop_rain_options, 't', threads, 0, 0, 0, ' '),
+};
+
 RAINDROP_DEF raindrop_rain_options raindrop_rain_defaults(void)
 {
     raindrop_rain_options o;
-    memset(&o, 0, sizeof o);
-    o.rate_mm_h = 10;
-    o.diameter_min_mm = 0.1;
-    o.diameter_max_mm = 6;
+    sat__fields_default(&o, sizeof o, raindrop__rain_fields, SAT__COUNT(raindrop__rain_fields));
     raindrop__set(o.box_size, 8, 8, 8);
     o.seed = 1;
     return o;
 }
 
-#define RAINDROP__MAX_DROPS 33554432
-
-static inline int raindrop__rain_is_valid(const raindrop_rain_options *o)
+static inline int raindrop__rain_is_valid(sat__text *t, const raindrop_rain_options *o)
 {
-    if (o->drops) return o->count >= 0 && o->count <= RAINDROP__MAX_DROPS && sat__threads_are_valid(&o->threads);
+    if (!raindrop__fields_are_valid(t, o, raindrop__rain_fields, SAT__COUNT(raindrop__rain_fields))) return 0;
+    if (!(o->diameter_min_mm < o->diameter_max_mm))
+        return raindrop__say(t, "diameter_min_mm is not below diameter_max_mm");
 #ifdef RAINDROP_NO_RAIN
-    return 0;
-#else
-    int axis;
-    if (!(o->rate_mm_h >= 0.01 && o->rate_mm_h <= 500) || o->count < 0 || o->count > RAINDROP__MAX_DROPS) return 0;
-    if (!(o->diameter_mm == 0 || (o->diameter_mm >= 0.001 && o->diameter_mm <= 6))) return 0;
-    if (!(o->diameter_min_mm >= 0.001 && o->diameter_min_mm < o->diameter_max_mm && o->diameter_max_mm <= 6)) return 0;
-    for (axis = 0; axis < 3; axis++)
-        if (!sat__is_finite(o->box_size[axis]) || !(o->box_size[axis] > 0)) return 0;
-    if (!raindrop__finite3(o->centre) || !raindrop__finite3(o->wind) || !sat__is_finite(o->speed) || o->speed < 0)
-        return 0;
-    return sat__threads_are_valid(&o->threads);
+    if (!o->drops) return raindrop__say(t, "drops is NULL; RAINDROP_NO_RAIN left out all but drops of your own");
 #endif
+    return raindrop__vector_is_valid(t, "box_size", o->box_size, 1e-6, 1e18) &&
+           raindrop__vector_is_valid(t, "centre", o->centre, -1e30, 1e30) &&
+           raindrop__vector_is_valid(t, "wind", o->wind, -1e18, 1e18);
+}
+
+RAINDROP_DEF const char *raindrop_explain_rain(char *text, size_t size, const raindrop_rain_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (options) raindrop__rain_is_valid(&t, options);
+    return text;
 }
 
 /* Drops in the box, so that their volumes times their speeds make the rate asked for. The sizes are Marshall-Palmer's;
@@ -2246,13 +2347,15 @@ RAINDROP_DEF sat_result raindrop_rain_create(raindrop_rain **out, const raindrop
     raindrop_rain_options o = options ? *options : raindrop_rain_defaults();
     raindrop_rain layout, *rain;
     sat__arena arena = {0, 0, 0};
+    sat__text ignored = sat__text_begin(NULL, 0);
     sat_allocator memory;
     double expected;
     int count, workers;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (!raindrop__rain_is_valid(&o) || !sat__resolve_allocator(&memory, &o.allocator)) return SAT_ERR_ARGUMENT;
+    if (!raindrop__rain_is_valid(&ignored, &o) || !sat__resolve_allocator(&memory, &o.allocator))
+        return SAT_ERR_ARGUMENT;
     expected = o.drops || o.count ? (double)o.count : raindrop__expected_count(&o);
     if (expected > RAINDROP__MAX_DROPS) return SAT_ERR_LIMIT;
     count = (int)(expected + 0.5);
@@ -2313,14 +2416,20 @@ RAINDROP_DEF sat_result raindrop_rain_set_drops(raindrop_rain *rain, const raind
    as vectors, looked up and blended.
    ------------------------------------------------------------------------------------------------ */
 
+static const sat__field raindrop__camera_fields[] = {
+    SAT__FIELD(raindrop_camera, 'f', fov_y, 1.5707963267948966, 0.001, 3, ' '),
+    SAT__FIELD(raindrop_camera, 'f', depth_near, 0.01, 0, 1e18, ' '),
+    SAT__FIELD(raindrop_camera, 'f', depth_far, 0, 0, 1e18, ' '),
+    SAT__FIELD(raindrop_camera, 'f', exposure, 0, 0, 1e18, ' '),
+    SAT__FIELD(raindrop_camera, 'f', aperture, 0, 0, 1e18, ' '),
+    SAT__FIELD(raindrop_camera, 'f', focus_distance, 3, 1e-18, 1e18, ' '),
+};
+
 RAINDROP_DEF raindrop_camera raindrop_camera_defaults(void)
 {
     raindrop_camera camera;
-    memset(&camera, 0, sizeof camera);
+    sat__fields_default(&camera, sizeof camera, raindrop__camera_fields, SAT__COUNT(raindrop__camera_fields));
     camera.right[0] = camera.up[1] = camera.back[2] = 1;
-    camera.fov_y = (float)(RAINDROP__PI / 2);
-    camera.depth_near = 0.01f;
-    camera.focus_distance = 3;
     return camera;
 }
 
@@ -2346,17 +2455,83 @@ RAINDROP_DEF raindrop_camera raindrop_camera_look(const float position[3], const
     return camera;
 }
 
+static inline int raindrop__camera_is_valid(sat__text *t, const raindrop_camera *c)
+{
+    float rr = raindrop__dot(c->right, c->right), uu = raindrop__dot(c->up, c->up),
+          bb = raindrop__dot(c->back, c->back);
+    float skew = fabsf(raindrop__dot(c->right, c->up)) + fabsf(raindrop__dot(c->up, c->back)) +
+                 fabsf(raindrop__dot(c->back, c->right));
+    if (!raindrop__vector_is_valid(t, "position", c->position, -1e38, 1e38)) return 0;
+    if (!raindrop__vector_is_valid(t, "velocity", c->velocity, -1e38, 1e38)) return 0;
+    if (!(fabsf(rr - 1) < 0.01f && fabsf(uu - 1) < 0.01f && fabsf(bb - 1) < 0.01f && skew < 0.01f))
+        return raindrop__say(t, "right, up and back are not orthonormal");
+    if (c->depth_far > 0 && !(c->depth_near > 0 && c->depth_far > c->depth_near))
+        return raindrop__say(t, "depth_far is above 0 but not above a depth_near above 0");
+#ifdef RAINDROP_NO_STREAK
+    if (c->exposure > 0 || c->aperture > 0)
+        return raindrop__say(t, "exposure or aperture is above 0; RAINDROP_NO_STREAK left them out");
+#endif
+    return raindrop__fields_are_valid(t, c, raindrop__camera_fields, SAT__COUNT(raindrop__camera_fields));
+}
+
+RAINDROP_DEF const char *raindrop_explain_camera(char *text, size_t size, const raindrop_camera *camera)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (camera) raindrop__camera_is_valid(&t, camera);
+    return text;
+}
+
+static const sat__field raindrop__render_fields[] = {
+    SAT__FIELD(raindrop_render_options, 'i', look, RAINDROP_LOOK_AUTO, 0, RAINDROP_LOOK_AUTO, ' '),
+    SAT__FIELD(raindrop_render_options, 'f', far_radius, 1.5, 0, 64, ' '),
+    SAT__FIELD(raindrop_render_options, 'f', coverage_threshold, 0.0001, 0, 1, ' '),
+    SAT__FIELD(raindrop_render_options, 'i', orders, 1, 0, 3, ' '),
+    SAT__FIELD(raindrop_render_options, 'i', exit_fresnel, 0, 0, 1, ' '),
+    SAT__FIELD(raindrop_render_options, 'f', orders_radius, 8, 0, 1e18, ' '),
+    SAT__FIELD(raindrop_render_options, 'i', sort, 1, 0, 1, ' '),
+};
+
 RAINDROP_DEF raindrop_render_options raindrop_render_defaults(void)
 {
     raindrop_render_options o;
-    memset(&o, 0, sizeof o);
-    o.look = RAINDROP_LOOK_AUTO;
-    o.far_radius = 1.5f;
-    o.coverage_threshold = 0.0001f;
-    o.orders = 1;
-    o.orders_radius = 8;
-    o.sort = 1;
+    sat__fields_default(&o, sizeof o, raindrop__render_fields, SAT__COUNT(raindrop__render_fields));
     return o;
+}
+
+static inline int raindrop__size_is_valid(sat__text *t, int width, int height)
+{
+    return raindrop__int_is_valid(t, "width", width, 1, 32768, ' ') &&
+           raindrop__int_is_valid(t, "height", height, 1, 32768, ' ');
+}
+
+static inline int raindrop__picture_is_valid(sat__text *t, ptrdiff_t stride, int width, int height)
+{
+    float aligned = 0;
+    if (!raindrop__size_is_valid(t, width, height)) return 0;
+    if (stride % (ptrdiff_t)sizeof(float)) return raindrop__say(t, "stride is not a multiple of 4 bytes");
+    if (sat__rows_are_valid(&aligned, &stride, width, height, 3 * sizeof(float), sizeof(float))) return 1;
+    return raindrop__say(t, "stride is shorter than a row");
+}
+
+static inline int raindrop__render_is_valid(sat__text *t, const raindrop_render_options *o)
+{
+    if (!raindrop__fields_are_valid(t, o, raindrop__render_fields, SAT__COUNT(raindrop__render_fields))) return 0;
+#ifdef RAINDROP_NO_MAP
+    if (o->look == RAINDROP_LOOK_MAP) return raindrop__say(t, "RAINDROP_LOOK_MAP: RAINDROP_NO_MAP left it out");
+#endif
+    return 1;
+}
+
+RAINDROP_DEF const char *raindrop_explain_render(char *text, size_t size, ptrdiff_t stride, int width, int height,
+                                                 const raindrop_camera *camera, const raindrop_render_options *options)
+{
+    const raindrop_camera c = camera ? *camera : raindrop_camera_defaults();
+    const raindrop_render_options o = options ? *options : raindrop_render_defaults();
+    sat__text t = sat__text_begin(text, size);
+    if (raindrop__picture_is_valid(&t, stride, width, height) && raindrop__camera_is_valid(&t, &c) &&
+        raindrop__render_is_valid(&t, &o) && o.look == RAINDROP_LOOK_MAP && !o.map)
+        raindrop__say(&t, "map is NULL, which RAINDROP_LOOK_MAP needs");
+    return text;
 }
 
 enum { RAINDROP__BAND = 16, RAINDROP__BATCH = 128 };
@@ -3462,47 +3637,14 @@ static void raindrop__draw_bands(int begin, int end, int worker, void *context)
     }
 }
 
-static inline int raindrop__camera_is_valid(const raindrop_camera *c)
+/* The picture that is drawn to, and the camera; resolves a stride of 0. */
+static inline int raindrop__frame_is_valid(raindrop__frame *frame)
 {
-    float rr = raindrop__dot(c->right, c->right), uu = raindrop__dot(c->up, c->up),
-          bb = raindrop__dot(c->back, c->back);
-    float skew = fabsf(raindrop__dot(c->right, c->up)) + fabsf(raindrop__dot(c->up, c->back)) +
-                 fabsf(raindrop__dot(c->back, c->right));
-    if (!raindrop__finite3(c->position) || !raindrop__finite3(c->velocity)) return 0;
-    if (!(fabsf(rr - 1) < 0.01f && fabsf(uu - 1) < 0.01f && fabsf(bb - 1) < 0.01f && skew < 0.01f)) return 0;
-    if (!(c->fov_y >= 0.001f && c->fov_y <= 3) || !(c->depth_near >= 0) || !sat__is_finite(c->depth_near))
-        return 0;
-    if (c->depth_far != 0 && (!(c->depth_near > 0 && c->depth_far > c->depth_near) || !sat__is_finite(c->depth_far)))
-        return 0;
-    if (!(c->exposure >= 0 && c->aperture >= 0) || !sat__is_finite(c->exposure) || !sat__is_finite(c->aperture))
-        return 0;
-#ifdef RAINDROP_NO_STREAK
-    if (c->exposure > 0 || c->aperture > 0) return 0;
-#endif
-    return c->focus_distance > 0 && sat__is_finite(c->focus_distance);
-}
-
-/* the picture that is drawn to; resolves a stride of 0 */
-static inline int raindrop__picture_is_valid(raindrop__frame *frame)
-{
-    if (frame->width > 32768 || frame->height > 32768) return 0;
-    return sat__rows_are_valid(frame->rgb, &frame->stride, frame->width, frame->height, 3 * sizeof(float),
+    sat__text ignored = sat__text_begin(NULL, 0);
+    return raindrop__picture_is_valid(&ignored, frame->stride, frame->width, frame->height) &&
+           raindrop__camera_is_valid(&ignored, &frame->camera) &&
+           sat__rows_are_valid(frame->rgb, &frame->stride, frame->width, frame->height, 3 * sizeof(float),
                                sizeof(float));
-}
-
-static inline int raindrop__render_is_valid(raindrop__frame *frame, const raindrop_environment *environment)
-{
-    const raindrop_render_options *o = &frame->options;
-    if (!frame->rain || !environment || !raindrop__picture_is_valid(frame)) return 0;
-    if (!raindrop__camera_is_valid(&frame->camera) || (unsigned)o->look > RAINDROP_LOOK_AUTO) return 0;
-    if (!(o->far_radius >= 0 && o->far_radius <= 64) || !(o->coverage_threshold >= 0 && o->coverage_threshold <= 1))
-        return 0;
-    if (o->orders < 0 || o->orders > 3 || !(o->orders_radius >= 0)) return 0;
-#ifdef RAINDROP_NO_MAP
-    return o->look != RAINDROP_LOOK_MAP;
-#else
-    return o->look != RAINDROP_LOOK_MAP || o->map;
-#endif
 }
 
 static inline void raindrop__set_frame(raindrop__frame *frame)
@@ -3548,6 +3690,7 @@ RAINDROP_DEF sat_result raindrop_render(float *rgb, ptrdiff_t stride, int width,
 {
     raindrop__frame frame;
     const sat_threads *threads;
+    sat__text ignored = sat__text_begin(NULL, 0);
     int workers;
     memset(&frame, 0, sizeof frame);
     frame.camera = camera ? *camera : raindrop_camera_defaults();
@@ -3559,7 +3702,10 @@ RAINDROP_DEF sat_result raindrop_render(float *rgb, ptrdiff_t stride, int width,
     frame.stride = stride;
     frame.width = width;
     frame.height = height;
-    if (!raindrop__render_is_valid(&frame, environment)) return SAT_ERR_ARGUMENT;
+    if (!rain || !environment || !raindrop__frame_is_valid(&frame) ||
+        !raindrop__render_is_valid(&ignored, &frame.options) ||
+        (frame.options.look == RAINDROP_LOOK_MAP && !frame.options.map))
+        return SAT_ERR_ARGUMENT;
     raindrop__set_frame(&frame);
     threads = &rain->options.threads;
     workers = sat__worker_count(threads);
@@ -3602,8 +3748,7 @@ RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride
     frame.stride = stride;
     frame.width = width;
     frame.height = height;
-    if (!environment || !raindrop__picture_is_valid(&frame) || !raindrop__camera_is_valid(&frame.camera))
-        return SAT_ERR_ARGUMENT;
+    if (!environment || !raindrop__frame_is_valid(&frame)) return SAT_ERR_ARGUMENT;
     if (threads && !sat__threads_are_valid(threads)) return SAT_ERR_ARGUMENT;
     raindrop__set_frame(&frame);
     sat__parallel_for(threads, height, raindrop__background_rows, &frame);
@@ -4181,12 +4326,24 @@ struct raindrop_gl {
     sat_allocator allocator;
 };
 
+static const sat__field raindrop__gl_fields[] = {
+    SAT__FIELD(raindrop_gl_options, 'i', half_map, 1, 0, 1, ' '),
+    SAT__FIELD(raindrop_gl_options, 'i', quads, 1, 0, 1, ' '),
+    SAT__FIELD(raindrop_gl_options, 'a', allocator, 0, 0, 0, ' '),
+};
+
 RAINDROP_DEF raindrop_gl_options raindrop_gl_defaults(void)
 {
     raindrop_gl_options o;
-    memset(&o, 0, sizeof o);
-    o.half_map = 1;
+    sat__fields_default(&o, sizeof o, raindrop__gl_fields, SAT__COUNT(raindrop__gl_fields));
     return o;
+}
+
+RAINDROP_DEF const char *raindrop_explain_gl(char *text, size_t size, const raindrop_gl_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (options) raindrop__fields_are_valid(&t, options, raindrop__gl_fields, SAT__COUNT(raindrop__gl_fields));
+    return text;
 }
 
 RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl)
@@ -4292,7 +4449,9 @@ RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *g
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (!get_proc || !sat__resolve_allocator(&memory, &o.allocator)) return SAT_ERR_ARGUMENT;
+    if (!get_proc || sat__fields_check(&o, raindrop__gl_fields, SAT__COUNT(raindrop__gl_fields)))
+        return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(&memory, &o.allocator)) return SAT_ERR_ARGUMENT;
     g = (raindrop_gl *)sat__alloc(&memory, sizeof *g);
     if (!g) return SAT_ERR_MEMORY;
     memset(g, 0, sizeof *g);
@@ -4549,6 +4708,18 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
     }
 }
 
+/* The message says what is wrong, in the words of raindrop_explain_render. */
+static inline int raindrop__gl_frame_is_valid(raindrop_gl *g, const raindrop__frame *frame)
+{
+    sat__text t = sat__text_begin(g->gl.message, sizeof g->gl.message);
+    if (!raindrop__size_is_valid(&t, frame->width, frame->height)) return 0;
+    if (!raindrop__camera_is_valid(&t, &frame->camera) || !raindrop__render_is_valid(&t, &frame->options)) return 0;
+    if (frame->options.look == RAINDROP_LOOK_MAP && !g->options.map)
+        return raindrop__say(&t, "map is NULL, which RAINDROP_LOOK_MAP needs");
+    if (!g->environment) return raindrop__say(&t, "there was no raindrop_gl_set_environment");
+    return g->drops[0] ? 1 : raindrop__say(&t, "there was no raindrop_gl_set_rain");
+}
+
 RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height, const raindrop_camera *camera,
                                            const raindrop_render_options *options)
 {
@@ -4563,13 +4734,8 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     frame.options = options ? *options : raindrop_render_defaults();
     frame.width = width;
     frame.height = height;
-    if (!g || !g->environment || !g->drops[0] || width < 1 || height < 1 || width > 32768 || height > 32768)
-        return SAT_ERR_ARGUMENT;
-    if (!raindrop__camera_is_valid(&frame.camera) || (unsigned)frame.options.look > RAINDROP_LOOK_AUTO)
-        return SAT_ERR_ARGUMENT;
-    if (frame.options.orders < 0 || frame.options.orders > 3 || !(frame.options.orders_radius >= 0))
-        return SAT_ERR_ARGUMENT;
-    if (frame.options.look == RAINDROP_LOOK_MAP && !g->options.map) return SAT_ERR_ARGUMENT;
+    if (!g || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
+    if (!raindrop__gl_frame_is_valid(g, &frame)) return SAT_ERR_ARGUMENT;
     if (!g->count) return SAT_OK;
     if (!raindrop__is_sprite(&frame) && (frame.camera.exposure > 0 || frame.camera.aperture > 0))
         kind |= RAINDROP__GL_SOFT;

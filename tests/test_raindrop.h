@@ -1165,6 +1165,139 @@ TEST(raindrop_rain_pauses_and_publishes)
     raindrop_rain_destroy(rain);
 }
 
+/* Every row of every table at its ends, beyond them and as NaN: create and explain agree, and the sentence begins with
+   the option's name. */
+typedef struct rt_table { const sat__field *fields; int count; } rt_table;
+
+static const char *rt_explain(int which, void *options, int create, sat_result *result)
+{
+    static char text[160];
+    static float sky[3 * 8 * 48];
+    sat_image image = sat_image_f32(sky, 8, 48, 3);
+    raindrop_environment *e = NULL;
+    raindrop_rain *r = NULL;
+    float rgb[3] = {0, 0, 0};
+    *result = SAT_OK;
+    if (which == 4) {
+        raindrop_map *map = NULL;
+        raindrop_explain_map(text, sizeof text, (const raindrop_map_options *)options);
+        if (create) {
+            *result = raindrop_map_create(&map, (const raindrop_map_options *)options);
+            raindrop_map_destroy(map);
+        }
+    } else if (which == 0) {
+        raindrop_explain_environment(text, sizeof text, &image, (const raindrop_environment_options *)options);
+        if (create) {
+            *result = raindrop_environment_create(&e, &image, (const raindrop_environment_options *)options, NULL);
+            raindrop_environment_destroy(e);
+        }
+    } else if (which == 1) {
+        raindrop_explain_rain(text, sizeof text, (const raindrop_rain_options *)options);
+        if (create) {
+            *result = raindrop_rain_create(&r, (const raindrop_rain_options *)options);
+            raindrop_rain_destroy(r);
+        }
+    } else {
+        raindrop_rain_options o = raindrop_rain_defaults();
+        const raindrop_camera *camera = which == 2 ? (const raindrop_camera *)options : NULL;
+        const raindrop_render_options *render = which == 3 ? (const raindrop_render_options *)options : NULL;
+        image.height = 4;
+        o.count = 1;
+        EXPECT_EQ(raindrop_environment_create(&e, &image, NULL, NULL), SAT_OK);
+        EXPECT_EQ(raindrop_rain_create(&r, &o), SAT_OK);
+        raindrop_explain_render(text, sizeof text, 12, 1, 1, camera, render);
+        *result = raindrop_render(rgb, 12, 1, 1, NULL, camera, r, e, render, NULL);
+        raindrop_environment_destroy(e);
+        raindrop_rain_destroy(r);
+    }
+    return text;
+}
+
+TEST(raindrop_options_are_checked_and_named)
+{
+    const rt_table tables[5] = {
+        {raindrop__environment_fields, SAT__COUNT(raindrop__environment_fields)},
+        {raindrop__rain_fields, SAT__COUNT(raindrop__rain_fields)},
+        {raindrop__camera_fields, SAT__COUNT(raindrop__camera_fields)},
+        {raindrop__render_fields, SAT__COUNT(raindrop__render_fields)},
+        {raindrop__map_fields, SAT__COUNT(raindrop__map_fields)}};
+    int which, i, at;
+    for (which = 0; which < 5; which++)
+        for (i = 0; i < tables[which].count; i++) {
+            const sat__field *f = &tables[which].fields[i];
+            if (f->type == 'a' || f->type == 't') continue;
+            for (at = 0; at < 6; at++) {
+                raindrop_environment_options e = raindrop_environment_defaults();
+                raindrop_rain_options r = raindrop_rain_defaults();
+                raindrop_camera c = raindrop_camera_defaults();
+                raindrop_render_options o = raindrop_render_defaults();
+                raindrop_map_options m = raindrop_map_defaults();
+                void *const each[5] = {&e, &r, &c, &o, &m}, *options = each[which];
+                const double values[5] = {f->initial, f->low, f->high, f->low - 1, f->high * 1.1 + 1};
+                /* the largest take seconds or gigabytes */
+                int large = at == 2 && (strstr(f->name, "resolution") || strstr(f->name, "samples") ||
+                                        !strcmp(f->name, "count"));
+                int smallest = !strcmp(f->name, "diameter_max_mm") && at == 1; /* not above the other one */
+                sat_result result;
+                const char *text;
+                if (at == 5 && f->type == 'i') continue;
+                r.count = 10;
+                m.resolution = 16;
+                sat__field_set(f, options, at == 5 ? (double)sat__float_from_bits(0x7fc00000u) : values[at]);
+                if (!strcmp(f->name, "look") && at == 1) continue; /* which needs a map */
+                if (!strcmp(f->name, "diameter_min_mm") && at == 2) r.diameter_min_mm = 5.9;
+                text = rt_explain(which, options, !large, &result);
+                if (at < 3 && !smallest) {
+                    if (!EXPECT(!*text)) puts(text);
+                    EXPECT_EQ(result, SAT_OK);
+                } else {
+                    if (!EXPECT(smallest || strstr(text, f->name) == text)) puts(text);
+                    EXPECT_EQ(result, SAT_ERR_ARGUMENT);
+                }
+            }
+        }
+}
+
+TEST(raindrop_sentences_name_what_is_wrong)
+{
+    static float sky[3 * 8 * 4];
+    char text[160];
+    sat_image image = sat_image_f32(sky, 8, 4, 3);
+    raindrop_environment_options e = raindrop_environment_defaults();
+    raindrop_rain_options r = raindrop_rain_defaults();
+    raindrop_camera c = raindrop_camera_defaults();
+    raindrop_render_options o = raindrop_render_defaults();
+    raindrop_map_options m = raindrop_map_defaults();
+    EXPECT(strcmp(raindrop_explain_environment(text, sizeof text, &image, NULL), "") == 0);
+    EXPECT(strcmp(raindrop_explain_environment(text, sizeof text, NULL, NULL), "image is NULL") == 0);
+    EXPECT(raindrop_explain_environment(NULL, 0, NULL, NULL) == NULL);
+    e.resolution = 8;
+    EXPECT(strcmp(raindrop_explain_environment(text, sizeof text, &image, &e), "resolution is 8; 16..4096 or 0") == 0);
+    e.resolution = 0;
+    e.sun_direction[2] = sat__float_from_bits(0x7fc00000u);
+    raindrop_explain_environment(text, sizeof text, &image, &e);
+    EXPECT(strcmp(text, "sun_direction[2] is NaN; -1e18..1e18") == 0);
+    EXPECT(strcmp(raindrop_explain_rain(text, sizeof text, NULL), "") == 0);
+    r.box_size[1] = -1;
+    EXPECT(strcmp(raindrop_explain_rain(text, sizeof text, &r), "box_size[1] is -1; 1e-6..1e18") == 0);
+    EXPECT(strcmp(raindrop_explain_camera(text, sizeof text, NULL), "") == 0);
+    c.up[0] = 1;
+    EXPECT(strcmp(raindrop_explain_camera(text, sizeof text, &c), "right, up and back are not orthonormal") == 0);
+    raindrop_explain_render(text, sizeof text, 8, 1, 2, NULL, NULL);
+    EXPECT(strcmp(text, "stride is shorter than a row") == 0);
+    EXPECT(strcmp(raindrop_explain_render(text, sizeof text, 12, 0, 1, NULL, NULL), "width is 0; 1..32768") == 0);
+    o.look = RAINDROP_LOOK_MAP;
+    raindrop_explain_render(text, sizeof text, 12, 1, 1, NULL, &o);
+    EXPECT(strcmp(text, "map is NULL, which RAINDROP_LOOK_MAP needs") == 0);
+    EXPECT(strcmp(raindrop_explain_map(text, sizeof text, NULL), "") == 0);
+    m.resolution = 48;
+    EXPECT(strcmp(raindrop_explain_map(text, sizeof text, &m), "resolution is 48; 1..4096, a power of two") == 0);
+    c = raindrop_camera_defaults();
+    c.depth_far = 0.005f;
+    raindrop_explain_camera(text, sizeof text, &c);
+    EXPECT(strcmp(text, "depth_far is above 0 but not above a depth_near above 0") == 0);
+}
+
 TEST(raindrop_rain_refuses_nonsense)
 {
     raindrop_rain *rain;

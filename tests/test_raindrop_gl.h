@@ -459,12 +459,16 @@ TEST(raindrop_gl_respects_the_depth_buffer)
 
 /* Positions and speeds against the CPU's after the same steps; drops that the two re-entered at different steps, by a
    rounding at the floor, are few. */
-static double rg_advance(raindrop_gl *g, raindrop_rain *rain, const double *steps, int count)
+static double rg_advance(raindrop_gl *g, raindrop_rain *rain, const float *wind, const double *steps, int count)
 {
     int n = 0, i, k, c, off = 0;
     const raindrop_drop *cpu = raindrop_rain_drops(&n, rain);
     raindrop_drop *gpu = (raindrop_drop *)malloc(sizeof *gpu * (size_t)n);
     EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    if (wind) { /* the wind turns when the drops are on the GPU already */
+        EXPECT_EQ(raindrop_rain_set_wind(rain, wind), SAT_OK);
+        EXPECT_EQ(raindrop_gl_set_wind(g, wind), SAT_OK);
+    }
     for (k = 0; k < count; k++) {
         EXPECT_EQ(raindrop_rain_advance(rain, steps[k]), SAT_OK);
         EXPECT_EQ(raindrop_gl_advance(g, steps[k]), SAT_OK);
@@ -497,20 +501,20 @@ TEST(raindrop_gl_rain_falls_as_on_the_cpu)
     o.oblate = 1;
     EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK);
     EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
-    off = rg_advance(g, rain, frames, 8);
+    off = rg_advance(g, rain, NULL, frames, 8);
     EXPECT(off < 2e-3);
     REPORT("drops that fell differently on the GPU", 100 * off, "%");
-    EXPECT_EQ(raindrop_rain_set_wind(rain, gust), SAT_OK);
-    off = rg_advance(g, rain, frames, 8);
+    off = rg_advance(g, rain, gust, frames, 8);
     EXPECT(off < 5e-3);
     REPORT("the same in a gust", 100 * off, "%");
-    EXPECT_EQ(raindrop_rain_set_wind(rain, updraught), SAT_OK);
-    off = rg_advance(g, rain, frames, 4);
+    off = rg_advance(g, rain, updraught, frames, 4);
     EXPECT(off < 2e-2);
     REPORT("the same in an updraught", 100 * off, "%");
-    EXPECT_EQ(raindrop_rain_set_wind(rain, calm), SAT_OK); /* risen, stopped, falling again */
-    off = rg_advance(g, rain, frames, 8);
+    off = rg_advance(g, rain, calm, frames, 8); /* risen, stopped, falling again */
     EXPECT(off < 2e-2);
+    gust[1] = sat__float_from_bits(0x7fc00000u);
+    EXPECT_EQ(raindrop_gl_set_wind(g, gust), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_set_wind(g, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(raindrop_gl_advance(g, -1), SAT_ERR_ARGUMENT);
     raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
@@ -602,12 +606,140 @@ TEST(raindrop_gl_restores_the_state)
     rg_close(&s);
 }
 
+/* The functions for shaders of the caller's own, a ray a texel, against raindrop_trace. */
+TEST(raindrop_gl_glsl_traces_as_the_cpu)
+{
+    static const char fragment[] = "layout(location = 0) out vec4 colour;\n"
+                                   "uniform vec2 which;\n" /* index, 0 reflected, 1 refracted, 2 shares */
+                                   "void main() {\n"
+                                   "    float b = (floor(gl_FragCoord.x) + 0.5) / 64.0, m = (1.0 - b) * (1.0 + b);\n"
+                                   "    float a = floor(gl_FragCoord.y) * 0.1;\n"
+                                   "    vec3 p = b * vec3(cos(a), sin(a), 0.0);\n"
+                                   "    raindrop_ray ray = raindrop_trace(vec3(0.0, 0.0, -1.0), p, m, which.x);\n"
+                                   "    colour = vec4(which.y < 0.5 ? ray.reflected : ray.refracted, ray.fresnel);\n"
+                                   "    if (which.y > 1.5) colour = vec4(ray.transmit, ray.footprint, 0.0, 0.0);\n"
+                                   "}\n";
+    static const float indices[3] = {1.33f, 1, 1 / 1.33f};
+    static float out[64 * 64][4];
+    const char *library[2], *text[2];
+    sat__gl_shaders shaders;
+    sat__gl_state state;
+    unsigned program = 0, target = 0, framebuffer = 0;
+    double worst = 0;
+    rg_scene s;
+    int i, k, c, which;
+    if (!rg_open(&s)) return;
+    memset(&shaders, 0, sizeof shaders);
+    library[0] = raindrop_gl_glsl();
+    text[0] = fragment;
+    library[1] = text[1] = NULL;
+    shaders.name = "rays";
+    shaders.library = library;
+    shaders.fragment = text;
+    sat__gl_begin(&s.gl, &state, 1);
+    if (!EXPECT_EQ(sat__gl_build(&s.gl, &program, &shaders), SAT_OK)) puts(s.gl.message);
+    EXPECT_EQ(sat__gl_texture(&s.gl, &target, SAT__GL_RGBA32F, 64, 64, NULL), SAT_OK);
+    EXPECT_EQ(sat__gl_framebuffer(&s.gl, &framebuffer, &target, 1, 0), SAT_OK);
+    for (k = 0; k < 3; k++)
+        for (which = 0; which < 3; which++) {
+            sat__gl_pass(&s.gl, program, framebuffer, 64, 64);
+            sat__gl_set_float2(&s.gl, program, "which", indices[k], (float)which);
+            sat__gl_draw(&s.gl);
+            EXPECT_EQ(sat__gl_read(&s.gl, out, target, SAT__GL_RGBA32F, 64, 64), SAT_OK);
+            for (i = 0; i < 64 * 64; i++) {
+                static const float d[3] = {0, 0, -1};
+                float b = ((float)(i % 64) + 0.5f) / 64, a = (float)(i / 64) * 0.1f, p[3], want[4] = {0, 0, 0, 0};
+                raindrop_ray ray;
+                raindrop__set(p, b * cosf(a), b * sinf(a), 0);
+                raindrop_trace(&ray, d, p, (1 - b) * (1 + b), indices[k]);
+                if (which < 2) memcpy(want, which ? ray.refracted : ray.reflected, sizeof ray.refracted);
+                else want[1] = ray.footprint_refracted;
+                if (which == 2) want[0] = ray.transmit;
+                else want[3] = ray.fresnel;
+                for (c = 0; c < 4; c++) {
+                    double error = fabs((double)out[i][c] - (double)want[c]) / (1 + fabs((double)want[c]));
+                    if (error > worst) worst = error;
+                }
+            }
+        }
+    s.gl.DeleteProgram(program);
+    s.gl.DeleteFramebuffers(1, &framebuffer);
+    s.gl.DeleteTextures(1, &target);
+    sat__gl_end(&s.gl, &state);
+    EXPECT(worst < 2e-5);
+    REPORT("rays of a shader of one's own, largest error", worst, "");
+    rg_close(&s);
+}
+
+/* Any two options away from their defaults, ends of their ranges among them: the CPU's picture and the GPU's. */
+enum { RG_OPTIONS = 14 };
+
+static void rg_set(rg_scene *s, raindrop_render_options *o, raindrop_rain *rain, int option)
+{
+    int i;
+    if (option == 0) o->look = RAINDROP_LOOK_SPRITE;
+    if (option == 1) o->look = RAINDROP_LOOK_RAY;
+    if (option == 2) o->far_radius = 0;
+    if (option == 3) o->far_radius = 64;
+    if (option == 4) o->coverage_threshold = 1;
+    if (option == 5) o->orders = 0;
+    if (option == 6) o->orders = 3;
+    if (option == 7) o->exit_fresnel = 1;
+    if (option == 8) o->orders_radius = 0;
+    if (option == 9) s->camera.exposure = 0.002f;
+    if (option == 10) s->camera.aperture = 0.004f;
+    if (option == 11) s->camera.fov_y = 2.2f;
+    if (option == 12) s->camera.depth_near = 0.2f;
+    if (option == 13)
+        for (i = 0; i < rain->count; i++) rain->drops[i].axis_ratio = 0.8f;
+}
+
+TEST(raindrop_gl_takes_options_in_pairs)
+{
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_rain *rain = rg_rain(150, 0.8f, 6);
+    double worst = 0;
+    int a, b, i;
+    if (!rg_open(&s)) {
+        raindrop_rain_destroy(rain);
+        return;
+    }
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    for (a = 0; a < RG_OPTIONS; a++)
+        for (b = a; b < RG_OPTIONS; b++) {
+            raindrop_render_options o = raindrop_render_defaults();
+            raindrop_camera camera = s.camera;
+            double error;
+            o.sort = 0;
+            for (i = 0; i < rain->count; i++) rain->drops[i].axis_ratio = 1;
+            s.camera.focus_distance = 0.3f;
+            rg_set(&s, &o, rain, a);
+            rg_set(&s, &o, rain, b);
+            error = rg_compare(&s, g, rain, &o);
+            if (!EXPECT(error < 5e-4)) printf("options %d and %d: %g\n", a, b, error);
+            if (error > worst) worst = error;
+            s.camera = camera;
+        }
+    REPORT("options in pairs, largest RMSE from the CPU", worst, "");
+    raindrop_gl_destroy(g);
+    raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
+
 static sat_gl_proc rg_no_procs(const char *name) { (void)name; return NULL; }
 
 TEST(raindrop_gl_says_what_is_wrong)
 {
     raindrop_gl *g = NULL;
+    raindrop_gl_options wrong = raindrop_gl_defaults();
+    char text[160];
     rg_scene s;
+    EXPECT(strcmp(raindrop_explain_gl(text, sizeof text, &wrong), "") == 0);
+    wrong.half_map = 2;
+    EXPECT(strcmp(raindrop_explain_gl(text, sizeof text, &wrong), "half_map is 2; 0..1") == 0);
+    EXPECT_EQ(raindrop_gl_create(&g, rg_no_procs, &wrong), SAT_ERR_ARGUMENT);
     EXPECT_EQ(raindrop_gl_create(&g, rg_no_procs, NULL), SAT_ERR_GL_FUNCTION);
     EXPECT(g && strstr(raindrop_gl_message(g), "gl") != NULL);
     EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, NULL), SAT_ERR_ARGUMENT);
@@ -619,6 +751,7 @@ TEST(raindrop_gl_says_what_is_wrong)
     EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
     EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
     EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, NULL), SAT_ERR_ARGUMENT); /* no rain yet */
+    EXPECT(strcmp(raindrop_gl_message(g), "there was no raindrop_gl_set_rain") == 0);
     EXPECT_EQ(raindrop_gl_advance(g, 1), SAT_ERR_ARGUMENT);
     {
         raindrop_render_options o = raindrop_render_defaults();
@@ -626,6 +759,9 @@ TEST(raindrop_gl_says_what_is_wrong)
         EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
         o.look = RAINDROP_LOOK_MAP; /* without a map */
         EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, &o), SAT_ERR_ARGUMENT);
+        EXPECT(strcmp(raindrop_explain_render(text, sizeof text, 0, 10, 10, NULL, &o), raindrop_gl_message(g)) == 0);
+        EXPECT_EQ(raindrop_gl_render(g, 10, 0, NULL, NULL), SAT_ERR_ARGUMENT);
+        EXPECT(strcmp(raindrop_gl_message(g), "height is 0; 1..32768") == 0);
         raindrop_rain_destroy(rain);
     }
     raindrop_gl_destroy(g);
