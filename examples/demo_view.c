@@ -58,7 +58,8 @@ typedef struct view {
     unsigned texture, framebuffer;
     pipeline p;
     pipeline_options wanted;
-    int help, paused, quit;
+    int help, paused, quit, split; /* split: 0, or the stage that the left of the mouse is without */
+    unsigned char *before;
     const common_settings *common;
 } view;
 
@@ -104,6 +105,45 @@ static int view_shot(view *v, const char *path)
     return ok;
 }
 
+/* ---- before and after: left of the mouse the picture lacks a stage ---- */
+
+enum { VIEW_SPLITS = 5 };
+static const char *const view_splits[VIEW_SPLITS] = {"", "shadows", "occlusion", "rain", "tone"};
+
+static int *view_stage(pipeline_options *o, int split)
+{
+    return split == 1 ? &o->shadows : split == 2 ? &o->occlusion : split == 3 ? &o->rain : &o->tone;
+}
+
+/* The picture without the stage; time stands still for it. */
+static int view_without(view *v)
+{
+    pipeline_options less = v->wanted;
+    size_t bytes = (size_t)less.width * (size_t)less.height * 3;
+    if (!v->split) return 1;
+    if (!v->before) v->before = (unsigned char *)malloc(bytes);
+    if (!v->before) return 1;
+    *view_stage(&less, v->split) = 0;
+    if (!pipeline_change(&v->p, &less) || !pipeline_frame(&v->p, 0)) return 0;
+    memcpy(v->before, v->p.pixels, bytes);
+    return 1;
+}
+
+static void view_part(view *v)
+{
+    int width, height, y, at, w = v->p.options.width;
+    double mouse, mouse_y;
+    if (!v->split || !v->before) return;
+    glfwGetCursorPos(v->window, &mouse, &mouse_y);
+    glfwGetWindowSize(v->window, &width, &height);
+    at = mouse > 0 && mouse < width ? (int)(mouse * w / width) : w / 2;
+    for (y = 0; y < v->p.options.height; ++y) {
+        size_t row = (size_t)y * (size_t)w * 3;
+        memcpy(v->p.pixels + row, v->before + row, (size_t)at * 3);
+        memset(v->p.pixels + row + 3 * at, 255, 3);
+    }
+}
+
 /* ---- keys ---- */
 
 static void view_key(GLFWwindow *window, int key, int scan, int action, int modifiers)
@@ -122,6 +162,7 @@ static void view_key(GLFWwindow *window, int key, int scan, int action, int modi
     case GLFW_KEY_O: o->occlusion = !o->occlusion; break;
     case GLFW_KEY_R: o->rain = !o->rain; break;
     case GLFW_KEY_T: o->tone = !o->tone; break;
+    case GLFW_KEY_B: v->split = (v->split + 1) % VIEW_SPLITS; break;
     case GLFW_KEY_H: o->hour = (scene_hour)((o->hour + 1) % 3); break;
     case GLFW_KEY_M: o->mesopic = (tonemap_mesopic)((o->mesopic + 1) % 3); break;
     case GLFW_KEY_P: o->operation = (tonemap_operator)((o->operation + 1) % 5); break;
@@ -142,6 +183,7 @@ static void view_overlay(view *v, double seconds)
     static const char *const names[] = {"", "", "scene", "shadows", "occlusion", "shade", "rain", "tone"};
     static const char *const keys[] = {"S O R T     shadows, occlusion, rain, tone mapping",
                                        "G H M P     OpenGL, hour, mesopic vision, operator",
+                                       "B           before and after: left of the mouse without a stage",
                                        "left right  turn the light",
                                        "up down     exposure",
                                        "page keys   rain",
@@ -152,7 +194,7 @@ static void view_overlay(view *v, double seconds)
     size_t i;
     int k, n;
     canvas.rgb = v->p.pixels, canvas.width = v->p.options.width, canvas.height = v->p.options.height;
-    for (i = 0; i < (size_t)(v->help ? 110 : 28) * (size_t)canvas.width * 3 &&
+    for (i = 0; i < (size_t)(v->help ? 120 : 28) * (size_t)canvas.width * 3 &&
                 i < (size_t)canvas.height * (size_t)canvas.width * 3;
          ++i)
         canvas.rgb[i] /= 3;
@@ -160,8 +202,9 @@ static void view_overlay(view *v, double seconds)
     for (k = PIPELINE_SCENE; k < PIPELINE_STAGES; ++k)
         n += snprintf(text + n, sizeof text - (size_t)n, " %s %.0f", names[k], 1e3 * v->p.seconds[k]);
     common_text(&canvas, 6, 6, text, 1);
-    snprintf(text, sizeof text, "%.0f mm/h  reach %.2f m  light %+.0f deg  exposure %+.2f  F1 keys", (double)v->wanted.rate,
-             (double)v->wanted.ao_radius, (double)v->wanted.turn, (double)v->wanted.exposure);
+    snprintf(text, sizeof text, "%.0f mm/h  reach %.2f m  light %+.0f deg  exposure %+.2f  F1 keys%s%s",
+             (double)v->wanted.rate, (double)v->wanted.ao_radius, (double)v->wanted.turn, (double)v->wanted.exposure,
+             v->split ? "  left without " : "", view_splits[v->split]);
     common_text(&canvas, 6, 16, text, 1);
     for (i = 0; v->help && i < sizeof keys / sizeof keys[0]; ++i) common_text(&canvas, 6, 32 + 10 * (int)i, keys[i], 1);
 }
@@ -171,8 +214,10 @@ static int view_loop(view *v, int frames, const char *out)
     double last = common_clock(), now, seconds = 0;
     int i, ok = 1;
     for (i = 0; ok && !v->quit && !glfwWindowShouldClose(v->window) && (frames == 0 || i < frames); ++i) {
-        ok = pipeline_change(&v->p, &v->wanted) && pipeline_frame(&v->p, i == 0 || v->paused ? 0 : 1 / 30.0);
+        ok = view_without(v) && pipeline_change(&v->p, &v->wanted) &&
+             pipeline_frame(&v->p, i == 0 || v->paused ? 0 : 1 / 30.0);
         if (!ok) break;
+        view_part(v);
         view_overlay(v, seconds);
         view_show(v);
         if (out && i + 1 == frames) ok = view_shot(v, out);
@@ -210,6 +255,7 @@ int main(int argc, char **argv)
         {"size", 'z', size, 16, 8192, "of the picture"},
         {"hour", 'w', &hour, 0, 0, "dusk|night|noon"},
         {"gl", 'b', &gl, 0, 0, "on OpenGL; key G"},
+        {"split", 'w', &v.split, 0, 0, "off|shadows|occlusion|rain|tone: left of the mouse without it; key B"},
         {"frames", 'i', &frames, 0, 1000000000, "end after so many; 0: go on"},
     };
     common_settings common;
@@ -236,6 +282,7 @@ int main(int argc, char **argv)
     }
     pipeline_destroy(&v.p);
     glfwTerminate();
+    free(v.before);
     image_free(&light);
     mesh_free(&sculpture);
     common_close(&common);
