@@ -127,7 +127,7 @@ static int run(pipeline *p, const gl_context *context, int frames, const common_
 int main(int argc, char **argv)
 {
     const char *env = NULL, *shape = NULL;
-    int hour = 0, operation = 0, mesopic, size[2] = {1280, 720}, frames = 1, gl = 0, mosaic = 0, no_shadows = 0,
+    int hour = 0, operation = TONEMAP_GUIDED, mesopic, size[2] = {1280, 720}, frames = 1, gl = 0, mosaic = 0, no_shadows = 0,
         no_occlusion = 0, no_rain = 0, no_tone = 0, ok;
     pipeline_options o = pipeline_defaults();
     const common_option options[] = {
@@ -139,7 +139,7 @@ int main(int argc, char **argv)
         {"turn", 'f', &o.turn, -36000, 36000, "degrees by which the light is turned"},
         {"ao-radius", 'f', &o.ao_radius, 0, 100, "reach of ambient occlusion in metres"},
         {"shutter", 'f', &o.shutter, 0, 10, "seconds for which the drops move"},
-        {"operator", 'w', &operation, 0, 0, "local|global|ashikhmin|ashikhmin-global|linear"},
+        {"operator", 'w', &operation, 0, 0, "local|global|ashikhmin|ashikhmin-global|linear|guided"},
         {"key", 'f', &o.key, 0, 10, "display value of the log-average; 0: one for the hour"},
         {"exposure", 'f', &o.exposure, -100, 100, "stops more light"},
         {"mesopic", 'w', &mesopic, 0, 0, "off|uniform|local reds fade in dim light"},

@@ -165,7 +165,7 @@ static void view_key(GLFWwindow *window, int key, int scan, int action, int modi
     case GLFW_KEY_B: v->split = (v->split + 1) % VIEW_SPLITS; break;
     case GLFW_KEY_H: o->hour = (scene_hour)((o->hour + 1) % 3); break;
     case GLFW_KEY_M: o->mesopic = (tonemap_mesopic)((o->mesopic + 1) % 3); break;
-    case GLFW_KEY_P: o->operation = (tonemap_operator)((o->operation + 1) % 5); break;
+    case GLFW_KEY_P: o->operation = (tonemap_operator)((o->operation + 1) % 6); break;
     case GLFW_KEY_LEFT: o->turn -= 10; break;
     case GLFW_KEY_RIGHT: o->turn += 10; break;
     case GLFW_KEY_UP: o->exposure += 0.25f; break;

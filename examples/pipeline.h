@@ -51,7 +51,7 @@ typedef struct pipeline_options {
     float rate;                  /* 150 mm/h: a cloudburst */
     float ao_radius;             /* 0.12 m */
     float shutter;               /* 0.0002 s: open so long */
-    tonemap_operator operation;  /* TONEMAP_PHOTOGRAPHIC_LOCAL */
+    tonemap_operator operation;  /* TONEMAP_GUIDED */
     tonemap_mesopic mesopic;     /* TONEMAP_MESOPIC_LOCAL */
     float key;                   /* 0: one that suits the hour */
     float exposure;              /* 0; stops: the key is doubled so many times */
@@ -99,6 +99,7 @@ static inline pipeline_options pipeline_defaults(void)
     o.rate = 150;
     o.ao_radius = 0.12f;
     o.shutter = 0.0002f;
+    o.operation = TONEMAP_GUIDED;
     o.mesopic = TONEMAP_MESOPIC_LOCAL;
     return o;
 }
