@@ -127,8 +127,8 @@ static int run(pipeline *p, const gl_context *context, int frames, const common_
 int main(int argc, char **argv)
 {
     const char *env = NULL, *shape = NULL;
-    int hour = 0, operation = TONEMAP_GUIDED, mesopic, size[2] = {1280, 720}, frames = 1, gl = 0, mosaic = 0, no_shadows = 0,
-        no_occlusion = 0, no_rain = 0, no_tone = 0, ok;
+    int hour = 0, operation = TONEMAP_GUIDED, mesopic, size[2] = {1280, 720}, frames = 1, gl = 0, mosaic = 0,
+        no_shadows = 0, no_occlusion = 0, no_rain = 0, no_tone = 0, ok;
     pipeline_options o = pipeline_defaults();
     const common_option options[] = {
         {"env", 'P', (void *)&env, 0, 0, "equirectangular picture of the light; without it a sky of our own"},
