@@ -128,8 +128,13 @@ typedef enum tonemap_operator {
     TONEMAP_ASHIKHMIN,           /* threshold against intensity, local; Michael 2010, section 4.3 */
     TONEMAP_ASHIKHMIN_GLOBAL,    /* its curve alone */
     TONEMAP_LINEAR,              /* exposure only: eq A.2, clipped */
-    TONEMAP_GUIDED               /* the photographic curve with La from a self-guided filter of log2 luminance: no rings
+    TONEMAP_GUIDED,              /* the photographic curve with La from a self-guided filter of log2 luminance: no rings
                                     round lamps, no seams, nothing flickers */
+    /* curves of one pixel that pictures are graded for; the metered luminance becomes the key before them */
+    TONEMAP_NEUTRAL,             /* Khronos PBR Neutral: colours up to 0.8 stay as they are */
+    TONEMAP_AGX,                 /* Sobotka's AgX as fitted by Wrensch 2023: the brightest fade to white */
+    TONEMAP_ACES,                /* Hill's fit of the ACES reference transforms, exposed by 1 / 0.6 as is usual */
+    TONEMAP_HABLE                /* Hable 2010, filmic */
 } tonemap_operator;
 
 /* Reds fade towards orange in dim light (Slomp 2012, section A.5). */
@@ -146,6 +151,21 @@ typedef enum tonemap_metering {
                                      nothing */
     TONEMAP_METERING_LOG_AVERAGE  /* of every positive luminance, eq A.1 */
 } tonemap_metering;
+
+/* Of red, green and blue, with a white of D65. */
+typedef enum tonemap_primaries {
+    TONEMAP_PRIMARIES_709,
+    TONEMAP_PRIMARIES_P3,
+    TONEMAP_PRIMARIES_2020
+} tonemap_primaries;
+
+/* Of floats, and of what OpenGL draws; bytes are sRGB. */
+typedef enum tonemap_encoding {
+    TONEMAP_ENCODING_AUTO,   /* floats are linear, OpenGL draws sRGB */
+    TONEMAP_ENCODING_LINEAR, /* 1 is white paper; up to peak */
+    TONEMAP_ENCODING_PQ,     /* SMPTE ST 2084: 0 to 1 */
+    TONEMAP_ENCODING_HLG     /* ITU-R BT.2100, for a display of that peak: 0 to 1 */
+} tonemap_encoding;
 
 typedef struct tonemap_options {
     tonemap_operator operation; /* TONEMAP_GUIDED */
@@ -183,6 +203,21 @@ typedef struct tonemap_options {
                                    more */
     double exposure;            /* 0; 0..1e30; 0: metered; else the key is at the luminance key / exposure, at once:
                                    what a camera model gives, as 1 / (1.2 exp2(EV100)) for luminances in cd/m2 */
+    tonemap_primaries primaries; /* TONEMAP_PRIMARIES_709; of the picture */
+    tonemap_primaries display;  /* TONEMAP_PRIMARIES_709; of the output; colours beyond it fade */
+    double balance_red;         /* 1; 0..1000; white balance: factors of the picture's channels */
+    double balance_green;       /* 1; 0..1000; */
+    double balance_blue;        /* 1; 0..1000; */
+    double peak; /* 1; 1..100; the brightest that the display shows, in units of white paper: light beyond
+                    paper is compressed less (photographic and guided; the other curves end at paper);
+                    bytes have 255 there */
+    tonemap_encoding encoding;  /* TONEMAP_ENCODING_AUTO */
+    double white_cd;            /* 203; 1..10000; cd/m2 of white paper, for PQ and HLG (ITU-R BT.2408) */
+    int dither;                 /* 0; 0..1; 1: bytes are rounded up or down in a pattern of 8 x 8 pixels, so that slow
+                                   gradients show no bands */
+    const float
+        *meter_weights; /* NULL, or a factor from 0 to 1 for each of width * height pixels, in steps of 1/15: how
+                           much it counts in metering, key and white; read in every call (OpenGL: in create) */
     sat_allocator allocator;    /* malloc; used by create and destroy only */
     sat_threads threads;        /* serial; same bits for any worker count */
 } tonemap_options;
@@ -262,9 +297,10 @@ TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_
 TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned hdr, double dt);
 TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl);
 /* Other options from the next picture on; the adaptation goes on. Costs nothing: key, white, exposure, the seconds, the
-   limits of adaptation, cd_per_unit and lux_per_cd are uniforms. What the shaders are compiled for is SAT_ERR_ARGUMENT,
-   and nothing changes: another value of any other option, a key or white that is estimated where it was not or the
-   other way round, a white that is infinite where it was not. Allocator and threads are not looked at. */
+   limits of adaptation, units, primaries, white balance and peak are uniforms. What the shaders are compiled for is
+   SAT_ERR_ARGUMENT, and nothing changes: another value of any other option, a key or white that is estimated where it
+   was not or the other way round, a white that is infinite where it was not. Allocator and threads are not looked at.
+ */
 TONEMAP_DEF sat_result tonemap_gl_set_options(tonemap_gl *gl, const tonemap_options *options);
 /* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 TONEMAP_DEF const char *tonemap_gl_message(const tonemap_gl *gl);
@@ -364,7 +400,7 @@ enum {
 TONEMAP_DEF int tonemap_version(void) { return TONEMAP_VERSION; }
 
 static const sat__field tonemap__fields[] = {
-    SAT__FIELD(tonemap_options, 'i', operation, TONEMAP_GUIDED, 0, TONEMAP_GUIDED, ' '),
+    SAT__FIELD(tonemap_options, 'i', operation, TONEMAP_GUIDED, 0, TONEMAP_HABLE, ' '),
     SAT__FIELD(tonemap_options, 'd', key, 0.18, -1e6, 10, ' '),
     SAT__FIELD(tonemap_options, 'd', white, 0, 0, 1e12, 'I'),
     SAT__FIELD(tonemap_options, 'd', phi, 8, -16, 16, ' '),
@@ -385,6 +421,15 @@ static const sat__field tonemap__fields[] = {
     SAT__FIELD(tonemap_options, 'd', adapt_low, 0, 0, 1e30, ' '),
     SAT__FIELD(tonemap_options, 'd', adapt_high, (double)INFINITY, 1e-30, 1e30, 'I'),
     SAT__FIELD(tonemap_options, 'd', exposure, 0, 0, 1e30, ' '),
+    SAT__FIELD(tonemap_options, 'i', primaries, 0, 0, TONEMAP_PRIMARIES_2020, ' '),
+    SAT__FIELD(tonemap_options, 'i', display, 0, 0, TONEMAP_PRIMARIES_2020, ' '),
+    SAT__FIELD(tonemap_options, 'd', balance_red, 1, 0, 1000, ' '),
+    SAT__FIELD(tonemap_options, 'd', balance_green, 1, 0, 1000, ' '),
+    SAT__FIELD(tonemap_options, 'd', balance_blue, 1, 0, 1000, ' '),
+    SAT__FIELD(tonemap_options, 'd', peak, 1, 1, 100, ' '),
+    SAT__FIELD(tonemap_options, 'i', encoding, 0, 0, TONEMAP_ENCODING_HLG, ' '),
+    SAT__FIELD(tonemap_options, 'd', white_cd, 203, 1, 10000, ' '),
+    SAT__FIELD(tonemap_options, 'i', dither, 0, 0, 1, ' '),
     SAT__FIELD(tonemap_options, 'a', allocator, 0, 0, 0, ' '),
     SAT__FIELD(tonemap_options, 't', threads, 0, 0, 0, ' '),
 };
@@ -456,6 +501,8 @@ typedef struct tonemap__worker {
     float *edge;          /* Sobel gradient */
     uint32_t *bins, *histogram; /* memory; the same or NULL when nobody asks */
     int64_t log_sum;      /* of log2 of the positive luminances, in 2^-16 */
+    uint64_t counted;     /* how many they are; with a mask, of its weights */
+    const float *luma, *mask; /* weights of red, green and blue; of the row's pixels, or NULL */
     tonemap_stats stats;
 } tonemap__worker;
 
@@ -470,6 +517,14 @@ enum {
     TONEMAP__HELD = TONEMAP__STATES
 };
 
+/* What options say about colours; see tonemap__prepare_colours. */
+typedef struct tonemap__colours {
+    float luma[3];          /* luminance weights of the picture's red, green and blue */
+    int mixes;              /* those of the display are mixed from them */
+    float mix[9];           /* by this matrix, white balance in it */
+    float red_x[3], red_step[3], display_luma[3]; /* X of the display's channels; channels of a step of X; Y */
+} tonemap__colours;
+
 /* The numbers of one picture that every pixel needs. */
 typedef struct tonemap__frame {
     float scale;            /* scaled luminance = luminance * scale, eq A.2 */
@@ -478,6 +533,7 @@ typedef struct tonemap__frame {
     float inverse_white2;   /* 1 / white^2 */
     float epsilon, term[TONEMAP__LENGTHS]; /* the test of eq A.5 and A.7: |c - v| < epsilon c + term[k] */
     float soft, gamut;
+    float peak;             /* display values are made in units of it */
     float edge2;            /* variance that makes half an edge, in q^2 of the guided filter */
     float lux;              /* illuminance of a scaled luminance of 1 */
     float rho;              /* eq A.11 of the whole picture; 1 where there is nothing to do */
@@ -499,6 +555,8 @@ struct tonemap {
     void *block;
     size_t block_size;
     int width, height, row, ring_row, workers, started;
+    uint64_t counted;       /* pixels that metering looks at, or their weights */
+    tonemap__colours colours;
     unsigned known;         /* bit i: state[i] was measured, not only set */
     tonemap__meter *meter;
     double held[2];         /* what percentile metering said, and the estimated white, until they move by more than a
@@ -510,6 +568,7 @@ struct tonemap {
     double state[TONEMAP__STATES];
     tonemap__frame frame;
     tonemap_stats stats;
+    uint16_t *fine;         /* codes in 256ths, for dithering */
     unsigned char code[TONEMAP__CODES];
 };
 
@@ -594,16 +653,23 @@ static inline float tonemap__sane_luminance(float y, tonemap_stats *stats)
     return y < TONEMAP__DARKEST ? 0 : y > TONEMAP__BRIGHTEST ? TONEMAP__BRIGHTEST : y;
 }
 
+/* What a pixel of a mask counts: 0 to 15. */
+static inline uint32_t tonemap__mask_weight(float v)
+{
+    return v > 0 ? v < 1 ? (uint32_t)(int32_t)(v * 15 + 0.5f) : 15 : 0;
+}
+
 /* Pixels [x, end) of a row. lane[x % 4] sums the luminances, so that four pixels at a time give the same sum. */
 static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, float *lane, const float *pixels,
                                           int channels, int x, int end)
 {
     int64_t log_sum = 0;
+    uint64_t counted = 0;
     size_t positive = 0;
     for (; x < end; x++) {
         const float *p = pixels + (size_t)x * (size_t)channels;
-        float y = channels == 1 ? p[0] : sat__luminance(p[0], p[1], p[2]), t;
-        uint32_t bits;
+        float y = channels == 1 ? p[0] : w->luma[0] * p[0] + w->luma[1] * p[1] + w->luma[2] * p[2], t;
+        uint32_t bits, weight = w->mask ? tonemap__mask_weight(w->mask[x]) : 1;
         if (!(y >= TONEMAP__DARKEST && y <= TONEMAP__BRIGHTEST)) {
             int finite = sat__is_finite(y);
             y = tonemap__sane_luminance(y, &w->stats);
@@ -616,11 +682,14 @@ static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, 
         lane[x & 3] += y;
         bits = sat__float_bits(y);
         t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
-        log_sum += ((int32_t)(bits >> 23) - 127) * 65536 + (int32_t)(tonemap__log2_octave(t) * 65536 + 0.5f);
+        log_sum += (int64_t)weight * (((int32_t)(bits >> 23) - 127) * 65536 +
+                                      (int32_t)(tonemap__log2_octave(t) * 65536 + 0.5f));
         positive++;
-        if (w->histogram) w->histogram[(bits - TONEMAP__DARKEST_BITS) >> 19]++;
+        counted += weight;
+        if (w->histogram) w->histogram[(bits - TONEMAP__DARKEST_BITS) >> 19] += weight;
     }
     w->log_sum += log_sum;
+    w->counted += counted;
     w->stats.positive += positive;
 }
 
@@ -634,11 +703,11 @@ static inline sat__f32x4 tonemap__load_pixels(const float *p, int channels, sat_
     return alpha;
 }
 
-static inline sat__f32x4 tonemap__luminance4(int channels, sat__f32x4 r, sat__f32x4 g, sat__f32x4 b)
+static inline sat__f32x4 tonemap__luminance4(const float *luma, int channels, sat__f32x4 r, sat__f32x4 g, sat__f32x4 b)
 {
     sat__f32x4 y =
-        sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(0.2126729f), r), sat__f32x4_mul(sat__f32x4_set1(0.7151522f), g));
-    return channels == 1 ? r : sat__f32x4_add(y, sat__f32x4_mul(sat__f32x4_set1(0.0721750f), b));
+        sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(luma[0]), r), sat__f32x4_mul(sat__f32x4_set1(luma[1]), g));
+    return channels == 1 ? r : sat__f32x4_add(y, sat__f32x4_mul(sat__f32x4_set1(luma[2]), b));
 }
 
 static inline void tonemap__count4(uint32_t *histogram, sat__i32x4 bits)
@@ -663,7 +732,7 @@ static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, 
         sat__f32x4 r, g, b, y;
         sat__i32x4 bits;
         tonemap__load_pixels(pixels + (size_t)x * (size_t)channels, channels, &r, &g, &b);
-        y = tonemap__luminance4(channels, r, g, b);
+        y = tonemap__luminance4(w->luma, channels, r, g, b);
         if (!sat__i32x4_all(sat__i32x4_and(sat__f32x4_less_equal(low, y), sat__f32x4_less_equal(y, high)))) {
             sat__f32x4_store(lane, sum);
             tonemap__measure_plain(w, luminance, lane, pixels, channels, x, x + 4);
@@ -684,6 +753,7 @@ static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, 
     sat__i32x4_store(f, fractions);
     for (i = 0; i < 4; i++) w->log_sum += ((int64_t)e[i] - 127 * (int64_t)groups) * 65536 + f[i];
     w->stats.positive += 4 * (size_t)groups;
+    w->counted += 4 * (uint64_t)groups;
     return x;
 }
 #endif
@@ -696,7 +766,7 @@ static inline float tonemap__measure_row(tonemap__worker *w, float *luminance, c
     while (x < width) {
         end = width - x > 65536 ? x + 65536 : width;
 #ifdef SAT__VECTOR
-        x = tonemap__measure_vector(w, luminance, lane, pixels, channels, x, end);
+        if (!w->mask) x = tonemap__measure_vector(w, luminance, lane, pixels, channels, x, end);
 #endif
         tonemap__measure_plain(w, luminance, lane, pixels, channels, x, end);
         x = end;
@@ -734,6 +804,8 @@ static void tonemap__measure_bands(int begin, int end, int worker, void *context
         float *luminance = map->luminance + (size_t)y * (size_t)map->row;
         const float *pixels = tonemap__float_row(w->pixels, job->hdr, y);
         size_t unusable = w->stats.nan + w->stats.negative;
+        const float *mask = map->options.meter_weights;
+        w->mask = mask ? mask + (size_t)y * (size_t)map->width : NULL;
         map->row_sum[y] = tonemap__measure_row(w, luminance, pixels, job->hdr->channels, map->width);
         map->row_unusable[y] = (unsigned char)(w->stats.nan + w->stats.negative > unusable);
         for (x = map->width; x < map->row; x++) luminance[x] = luminance[map->width - 1];
@@ -866,10 +938,12 @@ static inline void tonemap__collect(tonemap *map, int64_t *log_sum)
     int i, y;
     tonemap_stats *total = &map->stats;
     *log_sum = 0;
+    map->counted = 0;
     for (i = 0; i < map->workers; i++) {
         const tonemap__worker *w = &map->worker[i];
         *log_sum += w->log_sum;
         total->positive += w->stats.positive;
+        map->counted += w->counted;
         total->nan += w->stats.nan;
         total->infinite += w->stats.infinite;
         total->negative += w->stats.negative;
@@ -899,24 +973,24 @@ static inline int tonemap__measured_state(tonemap *map, double *state)
     int64_t log_sum;
     tonemap__meter *m = map->meter;
     tonemap__collect(map, &log_sum);
-    if (!map->stats.positive) return 0;
-    average = tonemap__log_average(log_sum, map->stats.positive);
+    if (!map->counted) return 0;
+    average = tonemap__log_average(log_sum, (size_t)map->counted);
     if (histogram) {
-        tonemap__open_meter(m, histogram, map->stats.positive);
-        low = tonemap__quantile(histogram, map->stats.positive, 0.01);
-        high = tonemap__quantile(histogram, map->stats.positive, 0.99);
+        tonemap__open_meter(m, histogram, (size_t)map->counted);
+        low = tonemap__quantile(histogram, (size_t)map->counted, 0.01);
+        high = tonemap__quantile(histogram, (size_t)map->counted, 0.99);
     }
     map->stats.log_average = exp2(average);
     if (o->metering == TONEMAP_METERING_PERCENTILES) {
-        if (map->started && map->stats.positive * 1000 < (size_t)map->width * (size_t)map->height)
+        if (map->started && map->counted * 1000 < (uint64_t)map->width * (uint64_t)map->height)
             return 0; /* as good as black */
         average = tonemap__hold(map, &map->held[0], 1u << TONEMAP__HELD, tonemap__metered(m, average, o), 64);
     }
     state[TONEMAP__AVERAGE] = average = tonemap__limited(average, o);
     state[TONEMAP__KEY] = o->key > 0 ? log2(o->key) : tonemap__estimated_key(average, low, high);
     state[TONEMAP__WHITE] = o->white > 0 ? 0 : tonemap__measured_white(map, m, state, low, high);
-    state[TONEMAP__LOW] = ashikhmin ? tonemap__quantile(histogram, map->stats.positive, 0.0005) : 0;
-    state[TONEMAP__HIGH] = ashikhmin ? tonemap__quantile(histogram, map->stats.positive, 0.9995) : 0;
+    state[TONEMAP__LOW] = ashikhmin ? tonemap__quantile(histogram, (size_t)map->counted, 0.0005) : 0;
+    state[TONEMAP__HIGH] = ashikhmin ? tonemap__quantile(histogram, (size_t)map->counted, 0.9995) : 0;
     map->stats.low = exp2(low);
     map->stats.high = exp2(high);
     return 1;
@@ -981,6 +1055,65 @@ static inline float tonemap__rho(float lux)
     return 1 + (u - 1) * q;
 }
 
+static inline void tonemap__invert(double *out, const double *m)
+{
+    double determinant = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+                         m[2] * (m[3] * m[7] - m[4] * m[6]);
+    int i, k;
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 3; k++) {
+            int a = (i + 1) % 3, b = (i + 2) % 3, c = (k + 1) % 3, d = (k + 2) % 3;
+            out[3 * k + i] = (m[3 * a + c] * m[3 * b + d] - m[3 * a + d] * m[3 * b + c]) / determinant;
+        }
+}
+
+/* ---- colours: from the picture's primaries to the display's */
+
+/* Rows X, Y, Z of red, green and blue whose sum is D65. */
+static inline void tonemap__to_xyz(double *m, tonemap_primaries primaries)
+{
+    static const double xy[3][6] = {{0.64, 0.33, 0.30, 0.60, 0.15, 0.06},
+                                    {0.68, 0.32, 0.265, 0.69, 0.15, 0.06},
+                                    {0.708, 0.292, 0.170, 0.797, 0.131, 0.046}};
+    static const double white[3] = {0.3127 / 0.3290, 1, 0.3583 / 0.3290};
+    const double *p = xy[primaries];
+    double inverse[9];
+    int i, c;
+    for (c = 0; c < 3; c++) {
+        m[c] = p[2 * c] / p[2 * c + 1];
+        m[3 + c] = 1;
+        m[6 + c] = (1 - p[2 * c] - p[2 * c + 1]) / p[2 * c + 1];
+    }
+    tonemap__invert(inverse, m);
+    for (c = 0; c < 3; c++) {
+        double y = inverse[3 * c] * white[0] + inverse[3 * c + 1] * white[1] + inverse[3 * c + 2] * white[2];
+        for (i = 0; i < 3; i++) m[3 * i + c] *= y;
+    }
+}
+
+static inline void tonemap__prepare_colours(tonemap__colours *colours, const tonemap_options *o)
+{
+    static const double rec709[3] = {0.2126729, 0.7151522, 0.0721750}; /* what the other headers take */
+    const double balance[3] = {o->balance_red, o->balance_green, o->balance_blue};
+    double from[9], to[9], inverse[9];
+    int i, c;
+    tonemap__to_xyz(from, o->primaries);
+    tonemap__to_xyz(to, o->display);
+    tonemap__invert(inverse, to);
+    colours->mixes = o->primaries != o->display;
+    for (c = 0; c < 3; c++) {
+        for (i = 0; i < 3; i++)
+            colours->mix[3 * i + c] = (float)((inverse[3 * i] * from[c] + inverse[3 * i + 1] * from[3 + c] +
+                                               inverse[3 * i + 2] * from[6 + c]) *
+                                              balance[c]);
+        colours->luma[c] = (float)((o->primaries == TONEMAP_PRIMARIES_709 ? rec709[c] : from[3 + c]) * balance[c]);
+        if (balance[c] < 1 || balance[c] > 1) colours->mixes = 1;
+        colours->red_x[c] = (float)to[c];
+        colours->red_step[c] = (float)inverse[3 * c];
+        colours->display_luma[c] = (float)to[3 + c];
+    }
+}
+
 static inline void tonemap__frame_boxes(tonemap__frame *f, const tonemap_options *o, double key)
 {
     static const int length[TONEMAP__LENGTHS] = {1, 3, 5, 7, 11, 17, 27, 41};
@@ -1017,13 +1150,14 @@ static inline void tonemap__prepare_frame(tonemap *map)
     f->scale = (float)(o->exposure > 0 ? o->exposure : key * exp2(-average));
     f->cap = TONEMAP__LOCAL_CAP;
     f->quantum = TONEMAP__QUANTUM;
-    f->inverse_white2 = !TONEMAP__HAS_WHITE || tonemap__is_infinite(white) ? 0 : (float)(1 / (white * white));
+    f->inverse_white2 = !TONEMAP__HAS_WHITE || tonemap__is_infinite(white) ? 0 : (float)(o->peak / (white * white));
     f->epsilon = (float)o->epsilon;
     f->soft = (float)o->soft;
+    f->peak = (float)o->peak;
     f->edge2 = (float)(o->edge * o->edge) * (TONEMAP__STEPS * TONEMAP__STEPS);
     f->gamut = o->gamut < 0 ? -1 : (float)o->gamut;
+    f->curve_factor = o->operation == TONEMAP_LINEAR ? (float)(1 / o->peak) : 1;
     if (o->operation == TONEMAP_LINEAR && !tonemap__is_infinite(white)) f->curve_factor = (float)(1 / white);
-    else f->curve_factor = 1;
     if (tonemap__is_ashikhmin(o)) {
         double low = map->state[TONEMAP__LOW], high = map->state[TONEMAP__HIGH];
         f->scale = (float)exp2(-ceil(high)); /* whole octaves: a firefly does not round every pixel anew */
@@ -1871,17 +2005,16 @@ static inline float tonemap__root(float q)
     return v * (0.331779718f + v * (-0.0999134065f + v * (0.0339404425f + v * -0.00595350893f)));
 }
 
-static inline void tonemap__shift_red_plain(float *r, float *g, float *b, float luminance, float rho)
+static inline void tonemap__shift_red_plain(float *v, float luminance, float rho, const tonemap__colours *f)
 {
-    float x = 0.4124564f * *r + 0.3575761f * *g + 0.1804375f * *b, y = 0.95047f * luminance, q, c, dx;
+    float x = f->red_x[0] * v[0] + f->red_x[1] * v[1] + f->red_x[2] * v[2], y = 0.95047f * luminance, q, c, dx;
+    int i;
     if (!(x > y && rho < 1)) return;
     q = x / y;
     q = q < 1048576 ? q : 1048576;
     c = 1 + rho * tonemap__root(q);
     dx = c * c * c * y - q * y;
-    *r += 3.2404542f * dx;
-    *g += -0.9692660f * dx;
-    *b += 0.0556434f * dx;
+    for (i = 0; i < 3; i++) v[i] += f->red_step[i] * dx;
 }
 
 static inline void tonemap__rho_row(float *rho, const float *local, float lux, int end)
@@ -1939,14 +2072,14 @@ static inline sat__f32x4 tonemap__root4(sat__f32x4 q)
                : p;
 }
 
-static inline void tonemap__shift_red4(sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 luminance,
-                                       sat__f32x4 rho)
+static inline void tonemap__shift_red4(sat__f32x4 *v, sat__f32x4 luminance, sat__f32x4 rho, const tonemap__colours *f)
 {
-    sat__f32x4 one = sat__f32x4_set1(1), x = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(0.4124564f), *r),
-                                                            sat__f32x4_mul(sat__f32x4_set1(0.3575761f), *g));
+    sat__f32x4 one = sat__f32x4_set1(1), x = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(f->red_x[0]), v[0]),
+                                                            sat__f32x4_mul(sat__f32x4_set1(f->red_x[1]), v[1]));
     sat__f32x4 y = sat__f32x4_mul(sat__f32x4_set1(0.95047f), luminance), q, c, dx;
     sat__i32x4 red;
-    x = sat__f32x4_add(x, sat__f32x4_mul(sat__f32x4_set1(0.1804375f), *b));
+    int i;
+    x = sat__f32x4_add(x, sat__f32x4_mul(sat__f32x4_set1(f->red_x[2]), v[2]));
     red = sat__i32x4_and(sat__f32x4_less(y, x), sat__f32x4_less(rho, one));
     if (!sat__i32x4_any(red)) return;
     q = sat__f32x4_div(x, y);
@@ -1954,15 +2087,14 @@ static inline void tonemap__shift_red4(sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 
     c = sat__f32x4_add(one, sat__f32x4_mul(rho, tonemap__root4(q)));
     dx = sat__f32x4_sub(sat__f32x4_mul(sat__f32x4_mul(sat__f32x4_mul(c, c), c), y), sat__f32x4_mul(q, y));
     dx = sat__f32x4_from_bits(sat__i32x4_and(red, sat__f32x4_bits(dx)));
-    *r = sat__f32x4_add(*r, sat__f32x4_mul(sat__f32x4_set1(3.2404542f), dx));
-    *g = sat__f32x4_add(*g, sat__f32x4_mul(sat__f32x4_set1(-0.9692660f), dx));
-    *b = sat__f32x4_add(*b, sat__f32x4_mul(sat__f32x4_set1(0.0556434f), dx));
+    for (i = 0; i < 3; i++) v[i] = sat__f32x4_add(v[i], sat__f32x4_mul(sat__f32x4_set1(f->red_step[i]), dx));
 }
 #endif
 
 /* ---- the factor from input to display, Ld / L: multiplying R, G and B by it is what replacing Y in Yxy does */
 
-/* Eq A.3 and A.4 with burn-out: Ld = Lr (1 + Lr / white^2) / (1 + La), and Lr = scale L. Where Lr is beyond the cap of
+/* Eq A.3 and A.4 with burn-out: Ld = Lr (1 + Lr peak / white^2) / (1 + La / peak), and Lr = scale L; the thesis has a
+   peak of 1; white is then the peak. Where Lr is beyond the cap of
    the sums, La grows with it, so that the brightest places keep their colour as with the global operator. */
 static inline void tonemap__gain_photographic(float *gain, const float *local, const float *luminance,
                                               const tonemap__frame *f, int end)
@@ -1972,13 +2104,13 @@ static inline void tonemap__gain_photographic(float *gain, const float *local, c
 #ifdef SAT__VECTOR
     sat__f32x4 one = sat__f32x4_set1(1), zero = sat__f32x4_set1(0), scale = sat__f32x4_set1(f->scale),
                burn = sat__f32x4_set1(f->inverse_white2);
-    sat__f32x4 inverse_cap = sat__f32x4_set1(f->inverse_cap);
+    sat__f32x4 inverse_cap = sat__f32x4_set1(f->inverse_cap), peak = sat__f32x4_set1(f->peak);
     for (; x + 4 <= end; x += 4) {
         sat__f32x4 y = sat__f32x4_load(luminance + x),
                    lr = sat__f32x4_min(sat__f32x4_mul(y, scale), sat__f32x4_set1(most));
         sat__f32x4 v = sat__f32x4_mul(scale, sat__f32x4_add(one, sat__f32x4_mul(lr, burn)));
         lr = sat__f32x4_max(sat__f32x4_mul(lr, inverse_cap), one);
-        v = sat__f32x4_div(v, sat__f32x4_add(one, sat__f32x4_mul(sat__f32x4_load(local + x), lr)));
+        v = sat__f32x4_div(v, sat__f32x4_add(peak, sat__f32x4_mul(sat__f32x4_load(local + x), lr)));
         sat__f32x4_store(gain + x, sat__f32x4_select(sat__f32x4_less(zero, y), v, zero));
     }
 #endif
@@ -1986,7 +2118,7 @@ static inline void tonemap__gain_photographic(float *gain, const float *local, c
         float lr = luminance[x] * f->scale, beyond;
         lr = lr < most ? lr : most;
         beyond = lr * f->inverse_cap > 1 ? lr * f->inverse_cap : 1;
-        gain[x] = luminance[x] > 0 ? f->scale * (1 + lr * f->inverse_white2) / (1 + local[x] * beyond) : 0;
+        gain[x] = luminance[x] > 0 ? f->scale * (1 + lr * f->inverse_white2) / (f->peak + local[x] * beyond) : 0;
     }
 }
 
@@ -2040,7 +2172,7 @@ static inline void tonemap__gain_row(tonemap *map, tonemap__worker *w, int y)
     int x;
     if (tonemap__is_ashikhmin(&map->options)) {
         tonemap__gain_ashikhmin(w->local, w->local, luminance, f, (float)map->stats.key, map->width);
-    } else if (map->options.operation == TONEMAP_LINEAR) {
+    } else if (map->options.operation == TONEMAP_LINEAR || map->options.operation > TONEMAP_GUIDED) {
         for (x = 0; x < map->width; x++) w->local[x] = luminance[x] > 0 ? f->scale * f->curve_factor : 0;
     } else {
         tonemap__gain_photographic(w->local, w->local, luminance, f, map->width);
@@ -2096,10 +2228,24 @@ static inline void tonemap__gamut4(sat__f32x4 *v, sat__f32x4 top, sat__f32x4 gre
 /* What the pixels of a row become their display values by. rho is NULL where nothing is mesopic. */
 typedef struct tonemap__shading {
     const float *pixels, *luminance, *gain, *rho;
+    const tonemap__colours *colours;
     int channels;
-    float floor, gamut;
+    float floor, most, gamut;
     size_t clamped;
 } tonemap__shading;
+
+/* To the display's primaries. A colour beyond them has a negative component: it fades until it has none. */
+static inline void tonemap__mix_plain(float *v, float luminance, const float *mix)
+{
+    float out[3], lowest = 0, share;
+    int c;
+    for (c = 0; c < 3; c++) {
+        out[c] = mix[3 * c] * v[0] + mix[3 * c + 1] * v[1] + mix[3 * c + 2] * v[2];
+        lowest = out[c] < lowest ? out[c] : lowest;
+    }
+    share = luminance / (luminance - lowest);
+    for (c = 0; c < 3; c++) v[c] = lowest < 0 ? luminance + (out[c] - luminance) * share : out[c];
+}
 
 /* Pixels [x, x + n) times their gain, clipped to [floor, 1]. Comparisons are written so that NaN becomes the floor: it
    comes from pixels that are black. */
@@ -2112,8 +2258,9 @@ static inline void tonemap__shade_plain(tonemap__planes out, tonemap__shading *s
         v[0] = p[0];
         v[1] = p[s->channels > 1 ? 1 : 0];
         v[2] = p[s->channels > 1 ? 2 : 0];
+        if (s->colours->mixes && s->channels > 1) tonemap__mix_plain(v, s->luminance[x + i], s->colours->mix);
         if (TONEMAP__HAS_MESOPIC && s->rho)
-            tonemap__shift_red_plain(v, v + 1, v + 2, s->luminance[x + i], s->rho[x + i]);
+            tonemap__shift_red_plain(v, s->luminance[x + i], s->rho[x + i], s->colours);
         for (c = 0; c < 3; c++) {
             float d = v[c] * gain;
             v[c] = d > s->floor ? d : s->floor;
@@ -2121,14 +2268,32 @@ static inline void tonemap__shade_plain(tonemap__planes out, tonemap__shading *s
         }
         s->clamped += (size_t)(top > 1);
         if (top > 1 && s->gamut >= 0) tonemap__gamut_plain(v, top, s->luminance[x + i] * gain, s->gamut, s->floor);
-        for (c = 0; c < 3; c++) out[c][i] = v[c] < 1 ? v[c] : 1;
+        for (c = 0; c < 3; c++) out[c][i] = v[c] < s->most ? v[c] : s->most;
     }
 }
 
 #ifdef SAT__VECTOR
+static inline void tonemap__mix4(sat__f32x4 *v, sat__f32x4 luminance, const float *mix)
+{
+    sat__f32x4 out[3], zero = sat__f32x4_set1(0), lowest = zero, share;
+    sat__i32x4 beyond;
+    int c;
+    for (c = 0; c < 3; c++) {
+        out[c] = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(mix[3 * c]), v[0]),
+                                sat__f32x4_mul(sat__f32x4_set1(mix[3 * c + 1]), v[1]));
+        out[c] = sat__f32x4_add(out[c], sat__f32x4_mul(sat__f32x4_set1(mix[3 * c + 2]), v[2]));
+        lowest = sat__f32x4_min(out[c], lowest);
+    }
+    beyond = sat__f32x4_less(lowest, zero);
+    share = sat__f32x4_div(luminance, sat__f32x4_sub(luminance, lowest));
+    for (c = 0; c < 3; c++)
+        v[c] = sat__f32x4_select(
+            beyond, sat__f32x4_add(luminance, sat__f32x4_mul(sat__f32x4_sub(out[c], luminance), share)), out[c]);
+}
+
 static inline int tonemap__shade_vector(tonemap__planes out, tonemap__shading *s, int x, int n)
 {
-    sat__f32x4 one = sat__f32x4_set1(1), least = sat__f32x4_set1(s->floor);
+    sat__f32x4 one = sat__f32x4_set1(1), least = sat__f32x4_set1(s->floor), most = sat__f32x4_set1(s->most);
     sat__i32x4 over = sat__i32x4_set1(0);
     int32_t count[4];
     int i, c;
@@ -2137,21 +2302,148 @@ static inline int tonemap__shade_vector(tonemap__planes out, tonemap__shading *s
                               luminance = sat__f32x4_load(s->luminance + x + i);
         sat__i32x4 beyond;
         tonemap__load_pixels(s->pixels + (size_t)(x + i) * (size_t)s->channels, s->channels, v, v + 1, v + 2);
+        if (s->colours->mixes && s->channels > 1) tonemap__mix4(v, luminance, s->colours->mix);
         if (TONEMAP__HAS_MESOPIC && s->rho)
-            tonemap__shift_red4(v, v + 1, v + 2, luminance, sat__f32x4_load(s->rho + x + i));
+            tonemap__shift_red4(v, luminance, sat__f32x4_load(s->rho + x + i), s->colours);
         for (c = 0; c < 3; c++) v[c] = sat__f32x4_max(sat__f32x4_mul(v[c], gain), least);
         top = sat__f32x4_max(sat__f32x4_max(v[0], v[1]), v[2]);
         beyond = sat__f32x4_less(one, top);
         over = sat__i32x4_sub(over, beyond);
         if (s->gamut >= 0 && sat__i32x4_any(beyond))
             tonemap__gamut4(v, top, sat__f32x4_mul(luminance, gain), s->gamut, least);
-        for (c = 0; c < 3; c++) sat__f32x4_store(out[c] + i, sat__f32x4_min(v[c], one));
+        for (c = 0; c < 3; c++) sat__f32x4_store(out[c] + i, sat__f32x4_min(v[c], most));
     }
     sat__i32x4_store(count, over);
     s->clamped += (size_t)(count[0] + count[1] + count[2] + count[3]);
     return i;
 }
 #endif
+
+/* ---- curves of one pixel, as published, for red, green and blue in which the metered luminance is the key */
+
+static inline void tonemap__matrix(float *v, const float *m)
+{
+    float a = m[0] * v[0] + m[1] * v[1] + m[2] * v[2], b = m[3] * v[0] + m[4] * v[1] + m[5] * v[2];
+    v[2] = m[6] * v[0] + m[7] * v[1] + m[8] * v[2];
+    v[0] = a;
+    v[1] = b;
+}
+
+/* Khronos 2024, "PBR Neutral tone mapper": a toe that takes off the reflection of 4 %, colours as they are up to 0.76,
+   then the largest component is compressed and the colour fades. */
+static inline void tonemap__neutral(float *v)
+{
+    const float start = 0.76f, room = 0.24f;
+    float x = v[0] < v[1] ? v[0] : v[1], offset, peak, top, fade;
+    int c;
+    x = x < v[2] ? x : v[2];
+    offset = x < 0.08f ? x - 6.25f * x * x : 0.04f;
+    for (c = 0; c < 3; c++) v[c] -= offset;
+    peak = v[0] > v[1] ? v[0] : v[1];
+    peak = peak > v[2] ? peak : v[2];
+    if (peak < start) return;
+    top = 1 - room * room / (peak + room - start);
+    fade = 1 / (0.15f * (peak - top) + 1);
+    for (c = 0; c < 3; c++) v[c] = top + (v[c] * (top / peak) - top) * fade;
+}
+
+/* Sobotka's AgX in Wrensch's fit (iolite-engine.com/blog_posts/minimal_agx_implementation), its display values
+   decoded with 2.2. */
+static inline void tonemap__agx(float *v)
+{
+    static const float in[9] = {0.842479062f, 0.0784336f, 0.0792237451f, 0.0423282422f, 0.878468636f,
+                                0.0791661275f, 0.0423756549f, 0.0784336f, 0.879142974f};
+    static const float out[9] = {1.196879005f, -0.0980208811f, -0.0990297441f, -0.0528968518f, 1.15190313f,
+                                 -0.0989611768f, -0.0529716355f, -0.0980434501f, 1.151073673f};
+    int c;
+    tonemap__matrix(v, in);
+    for (c = 0; c < 3; c++) {
+        float x = (tonemap__log2(v[c] > 1e-9f ? v[c] : 1e-9f) + 12.47393f) * (1 / 16.5f), x2, x4;
+        x = x < 0 ? 0 : x > 1 ? 1 : x;
+        x2 = x * x;
+        x4 = x2 * x2;
+        v[c] =
+            15.5f * x4 * x2 - 40.14f * x4 * x + 31.96f * x4 - 6.868f * x2 * x + 0.4298f * x2 + 0.1191f * x - 0.00232f;
+    }
+    tonemap__matrix(v, out);
+    for (c = 0; c < 3; c++) v[c] = v[c] > 1e-9f ? tonemap__exp2(2.2f * tonemap__log2(v[c])) : 0;
+}
+
+/* Stephen Hill's fit of the ACES reference rendering and sRGB output transforms (BakingLab, ACES.hlsl). */
+static inline void tonemap__aces(float *v)
+{
+    static const float in[9] = {0.59719f, 0.35458f, 0.04823f, 0.07600f, 0.90834f,
+                                0.01566f, 0.02840f, 0.13383f, 0.83777f};
+    static const float out[9] = {1.60475f,  -0.53108f, -0.07367f, -0.10208f, 1.10813f,
+                                 -0.00605f, -0.00327f, -0.07276f, 1.07602f};
+    int c;
+    tonemap__matrix(v, in);
+    for (c = 0; c < 3; c++) {
+        float x = v[c] * (1 / 0.6f);
+        v[c] = (x * (x + 0.0245786f) - 0.000090537f) / (x * (0.983729f * x + 0.4329510f) + 0.238081f);
+    }
+    tonemap__matrix(v, out);
+}
+
+/* Hable 2010, "Uncharted 2: HDR lighting": A .15 B .5 C .1 D .2 E .02 F .3, exposure 2, white 11.2. */
+static inline float tonemap__hable(float x)
+{
+    return (x * (0.15f * x + 0.05f) + 0.004f) / (x * (0.15f * x + 0.5f) + 0.06f) - 1 / 15.0f;
+}
+
+static inline void tonemap__curve_planes(tonemap__planes p, tonemap_operator curve, float floor, float scale, int n)
+{
+    int i, c;
+    for (i = 0; i < n; i++) {
+        float v[3];
+        for (c = 0; c < 3; c++) v[c] = p[c][i];
+        if (curve == TONEMAP_NEUTRAL) tonemap__neutral(v);
+        else if (curve == TONEMAP_AGX) tonemap__agx(v);
+        else if (curve == TONEMAP_ACES) tonemap__aces(v);
+        else
+            for (c = 0; c < 3; c++) v[c] = tonemap__hable(2 * v[c]) * (1 / 0.725129270f);
+        for (c = 0; c < 3; c++) {
+            v[c] = (v[c] < 1 ? v[c] : 1) * scale;
+            p[c][i] = v[c] > floor ? v[c] : floor;
+        }
+    }
+}
+
+/* ---- encodings of floats, from values in units of the display's peak */
+
+/* SMPTE ST 2084; cd: cd/m2. Within 3e-4: a third of a code of 10 bits. */
+static inline float tonemap__pq(float cd)
+{
+    float y = cd > 1e-7f ? tonemap__exp2(0.1593017578125f * tonemap__log2(cd * 1e-4f)) : 0;
+    y = (0.8359375f + 18.8515625f * y) / (1 + 18.6875f * y);
+    return cd > 1e-7f ? tonemap__exp2(78.84375f * tonemap__log2(y)) : 0;
+}
+
+/* ITU-R BT.2100: the light of the scene. */
+static inline float tonemap__hlg(float scene)
+{
+    float v = scene < 1 ? scene : 1;
+    if (v <= 1 / 12.0f) return sqrtf(3 * v);
+    return 0.17883277f * 0.693147181f * tonemap__log2(12 * v - 0.28466892f) + 0.55991073f;
+}
+
+static inline void tonemap__encode_planes(tonemap__planes v, const tonemap *map, int n)
+{
+    const float *luma = map->colours.display_luma;
+    float peak_cd = (float)(map->options.peak * map->options.white_cd),
+          power = (float)(1.2 + 0.42 * log10(map->options.peak * map->options.white_cd / 1000));
+    int i, c;
+    power = 1 / power - 1;
+    for (i = 0; i < n; i++) {
+        float y = luma[0] * v[0][i] + luma[1] * v[1][i] + luma[2] * v[2][i], factor;
+        if (map->options.encoding == TONEMAP_ENCODING_PQ) {
+            for (c = 0; c < 3; c++) v[c][i] = tonemap__pq(v[c][i] * peak_cd);
+            continue;
+        }
+        factor = y > 1e-9f ? tonemap__exp2(power * tonemap__log2(y)) : 0;
+        for (c = 0; c < 3; c++) v[c][i] = tonemap__hlg(v[c][i] * factor);
+    }
+}
 
 /* sRGB codes by a table over the float's exponent and 9 bits of its mantissa, from 2^-13 (code 0) to 1: at most one
    code from the rounded value, and that only within 0.1 of a step. */
@@ -2173,6 +2465,24 @@ static inline void tonemap__fill_codes(unsigned char *code)
     code[0] = 0;
 }
 
+/* 256 times the code where each entry begins, for dithering. */
+static inline void tonemap__fill_fine(uint16_t *fine)
+{
+    uint32_t i;
+    for (i = 0; i <= TONEMAP__CODES; i++) {
+        float v = sat__float_from_bits((i + TONEMAP__CODE_BASE) << TONEMAP__CODE_SHIFT);
+        fine[i] = (uint16_t)(65280 * sat__srgb_encode(v < 1 ? v : 1) + 0.5f);
+    }
+    fine[0] = 0;
+}
+
+/* Bayer's pattern, in 256ths of a code: the bits of x ^ y and y in turns, lowest first. */
+static inline uint32_t tonemap__threshold(int x, int y)
+{
+    int d = x ^ y;
+    return (uint32_t)((d & 1) << 7 | (y & 1) << 6 | (d & 2) << 4 | (y & 2) << 3 | (d & 4) << 1 | (y & 4)) + 2;
+}
+
 static inline void tonemap__write_u8(const tonemap *map, unsigned char *out, int channels, tonemap__planes v, int n)
 {
     int i;
@@ -2187,9 +2497,29 @@ static inline void tonemap__write_u8(const tonemap *map, unsigned char *out, int
     }
 }
 
-static inline void tonemap__write_f32(float *out, int channels, tonemap__planes v, int n)
+/* Ordered dithering: code + a threshold that is another 64th at each of 8 x 8 pixels, rounded down. The mean over such
+   a block is that of the codes. */
+static inline void tonemap__write_dithered(const tonemap *map, unsigned char *out, int channels, tonemap__planes v,
+                                           int x, int y, int n)
 {
     int i, c, colours = channels == 1 ? 1 : 3;
+    for (i = 0; i < n; i++, out += channels)
+        for (c = 0; c < colours; c++) {
+            uint32_t bits = sat__float_bits(v[c][i]), at = (bits >> TONEMAP__CODE_SHIFT) - TONEMAP__CODE_BASE,
+                     part = bits & ((1u << TONEMAP__CODE_SHIFT) - 1), low = map->fine[at], high = map->fine[at + 1];
+            out[c] =
+                (unsigned char)((low + ((high - low) * part >> TONEMAP__CODE_SHIFT) + tonemap__threshold(x + i, y)) >>
+                                8);
+        }
+}
+
+static inline void tonemap__write_f32(float *out, int channels, tonemap__planes v, int n, const tonemap *map)
+{
+    int i, c, colours = channels == 1 ? 1 : 3;
+    if (map->options.encoding > TONEMAP_ENCODING_LINEAR) tonemap__encode_planes(v, map, n);
+    else if (map->frame.peak > 1)
+        for (c = 0; c < 3; c++)
+            for (i = 0; i < n; i++) v[c][i] *= map->frame.peak;
     for (i = 0; i < n; i++, out += channels)
         for (c = 0; c < colours; c++) out[c] = v[c][i];
 }
@@ -2202,7 +2532,7 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
     tonemap *map = job->map;
     const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
     unsigned char *row = job->out + (ptrdiff_t)y * job->out_stride;
-    int x, i, n, channels = job->hdr->channels;
+    int x, i, n, channels = job->hdr->channels, curve = map->options.operation > TONEMAP_GUIDED;
     tonemap__shading shading;
     tonemap__planes v;
     shading.pixels = pixels;
@@ -2210,8 +2540,10 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
     shading.gain = w->local;
     shading.rho = rho;
     shading.channels = channels;
+    shading.colours = &map->colours;
+    shading.most = curve ? 1e9f : 1;
     shading.floor = job->as_float ? 0 : TONEMAP__CODE_FLOOR;
-    shading.gamut = channels > 1 ? map->frame.gamut : -1;
+    shading.gamut = channels > 1 && !curve ? map->frame.gamut : -1;
     shading.clamped = 0;
     for (x = 0; x < map->width; x += n) {
         size_t at = (size_t)x * (size_t)channels;
@@ -2223,16 +2555,18 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
         i = 0;
 #endif
         tonemap__shade_plain(v, &shading, x, i, n);
+        if (curve) tonemap__curve_planes(v, map->options.operation, shading.floor, 1 / map->frame.peak, n);
         if (channels == 4) /* alpha: before the colours, which may overwrite the input */
             for (i = 0; i < n; i++) {
                 float alpha = tonemap__unit(pixels[at + 4 * (size_t)i + 3]);
                 if (job->as_float) as_float[4 * i + 3] = alpha;
                 else row[at + 4 * (size_t)i + 3] = (unsigned char)(alpha * 255 + 0.5f);
             }
-        if (job->as_float) tonemap__write_f32(as_float, channels, v, n);
+        if (job->as_float) tonemap__write_f32(as_float, channels, v, n, map);
+        else if (map->options.dither) tonemap__write_dithered(map, row + at, channels, v, x, y, n);
         else tonemap__write_u8(map, row + at, channels, v, n);
     }
-    w->stats.clamped += shading.clamped;
+    if (!curve) w->stats.clamped += shading.clamped;
 }
 
 static void tonemap__map_bands(int begin, int end, int worker, void *context)
@@ -2314,6 +2648,7 @@ static inline void tonemap__carve(tonemap *map, sat__arena *arena)
     map->luminance = (float *)sat__carve(arena, height, row * sizeof(float));
     map->row_sum = (float *)sat__carve(arena, height, sizeof(float));
     map->row_unusable = (unsigned char *)sat__carve(arena, height, 1);
+    map->fine = (uint16_t *)sat__carve(arena, TONEMAP__CODES + 1, sizeof(uint16_t));
     map->meter = (tonemap__meter *)sat__carve(arena, 1, sizeof *map->meter);
     for (i = 0; i < map->workers; i++) {
         tonemap__worker ignored, *w = arena->base ? &map->worker[i] : &ignored;
@@ -2362,6 +2697,8 @@ TONEMAP_DEF sat_result tonemap_create(tonemap **out, int width, int height, cons
     map->block = block;
     tonemap__carve(map, &arena);
     tonemap__fill_codes(map->code);
+    tonemap__fill_fine(map->fine);
+    tonemap__prepare_colours(&map->colours, &o);
     *out = map;
     return SAT_OK;
 }
@@ -2380,6 +2717,7 @@ TONEMAP_DEF sat_result tonemap_set_options(tonemap *map, const tonemap_options *
     if (!map || !tonemap__options_are_valid(&o) || sat__worker_count(&o.threads) > map->workers)
         return SAT_ERR_ARGUMENT;
     map->options = o;
+    tonemap__prepare_colours(&map->colours, &o);
     return SAT_OK;
 }
 
@@ -2407,6 +2745,8 @@ static inline sat_result tonemap__apply(tonemap__job *job, double dt, tonemap_st
         tonemap__worker *w = &map->worker[i];
         memset(&w->stats, 0, sizeof w->stats);
         w->log_sum = 0;
+        w->counted = 0;
+        w->luma = map->colours.luma;
         w->histogram = histogram ? w->bins : NULL;
         memset(w->bins, 0, TONEMAP__BINS * sizeof *w->bins);
     }
@@ -2499,22 +2839,25 @@ static const char tonemap__glsl_library[] =
     "#define TONEMAP_PHI_TERM 12.8\n"
     "#define TONEMAP_SCALES 8\n"
     "#endif\n"
-    "float tonemap_luminance(vec3 rgb) {\n"
-    "    float y = 0.2126729 * rgb.r + 0.7151522 * rgb.g + 0.0721750 * rgb.b;\n"
+    "float tonemap_sane(float y) {\n"
     "    uint bits = floatBitsToUint(y);\n"
     "    if (bits > 0x7f800000u || bits < 0x0d800000u) return 0.0;\n"
     "    return bits > 0x71800000u ? uintBitsToFloat(0x71800000u) : y;\n"
     "}\n"
+    "float tonemap_luminance(vec3 rgb) { return tonemap_sane(0.2126729 * rgb.r + 0.7151522 * rgb.g + 0.0721750 * rgb.b); }\n"
     "float tonemap_rho(float lux) {\n"
     "    float t = pow(clamp(lux, 1e-8, 10.0), 0.383);\n"
     "    return lux < 10.0 ? min((t * (92.0 / 57.0) + 0.93227627) / (t + 2.41546083), 1.0) : 1.0;\n"
     "}\n"
-    "vec3 tonemap_mesopic(vec3 rgb, float luminance, float rho) {\n"
+    "vec3 tonemap_mesopic_in(vec3 rgb, float luminance, float rho, vec3 x, vec3 step) {\n" /* x, step: X, and colour of a step of X, of the primaries */
     "    float y = 0.95047 * max(luminance, 7.8886e-31);\n"
-    "    float q = min(dot(rgb, vec3(0.4124564, 0.3575761, 0.1804375)) / y, 1048576.0);\n"
+    "    float q = min(dot(rgb, x) / y, 1048576.0);\n"
     "    if (!(q > 1.0 && rho < 1.0)) return rgb;\n"
     "    float c = 1.0 + rho * (pow(q, 1.0 / 3.0) - 1.0);\n"
-    "    return rgb + (c * c * c - q) * y * vec3(3.2404542, -0.9692660, 0.0556434);\n"
+    "    return rgb + (c * c * c - q) * y * step;\n"
+    "}\n"
+    "vec3 tonemap_mesopic(vec3 rgb, float luminance, float rho) {\n"
+    "    return tonemap_mesopic_in(rgb, luminance, rho, vec3(0.4124564, 0.3575761, 0.1804375), vec3(3.2404542, -0.9692660, 0.0556434));\n"
     "}\n"
     "vec3 tonemap_srgb(vec3 v) {\n"
     "    v = clamp(v, 0.0, 1.0);\n"
@@ -2540,26 +2883,29 @@ TONEMAP_DEF const char *tonemap_gl_glsl(void) { return tonemap__glsl_library; }
 /* The luminance plane. */
 static const char tonemap__glsl_luminance[] =
     "uniform sampler2D hdr;\n"
+    "uniform vec3 luma;\n"
     "out float value;\n"
     "void main() {\n"
     "    vec3 rgb = texelFetch(hdr, ivec2(gl_FragCoord.xy), 0).rgb;\n"
-    "    uint bits = floatBitsToUint(0.2126729 * rgb.r + 0.7151522 * rgb.g + 0.0721750 * rgb.b);\n"
-    "    value = bits > 0x7f800000u && bits != 0x80000000u ? -1.0 : tonemap_luminance(rgb);\n" /* -1: unusable */
+    "    float y = luma.r * rgb.r + luma.g * rgb.g + luma.b * rgb.b;\n"
+    "    uint bits = floatBitsToUint(y);\n"
+    "    value = bits > 0x7f800000u && bits != 0x80000000u ? -1.0 : tonemap_sane(y);\n" /* -1: unusable */
     "}\n";
 
 /* Sums over 4 x 4 texels. Texel: whole and 2^-16 parts of the sum of log2, carried over; pixels. Integers, so that the
  * log-average is the CPU's. The polynomial is the CPU's, too. */
 static const char tonemap__glsl_reduce[] =
     "#ifdef TONEMAP_FIRST\n"
-    "uniform sampler2D source;\n"
+    "uniform sampler2D source, mask;\n"
     "ivec4 tonemap_read(ivec2 p) {\n"
     "    float y = texelFetch(source, p, 0).x;\n"
+    "    int weight = TONEMAP_MASK == 1 ? int(texelFetch(mask, p, 0).x) : 1;\n"
     "    uint bits = floatBitsToUint(y);\n"
     "    if (!(y > 0.0) || bits >= 0x71800000u) return ivec4(0);\n"
     "    float t = uintBitsToFloat((bits & 0x007fffffu) | 0x3f800000u) - 1.0;\n"
     "    float q = -0.0959564262 + t * 0.0258414329;\n"
     "    q = 0.442544943 + t * (-0.275600307 + t * (0.18194886 + t * q));\n"
-    "    return ivec4(int(bits >> 23) - 127, int((t + t * (1.0 - t) * q) * 65536.0 + 0.5), 1, 0);\n"
+    "    return weight * ivec4(int(bits >> 23) - 127, int((t + t * (1.0 - t) * q) * 65536.0 + 0.5), 1, 0);\n"
     "}\n"
     "#else\n"
     "uniform highp isampler2D source;\n"
@@ -2579,9 +2925,11 @@ static const char tonemap__glsl_reduce[] =
 
 /* The histogram: a point a pixel, added up by blending; bins as on the CPU, 64 in a row. */
 static const char tonemap__glsl_scatter[] =
-    "uniform sampler2D luminance;\n"
+    "uniform sampler2D luminance, mask;\n"
     "uniform int width;\n"
+    "flat out float weight;\n"
     "void main() {\n"
+    "    weight = TONEMAP_MASK == 1 ? texelFetch(mask, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x : 1.0;\n"
     "    float y = texelFetch(luminance, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x;\n"
     "    uint bits = floatBitsToUint(y);\n"
     "    int bin = int((bits - 0x0d800000u) >> 19);\n"
@@ -2591,8 +2939,9 @@ static const char tonemap__glsl_scatter[] =
     "}\n";
 
 static const char tonemap__glsl_count[] =
+    "flat in float weight;\n"
     "out float value;\n"
-    "void main() { value = 1.0; }\n";
+    "void main() { value = weight; }\n";
 
 /* The state, two texels: log2 of average, key and white, and 1; log2 of low and high, what the meter and what the white
    hold. An empty picture keeps the old one. */
@@ -2788,10 +3137,59 @@ static const char tonemap__glsl_search[] =
     "    return dot(gradient, gradient) > TONEMAP_SELECTIVE * TONEMAP_SELECTIVE;\n"
     "}\n";
 
+/* Curves of one pixel, and encodings of values in units of the peak: the CPU's. */
+static const char tonemap__glsl_curves[] =
+    "uniform float peak, peak_cd;\n"
+    "uniform vec3 display_luma;\n"
+    "#if TONEMAP_OPERATOR == 6\n"
+    "vec3 tonemap_curve(vec3 v) {\n"
+    "    float x = min(min(v.r, v.g), v.b);\n"
+    "    v -= x < 0.08 ? x - 6.25 * x * x : 0.04;\n"
+    "    float most = max(max(v.r, v.g), v.b), top = 1.0 - 0.0576 / (most + 0.24 - 0.76);\n"
+    "    return most < 0.76 ? v : top + (v * (top / most) - top) / (0.15 * (most - top) + 1.0);\n"
+    "}\n"
+    "#elif TONEMAP_OPERATOR == 7\n"
+    "vec3 tonemap_curve(vec3 v) {\n"
+    "    v = mat3(0.842479062, 0.0423282422, 0.0423756549, 0.0784336, 0.878468636, 0.0784336, 0.0792237451, 0.0791661275, 0.879142974) * v;\n"
+    "    vec3 x = clamp((log2(max(v, 1e-9)) + 12.47393) / 16.5, 0.0, 1.0), x2 = x * x, x4 = x2 * x2;\n"
+    "    v = 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232;\n"
+    "    v = mat3(1.196879005, -0.0528968518, -0.0529716355, -0.0980208811, 1.15190313, -0.0980434501, -0.0990297441, -0.0989611768, 1.151073673) * v;\n"
+    "    return pow(max(v, 1e-9), vec3(2.2));\n"
+    "}\n"
+    "#elif TONEMAP_OPERATOR == 8\n"
+    "vec3 tonemap_curve(vec3 v) {\n"
+    "    v = mat3(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566, 0.83777) * v / 0.6;\n"
+    "    v = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081);\n"
+    "    return mat3(1.60475, -0.10208, -0.00327, -0.53108, 1.10813, -0.07276, -0.07367, -0.00605, 1.07602) * v;\n"
+    "}\n"
+    "#elif TONEMAP_OPERATOR == 9\n"
+    "vec3 tonemap_curve(vec3 v) {\n"
+    "    v *= 2.0;\n"
+    "    return ((v * (0.15 * v + 0.05) + 0.004) / (v * (0.15 * v + 0.5) + 0.06) - 1.0 / 15.0) / 0.725129270;\n"
+    "}\n"
+    "#endif\n"
+    "vec3 tonemap_encode(vec3 v) {\n"
+    "#if TONEMAP_ENCODING == 1\n"
+    "    return clamp(v, 0.0, 1.0) * peak;\n"
+    "#elif TONEMAP_ENCODING == 2\n"
+    "    v = pow(clamp(v, 0.0, 1.0) * peak_cd * 1e-4 + 1e-12, vec3(0.1593017578125));\n"
+    "    return pow((0.8359375 + 18.8515625 * v) / (1.0 + 18.6875 * v), vec3(78.84375));\n"
+    "#elif TONEMAP_ENCODING == 3\n"
+    "    v = clamp(v, 0.0, 1.0);\n"
+    "    float power = 1.0 / (1.2 + 0.42 * log(peak_cd / 1000.0) / log(10.0)) - 1.0;\n"
+    "    v = min(v * pow(max(dot(display_luma, v), 1e-9), power), 1.0);\n"
+    "    return mix(sqrt(3.0 * v), 0.17883277 * log(max(12.0 * v - 0.28466892, 1e-9)) + 0.55991073, greaterThan(v, vec3(1.0 / 12.0)));\n"
+    "#else\n"
+    "    return tonemap_srgb(v);\n"
+    "#endif\n"
+    "}\n";
+
 /* Local luminance, mesopic vision, display luminance and colour in one pass. */
 static const char tonemap__glsl_map[] =
     "uniform sampler2D hdr;\n"
     "uniform float cd_per_unit, lux_per_cd;\n"
+    "uniform vec3 mix_r, mix_g, mix_b, red_x, red_step;\n"
+    "uniform int mixes;\n"
     "out vec4 value;\n"
     "float tonemap_capacity(float cd) {\n"
     "    float ln = log(max(cd, 7.8886e-31));\n"
@@ -2814,7 +3212,12 @@ static const char tonemap__glsl_map[] =
     "    float cd = cd_per_unit > 0.0 ? cd_per_unit : 10.0 * exp2(-first.x);\n"
     "    float lux = (cd_per_unit > 0.0 ? cd_per_unit : exp2(-first.x)) * lux_per_cd;\n"
     "    float gain;\n"
-    "    if (!(y > 0.0)) return vec3(0.0);\n"
+    "    if (!(y > 0.0)) return tonemap_encode(vec3(0.0));\n"
+    "    if (mixes > 0) {\n"
+    "        rgb = vec3(dot(mix_r, rgb), dot(mix_g, rgb), dot(mix_b, rgb));\n"
+    "        float lowest = min(min(rgb.r, rgb.g), rgb.b);\n"
+    "        if (lowest < 0.0) rgb = y + (rgb - y) * (y / (y - lowest));\n"
+    "    }\n"
     "#if TONEMAP_OPERATOR == 5\n"
     "    la = tonemap_find(p, own, key);\n"
     "    beyond = max(own / TONEMAP_CAP, 1.0);\n"
@@ -2825,21 +3228,23 @@ static const char tonemap__glsl_map[] =
     "    }\n"
     "#endif\n"
     "#if TONEMAP_MESOPIC == 1\n"
-    "    rgb = tonemap_mesopic(rgb, y, tonemap_rho(exp2(first.x) * lux));\n"
+    "    rgb = tonemap_mesopic_in(rgb, y, tonemap_rho(exp2(first.x) * lux), red_x, red_step);\n"
     "#elif TONEMAP_MESOPIC == 2\n"
-    "    rgb = tonemap_mesopic(rgb, y, tonemap_rho(la / scale * lux));\n"
+    "    rgb = tonemap_mesopic_in(rgb, y, tonemap_rho(la / scale * lux), red_x, red_step);\n"
     "#endif\n"
     "#if TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 3\n"
     "    float low = tonemap_capacity(cd * exp2(second.x)), high = tonemap_capacity(cd * exp2(second.y)), display = key;\n"
     "    if (second.y - second.x > 0.125) display = (tonemap_capacity(la * cd / scale) - low) / (high - low);\n"
     "    gain = max(display, 0.0) * scale / max(la, 7.8886e-31);\n"
     "#elif TONEMAP_OPERATOR == 4\n"
-    "    gain = scale * (TONEMAP_BURN == 1 ? exp2(-first.z) : 1.0);\n"
+    "    gain = scale * (TONEMAP_BURN == 1 ? exp2(-first.z) : 1.0 / peak);\n"
+    "#elif TONEMAP_OPERATOR > 5\n"
+    "    return tonemap_encode(clamp(tonemap_curve(clamp(rgb * scale, 0.0, 1e9)), 0.0, 1.0) / peak);\n"
     "#else\n"
-    "    float burn = TONEMAP_BURN == 1 ? exp2(-2.0 * first.z) : 0.0;\n"
-    "    gain = scale * (1.0 + min(own, 1.1529215e18) * burn) / (1.0 + la * beyond);\n"
+    "    float burn = TONEMAP_BURN == 1 ? peak * exp2(-2.0 * first.z) : 0.0;\n"
+    "    gain = scale * (1.0 + min(own, 1.1529215e18) * burn) / (peak + la * beyond);\n"
     "#endif\n"
-    "    return tonemap_srgb(tonemap_gamut(rgb * gain, y * gain));\n"
+    "    return tonemap_encode(tonemap_gamut(rgb * gain, y * gain));\n"
     "}\n"
     "void main() {\n"
     "    ivec2 p = ivec2(gl_FragCoord.xy), high = textureSize(luminance, 0) - 1;\n"
@@ -2850,6 +3255,10 @@ static const char tonemap__glsl_map[] =
     "            for (int x = max(p.x - radius, 0); x <= min(p.x + radius, high.x); x++)\n"
     "                if (texelFetch(luminance, ivec2(x, y), 0).x >= 0.0) sum += vec4(tonemap_display(ivec2(x, y)), 1.0);\n"
     "    value = vec4(sum.rgb / max(sum.a, 1.0), 1.0);\n"
+    "#if TONEMAP_DITHER\n"
+    "    int d = p.x ^ p.y, threshold = (d & 1) << 7 | (p.y & 1) << 6 | (d & 2) << 4 | (p.y & 2) << 3 | (d & 4) << 1 | (p.y & 4);\n"
+    "    value.rgb = floor(value.rgb * 255.0 + float(threshold + 2) / 256.0) / 255.0;\n"
+    "#endif\n"
     "}\n";
 
 enum { TONEMAP__LEVELS = 14, TONEMAP__BIN_ROWS = (TONEMAP__BINS + 63) / 64, TONEMAP__GL_UNITS = 5 };
@@ -2859,10 +3268,11 @@ struct tonemap_gl {
     tonemap_options options;
     sat_allocator allocator;
     sat_gl *sat;                /* NULL for the global operators */
+    tonemap__colours colours;
     int width, height, levels, current, histogram; /* histogram: 0, or the estimates it serves, see the state shader */
     unsigned luminance_program, first_program, reduce_program, scatter_program, state_program, quantise_program,
         steps_program, along_program[2], fit_program, map_program;
-    unsigned luminance, quanta, out, bins, steps, pair[2], state[2], level[TONEMAP__LEVELS]; /* textures */
+    unsigned luminance, quanta, out, bins, steps, mask, pair[2], state[2], level[TONEMAP__LEVELS]; /* textures */
     unsigned luminance_target, quanta_target, out_target, bins_target, steps_target, pair_target[2], state_target[2],
         level_target[TONEMAP__LEVELS];
 };
@@ -2888,6 +3298,9 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define_float(gl, "TONEMAP_METER_LOW", (float)o->meter_low);
     sat__gl_define_float(gl, "TONEMAP_METER_HIGH", (float)o->meter_high);
     sat__gl_define(gl, "TONEMAP_HISTOGRAM", g->histogram);
+    sat__gl_define(gl, "TONEMAP_MASK", o->meter_weights != NULL);
+    sat__gl_define(gl, "TONEMAP_ENCODING", (int)o->encoding);
+    sat__gl_define(gl, "TONEMAP_DITHER", o->dither);
     sat__gl_define(gl, "TONEMAP_BINS", TONEMAP__BIN_ROWS * 64);
     sat__gl_define(gl, "TONEMAP_BURN", !tonemap__is_infinite(o->white));
     sat__gl_define_float(gl, "TONEMAP_EPSILON", (float)o->epsilon);
@@ -2903,7 +3316,7 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
 static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, const char *name, const char *vertex,
                                              const char *frame, const char *search, const char *body)
 {
-    const char *library[3], *fragment[5], *points[2];
+    const char *library[3], *fragment[6], *points[2];
     sat__gl_shaders shaders;
     int n = 0;
     memset(&shaders, 0, sizeof shaders);
@@ -2911,8 +3324,9 @@ static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, c
     library[1] = tonemap_gl_glsl();
     library[2] = NULL;
     if (frame) fragment[n++] = frame;
-    if (search) fragment[n++] = tonemap__glsl_down;
+    if (search && *search) fragment[n++] = tonemap__glsl_down;
     if (search) fragment[n++] = search;
+    if (search) fragment[n++] = tonemap__glsl_curves;
     fragment[n++] = body;
     fragment[n] = NULL;
     points[0] = vertex;
@@ -2968,6 +3382,18 @@ static inline sat_result tonemap__gl_target(tonemap_gl *g, unsigned *texture, un
     return r == SAT_OK ? sat__gl_framebuffer(&g->gl, framebuffer, texture, 1, 0) : r;
 }
 
+static inline sat_result tonemap__gl_make_mask(tonemap_gl *g)
+{
+    size_t n = (size_t)g->width * (size_t)g->height, i;
+    float *weights = n > SIZE_MAX / sizeof(float) ? NULL : (float *)sat__alloc(&g->allocator, n * sizeof(float));
+    sat_result r;
+    if (!weights) return SAT_ERR_MEMORY;
+    for (i = 0; i < n; i++) weights[i] = (float)tonemap__mask_weight(g->options.meter_weights[i]);
+    r = sat__gl_texture(&g->gl, &g->mask, SAT__GL_R32F, g->width, g->height, weights);
+    sat__release(&g->allocator, weights, n * sizeof(float));
+    return r;
+}
+
 static inline sat_result tonemap__gl_targets(tonemap_gl *g)
 {
     int i, width = g->width, height = g->height;
@@ -2975,6 +3401,7 @@ static inline sat_result tonemap__gl_targets(tonemap_gl *g)
     for (i = 0; g->options.operation == TONEMAP_GUIDED && i < 3 && r == SAT_OK; i++)
         r = i < 2 ? tonemap__gl_target(g, &g->pair[i], &g->pair_target[i], SAT__GL_RG32UI, width, height)
                   : tonemap__gl_target(g, &g->steps, &g->steps_target, SAT__GL_R32F, width, height);
+    if (r == SAT_OK && g->options.meter_weights) r = tonemap__gl_make_mask(g);
     if (r == SAT_OK && g->sat) r = tonemap__gl_target(g, &g->quanta, &g->quanta_target, SAT__GL_R32UI, width, height);
     if (r == SAT_OK) r = tonemap__gl_target(g, &g->out, &g->out_target, SAT__GL_RGBA8, width, height);
     if (r == SAT_OK && g->histogram)
@@ -2991,6 +3418,20 @@ static inline sat_result tonemap__gl_targets(tonemap_gl *g)
         g->levels++;
     }
     return r;
+}
+
+static inline void tonemap__gl_count(tonemap_gl *g);
+
+/* OpenGL ES blends into floats of 32 bits only with an extension, and says so when it draws. */
+static inline sat_result tonemap__gl_try_blending(tonemap_gl *g)
+{
+    sat__gl_clear_errors(&g->gl);
+    tonemap__gl_count(g);
+    if (g->gl.GetError() == SAT__GL_NO_ERROR) return SAT_OK;
+    return sat__gl_fail(&g->gl, SAT_ERR_GL_STATE,
+                        "the context lacks EXT_float_blend, which metering by percentiles (the default), an estimated key "
+                        "or white, and Ashikhmin need; TONEMAP_METERING_LOG_AVERAGE with a white above 0 does without",
+                        NULL);
 }
 
 static inline sat_result tonemap__gl_make(tonemap_gl *g, sat_gl_get_proc *get_proc)
@@ -3013,9 +3454,10 @@ static inline sat_result tonemap__gl_make(tonemap_gl *g, sat_gl_get_proc *get_pr
     r = tonemap__gl_targets(g);
     if (r == SAT_OK) r = tonemap__gl_programs(g);
     if (r == SAT_OK && o->operation == TONEMAP_GUIDED) r = tonemap__gl_guided_programs(g);
+    if (r == SAT_OK && g->histogram && g->gl.is_es) r = tonemap__gl_try_blending(g);
     if (r == SAT_OK)
         r = tonemap__gl_program(g, &g->map_program, "tonemap: mapping", NULL, tonemap__glsl_frame,
-                                g->sat || g->steps ? tonemap__glsl_search : NULL, tonemap__glsl_map);
+                                g->sat || g->steps ? tonemap__glsl_search : "", tonemap__glsl_map);
     sat__gl_end(&g->gl, &state);
     return r;
 }
@@ -3036,6 +3478,7 @@ TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_
     if (!g) return SAT_ERR_MEMORY;
     memset(g, 0, sizeof *g);
     g->options = o;
+    tonemap__prepare_colours(&g->colours, &o);
     g->allocator = allocator;
     g->width = width;
     g->height = height;
@@ -3043,17 +3486,19 @@ TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_
     return tonemap__gl_make(g, get_proc);
 }
 
-/* Whether two sets of options have the same shaders. */
+/* Whether two sets of options have the same shaders: all but uniforms is the same. */
 static inline int tonemap__gl_same_programs(const tonemap_options *a, const tonemap_options *b)
 {
-    return a->operation == b->operation && a->mesopic == b->mesopic && a->metering == b->metering &&
-           a->scales == b->scales && !(a->phi < b->phi || a->phi > b->phi) &&
-           !(a->epsilon < b->epsilon || a->epsilon > b->epsilon) && !(a->soft < b->soft || a->soft > b->soft) &&
-           !(a->gamut < b->gamut || a->gamut > b->gamut) && !(a->edge < b->edge || a->edge > b->edge) &&
-           !(a->selective < b->selective || a->selective > b->selective) &&
-           !(a->meter_low < b->meter_low || a->meter_low > b->meter_low) &&
-           !(a->meter_high < b->meter_high || a->meter_high > b->meter_high) && (a->key > 0) == (b->key > 0) &&
-           (a->white > 0) == (b->white > 0) && tonemap__is_infinite(a->white) == tonemap__is_infinite(b->white);
+    static const char uniforms[] = " key white exposure adapt_seconds darker_seconds adapt_low adapt_high cd_per_unit "
+                                   "lux_per_cd primaries display balance_red balance_green balance_blue peak white_cd ";
+    int i;
+    for (i = 0; i < SAT__COUNT(tonemap__fields); i++) {
+        const sat__field *f = &tonemap__fields[i];
+        double x = sat__field_value(f, a), y = sat__field_value(f, b);
+        if (!strstr(uniforms, f->name) && (x < y || x > y)) return 0;
+    }
+    return (a->key > 0) == (b->key > 0) && (a->white > 0) == (b->white > 0) &&
+           tonemap__is_infinite(a->white) == tonemap__is_infinite(b->white) && a->meter_weights == b->meter_weights;
 }
 
 TONEMAP_DEF sat_result tonemap_gl_set_options(tonemap_gl *gl, const tonemap_options *options)
@@ -3062,6 +3507,7 @@ TONEMAP_DEF sat_result tonemap_gl_set_options(tonemap_gl *gl, const tonemap_opti
     if (!gl || !gl->map_program || !tonemap__options_are_valid(&o) || !tonemap__gl_same_programs(&gl->options, &o))
         return SAT_ERR_ARGUMENT;
     gl->options = o;
+    tonemap__prepare_colours(&gl->colours, &o);
     return SAT_OK;
 }
 
@@ -3095,6 +3541,7 @@ TONEMAP_DEF void tonemap_gl_destroy(tonemap_gl *gl)
         t->DeleteTextures(1, &gl->out);
         t->DeleteTextures(1, &gl->bins);
         t->DeleteTextures(1, &gl->steps);
+        t->DeleteTextures(1, &gl->mask);
         t->DeleteTextures(2, gl->pair);
         sat__gl_close(t);
     }
@@ -3109,11 +3556,13 @@ static inline void tonemap__gl_measure(tonemap_gl *g, unsigned hdr)
     int i, width = g->width, height = g->height;
     sat__gl_pass(gl, g->luminance_program, g->luminance_target, width, height);
     sat__gl_set_texture(gl, g->luminance_program, "hdr", 0, hdr);
+    sat__gl_set_float3(gl, g->luminance_program, "luma", g->colours.luma);
     sat__gl_draw(gl);
     for (i = 0; i < g->levels; i++) {
         unsigned program = i ? g->reduce_program : g->first_program;
         sat__gl_pass(gl, program, g->level_target[i], (width + 3) / 4, (height + 3) / 4);
         sat__gl_set_texture(gl, program, "source", 0, i ? g->level[i - 1] : g->luminance);
+        if (g->mask && !i) sat__gl_set_texture(gl, program, "mask", 1, g->mask);
         sat__gl_set_int2(gl, program, "size", width, height);
         sat__gl_draw(gl);
         width = (width + 3) / 4;
@@ -3131,6 +3580,7 @@ static inline void tonemap__gl_count(tonemap_gl *g)
     gl->BlendEquationSeparate(0x8006u, 0x8006u); /* GL_FUNC_ADD */
     gl->BlendFuncSeparate(SAT__GL_ONE, SAT__GL_ONE, SAT__GL_ONE, SAT__GL_ONE);
     sat__gl_set_texture(gl, g->scatter_program, "luminance", 0, g->luminance);
+    if (g->mask) sat__gl_set_texture(gl, g->scatter_program, "mask", 1, g->mask);
     sat__gl_set_int(gl, g->scatter_program, "width", g->width);
     gl->BindVertexArray(gl->vertex_array);
     gl->DrawArrays(SAT__GL_POINTS, 0, g->width * g->height);
@@ -3200,6 +3650,15 @@ static inline sat_result tonemap__gl_map(tonemap_gl *g, unsigned ldr, unsigned h
     if (g->steps) sat__gl_set_texture(gl, program, "steps", 4, g->steps);
     sat__gl_set_float(gl, program, "cd_per_unit", (float)g->options.cd_per_unit);
     sat__gl_set_float(gl, program, "lux_per_cd", (float)g->options.lux_per_cd);
+    sat__gl_set_float(gl, program, "peak", (float)g->options.peak);
+    sat__gl_set_float(gl, program, "peak_cd", (float)(g->options.peak * g->options.white_cd));
+    sat__gl_set_int(gl, program, "mixes", g->colours.mixes);
+    sat__gl_set_float3(gl, program, "mix_r", g->colours.mix);
+    sat__gl_set_float3(gl, program, "mix_g", g->colours.mix + 3);
+    sat__gl_set_float3(gl, program, "mix_b", g->colours.mix + 6);
+    sat__gl_set_float3(gl, program, "red_x", g->colours.red_x);
+    sat__gl_set_float3(gl, program, "red_step", g->colours.red_step);
+    sat__gl_set_float3(gl, program, "display_luma", g->colours.display_luma);
     sat__gl_draw(gl);
     if (ldr) gl->FramebufferTexture2D(SAT__GL_FRAMEBUFFER, SAT__GL_COLOR_ATTACHMENT0, SAT__GL_TEXTURE_2D, 0, 0);
     return SAT_OK;

@@ -35,7 +35,7 @@ static double take_number(fuzz_input *in, double low, double high)
 static tonemap_options take_options(fuzz_input *in)
 {
     tonemap_options o = tonemap_defaults();
-    o.operation = (tonemap_operator)(take_byte(in) % 6);
+    o.operation = (tonemap_operator)(take_byte(in) % 11);
     o.mesopic = (tonemap_mesopic)(take_byte(in) % 4);
     if (take_byte(in) & 1) o.key = take_number(in, -1, 2);
     if (take_byte(in) & 1) o.white = take_number(in, 0, 10);
@@ -46,6 +46,17 @@ static tonemap_options take_options(fuzz_input *in)
     if (take_byte(in) & 1) o.cd_per_unit = take_number(in, 0, 100);
     if (take_byte(in) & 1) o.lux_per_cd = take_number(in, 0, 10);
     if (take_byte(in) & 1) o.selective = take_number(in, 0, 2);
+    o.primaries = (tonemap_primaries)(take_byte(in) % 4);
+    o.display = (tonemap_primaries)(take_byte(in) % 4);
+    o.encoding = (tonemap_encoding)(take_byte(in) % 5);
+    o.dither = take_byte(in) % 3;
+    if (take_byte(in) & 1) o.peak = take_number(in, 1, 100);
+    if (take_byte(in) & 1) o.edge = take_number(in, 0, 10);
+    if (take_byte(in) & 1) o.balance_red = take_number(in, 0, 10);
+    if (take_byte(in) & 1) o.balance_blue = take_number(in, 0, 10);
+    if (take_byte(in) & 1) o.gamut = take_number(in, -1, 1);
+    if (take_byte(in) & 1) o.metering = TONEMAP_METERING_LOG_AVERAGE;
+    if (take_byte(in) & 1) o.exposure = take_number(in, 0, 10);
     if (take_byte(in) & 1) o.adapt_seconds = take_number(in, 0, 2);
     return o;
 }
@@ -67,7 +78,7 @@ static void map_frame(tonemap *map, fuzz_input *in, int width, int height)
     n = width * height * view.channels;
     if (tonemap_apply_f32(map, out, (ptrdiff_t)width * view.channels * 4, &view, dt, &stats) == SAT_OK)
         for (i = 0; i < n; i++)
-            if (!(out[i] >= 0 && out[i] <= 1)) abort();
+            if (!(out[i] >= 0 && out[i] <= 100)) abort();
     tonemap_apply_u8(map, codes, (ptrdiff_t)width * view.channels, &view, dt, NULL);
 }
 

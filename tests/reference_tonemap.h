@@ -135,6 +135,81 @@ static inline void reference_guided(double *la, const double *scaled, int width,
     free(mean);
 }
 
+/* ---- curves of one pixel, from their publications: curve 0 Neutral, 1 AgX, 2 ACES (Hill), 3 Hable */
+
+static inline void reference_rows(double *out, const double m[3][3], const double *v)
+{
+    int i;
+    for (i = 0; i < 3; ++i) out[i] = m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2];
+}
+
+static inline double reference_hable(double x)
+{
+    const double A = 0.15, B = 0.50, C = 0.10, D = 0.20, E = 0.02, F = 0.30;
+    return (x * (A * x + C * B) + D * E) / (x * (A * x + B) + D * F) - E / F;
+}
+
+static inline void reference_curve(double *out, const double *v, int curve)
+{
+    static const double aces_in[3][3] = {
+        {0.59719, 0.35458, 0.04823}, {0.07600, 0.90834, 0.01566}, {0.02840, 0.13383, 0.83777}};
+    static const double aces_out[3][3] = {
+        {1.60475, -0.53108, -0.07367}, {-0.10208, 1.10813, -0.00605}, {-0.00327, -0.07276, 1.07602}};
+    static const double agx_in[3][3] = {{0.842479062253094, 0.0784335999999992, 0.0792237451477643},
+                                        {0.0423282422610123, 0.878468636469772, 0.0791661274605434},
+                                        {0.0423756549057051, 0.0784336, 0.879142973793104}};
+    static const double agx_out[3][3] = {{1.19687900512017, -0.0980208811401368, -0.0990297440797205},
+                                         {-0.0528967518574562, 1.15190312990417, -0.0989611768448433},
+                                         {-0.0529716355144438, -0.0980434501171241, 1.15107367264116}};
+    double t[3], x, offset, peak, new_peak, g;
+    int c;
+    if (curve == 0) {
+        x = fmin(v[0], fmin(v[1], v[2]));
+        offset = x < 0.08 ? x - 6.25 * x * x : 0.04;
+        for (c = 0; c < 3; ++c) out[c] = v[c] - offset;
+        peak = fmax(out[0], fmax(out[1], out[2]));
+        if (peak >= 0.8 - 0.04) {
+            double d = 1 - (0.8 - 0.04);
+            new_peak = 1 - d * d / (peak + d - (0.8 - 0.04));
+            g = 1 - 1 / (0.15 * (peak - new_peak) + 1);
+            for (c = 0; c < 3; ++c) out[c] = out[c] * new_peak / peak * (1 - g) + new_peak * g;
+        }
+    } else if (curve == 1) {
+        reference_rows(t, agx_in, v);
+        for (c = 0; c < 3; ++c) {
+            x = (fmin(fmax(log2(fmax(t[c], 1e-10)), -12.47393), 4.026069) + 12.47393) / (4.026069 + 12.47393);
+            t[c] = 15.5 * pow(x, 6) - 40.14 * pow(x, 5) + 31.96 * pow(x, 4) - 6.868 * pow(x, 3) + 0.4298 * x * x +
+                   0.1191 * x - 0.00232;
+        }
+        reference_rows(out, agx_out, t);
+        for (c = 0; c < 3; ++c) out[c] = pow(fmax(out[c], 0), 2.2);
+    } else if (curve == 2) {
+        for (c = 0; c < 3; ++c) out[c] = v[c] / 0.6;
+        reference_rows(t, aces_in, out);
+        for (c = 0; c < 3; ++c)
+            t[c] = (t[c] * (t[c] + 0.0245786) - 0.000090537) / (t[c] * (0.983729 * t[c] + 0.4329510) + 0.238081);
+        reference_rows(out, aces_out, t);
+    } else {
+        for (c = 0; c < 3; ++c) out[c] = reference_hable(2 * v[c]) / reference_hable(11.2);
+    }
+    for (c = 0; c < 3; ++c) out[c] = fmin(fmax(out[c], 0), 1);
+}
+
+/* SMPTE ST 2084 and ITU-R BT.2100, table 5 */
+static inline double reference_pq(double cd)
+{
+    const double m1 = 2610.0 / 16384, m2 = 2523.0 / 4096 * 128, c1 = 3424.0 / 4096, c2 = 2413.0 / 4096 * 32,
+                 c3 = 2392.0 / 4096 * 32;
+    double y = pow(cd / 10000, m1);
+    return pow((c1 + c2 * y) / (1 + c3 * y), m2);
+}
+
+static inline double reference_hlg(double scene)
+{
+    const double a = 0.17883277, b = 1 - 4 * a, c = 0.5 - a * log(4 * a);
+    return scene <= 1.0 / 12 ? sqrt(3 * scene) : a * log(12 * scene - b) + c;
+}
+
 /* ---- colour as the thesis has it: RGB -> XYZ -> Lab -> La'b -> XYZ -> Yxy -> Y'xy -> XYZ -> RGB (section A.5.3) */
 
 static inline double reference_rho(double lux)

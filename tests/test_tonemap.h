@@ -76,6 +76,8 @@ static tonemap_options local_options(void)
     return o;
 }
 
+static double code_of(float linear) { return metrics_code((double)linear); }
+
 /* ---- arguments */
 
 TEST(defaults_are_as_written)
@@ -108,7 +110,7 @@ TEST(bad_options_are_refused)
     const double bad[4] = {(double)NAN, (double)INFINITY, -1, 1e31};
     tonemap_options o;
     int i;
-    o = good, o.operation = (tonemap_operator)(TONEMAP_GUIDED + 1), refuses(&o);
+    o = good, o.operation = (tonemap_operator)(TONEMAP_HABLE + 1), refuses(&o);
     o = good, o.mesopic = (tonemap_mesopic)3, refuses(&o);
     o = good, o.scales = 0, refuses(&o);
     o = good, o.scales = 9, refuses(&o);
@@ -334,6 +336,35 @@ TEST(guided_operator_is_he_2013)
     check_guided(97, 66, 0.05);
     check_guided(61, 190, 3);
 }
+/* Steps of 10:1 to 10000:1: how many codes the sides leave their plateaus by. */
+TEST(guided_operator_has_no_halos)
+{
+    enum { W = 160, H = 60 };
+    float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    double contrast;
+    for (contrast = 10; contrast <= 10001; contrast *= 10) {
+        double halo[2] = {0, 0};
+        int k, i;
+        for (k = 0; k < 2; ++k) {
+            tonemap_options o = local_options();
+            shot s;
+            if (k) o.operation = TONEMAP_GUIDED;
+            for (i = 0; i < W * H * 3; ++i) pixels[i] = i / 3 % W < W / 2 ? 1.0f : (float)contrast;
+            o.metering = TONEMAP_METERING_LOG_AVERAGE;
+            s = shoot(&view, &o);
+            for (i = 21; i < W - 21; ++i)
+                halo[k] = fmax(halo[k], fabs(code_of(s.f32[3 * (30 * W + i)]) -
+                                             code_of(s.f32[3 * (30 * W + (i < W / 2 ? 22 : W - 23))])));
+            shot_free(&s);
+        }
+        EXPECT(halo[1] <= 8 && (contrast > 1001 || halo[1] < 0.5 * halo[0]));
+        REPORT("halo of the search", halo[0], "codes");
+        REPORT("halo of the guided filter", halo[1], "codes");
+    }
+    free(pixels);
+}
+
 TEST(guided_operator_on_small_and_thin_pictures)
 {
     int sizes[][2] = {{1, 1}, {1, 40}, {40, 1}, {7, 5}, {20, 20}, {21, 21}, {22, 64}, {25, 129}, {10, 300}, {300, 11}},
@@ -400,6 +431,70 @@ TEST(vector_and_plain_code_give_the_same_bits)
     free(local);
     free(pixels);
 }
+
+/* One pixel is fewer than a vector: the guided filter and the colours, in ones and in rows. */
+TEST(vector_and_plain_colours_give_the_same_bits)
+{
+    enum { W = 61, H = 40 };
+    float *pixels = room_pixels(W, H, 3), gain[W], rho[W];
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    unsigned char *out = (unsigned char *)malloc(W * H * 3);
+    uint32_t a[2][W], b[2][W];
+    float local[2][W];
+    int kind, x, y, differ = 0;
+    for (kind = 0; kind < 4; ++kind) {
+        tonemap_options o = tonemap_defaults();
+        tonemap *map = NULL;
+        if (kind) o.primaries = TONEMAP_PRIMARIES_2020, o.balance_red = 1.3;
+        if (kind == 2) o.gamut = -1, o.peak = 3;
+        if (kind == 3) o.operation = TONEMAP_NEUTRAL;
+        EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
+        EXPECT_EQ(tonemap_apply_u8(map, out, W * 3, &view, 0, NULL), SAT_OK);
+        for (y = 0; y < H; ++y) {
+            const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
+            tonemap__shading shading;
+            tonemap__planes v[2];
+            tonemap__worker *w = &map->worker[0];
+            uint32_t *sum = tonemap__guided_ring(map, w, 3, 0), *square = tonemap__guided_ring(map, w, 3, 1);
+            float inverse = 1 / 441.0f, steps[W];
+            memset(&shading, 0, sizeof shading);
+            memset(v, 0, sizeof v);
+            shading.pixels = pixels + 3 * y * W;
+            shading.luminance = luminance;
+            shading.gain = gain;
+            shading.rho = kind == 1 ? rho : NULL;
+            shading.colours = &map->colours;
+            shading.channels = 3;
+            shading.floor = kind == 1 ? TONEMAP__CODE_FLOOR : 0;
+            shading.most = kind == 3 ? 1e9f : 1;
+            shading.gamut = kind == 3 ? -1 : map->frame.gamut;
+            for (x = 0; x < W; ++x) {
+                gain[x] = 0.1f + (float)(x % 7);
+                rho[x] = (float)(x % 5) / 4;
+                steps[x] = (float)(x * y % 1153);
+            }
+            tonemap__shade_plain(v[0], &shading, 0, tonemap__shade_vector(v[0], &shading, 0, W), W);
+            tonemap__shade_plain(v[1], &shading, 0, 0, W);
+            differ += memcmp(v[0], v[1], sizeof v[0]) != 0;
+            for (x = -TONEMAP__RADIUS; x < W + TONEMAP__RADIUS + 1; ++x) {
+                sum[x] = (uint32_t)(x + 10) * 5000u;
+                square[x] = (uint32_t)(x + 10) * 3000000u + (uint32_t)(x * x * 70 * y);
+            }
+            tonemap__guided_fit(a[0], b[0], sum, square, 0, W, inverse, map->frame.edge2);
+            tonemap__guided_local(local[0], steps, sum, square, 0, W, inverse * 1e-3f);
+            for (x = 0; x < W; ++x) {
+                tonemap__guided_fit(a[1], b[1], sum, square, x, x + 1, inverse, map->frame.edge2);
+                tonemap__guided_local(local[1], steps, sum, square, x, x + 1, inverse * 1e-3f);
+            }
+            differ += memcmp(a[0], a[1], sizeof a[0]) != 0 || memcmp(b[0], b[1], sizeof b[0]) != 0;
+            differ += memcmp(local[0], local[1], sizeof local[0]) != 0;
+        }
+        tonemap_destroy(map);
+    }
+    EXPECT_EQ(differ, 0);
+    free(out);
+    free(pixels);
+}
 #endif
 
 TEST(same_bits_for_any_number_of_workers)
@@ -407,14 +502,19 @@ TEST(same_bits_for_any_number_of_workers)
     enum { W = 171, H = 300 };
     float *pixels = room_pixels(W, H, 4);
     sat_image view = sat_image_f32(pixels, W, H, 3);
+    float *mask = (float *)malloc(W * H * sizeof(float));
     int counts[] = {1, 2, 3, 7}, kind, i;
-    for (kind = 0; kind < 5; ++kind) {
+    support_fill(mask, W * H, 0, 1, 9);
+    pixels[3 * (W * 77 + 50)] = NAN;
+    for (kind = 0; kind < 7; ++kind) {
         tonemap_options o = local_options();
         uint64_t hash = 0;
         if (kind == 1) o.mesopic = TONEMAP_MESOPIC_UNIFORM;
         if (kind == 2) o.operation = TONEMAP_ASHIKHMIN;
         if (kind == 3) o.selective = 0.1, o.mesopic = TONEMAP_MESOPIC_LOCAL;
         if (kind == 4) o.soft = 1, o.key = 0, o.white = 0;
+        if (kind > 4) o = tonemap_defaults();
+        if (kind == 6) o.meter_weights = mask, o.dither = 1, o.encoding = TONEMAP_ENCODING_PQ, o.peak = 2;
         for (i = 0; i < 8; ++i) {
             shot s;
             o.threads = i < 4 ? support_threads(counts[i]) : support_odd_threads(counts[i - 4]);
@@ -425,6 +525,7 @@ TEST(same_bits_for_any_number_of_workers)
         }
     }
     free(pixels);
+    free(mask);
 }
 
 TEST(units_that_are_powers_of_two_change_no_bit)
@@ -433,7 +534,7 @@ TEST(units_that_are_powers_of_two_change_no_bit)
     float *pixels = hdr_pixels(W, H, 3, 6), *scaled = (float *)malloc(N * sizeof(float));
     sat_image view = sat_image_f32(scaled, W, H, 3);
     int operation, k, i;
-    for (operation = 0; operation < 5; ++operation) {
+    for (operation = 0; operation <= TONEMAP_HABLE; ++operation) {
         uint64_t hash = 0;
         for (k = -20; k <= 20; k += 5) {
             tonemap_options o = local_options();
@@ -476,10 +577,11 @@ TEST(a_bad_pixel_stays_in_its_window)
     float *pixels = room_pixels(W, H, 8), *centre = pixels + 3 * (H / 2 * W + W / 2);
     sat_image view = sat_image_f32(pixels, W, H, 3);
     int operation, i, c;
-    for (operation = 0; operation < 4; ++operation) {
+    for (operation = 0; operation < 5; ++operation) {
         tonemap_options o = local_options();
         shot clean;
         o.operation = (tonemap_operator)operation;
+        if (operation == 4) o = tonemap_defaults();
         centre[0] = centre[1] = centre[2] = 0;
         clean = shoot(&view, &o);
         for (i = 0; i < 6; ++i) {
@@ -519,12 +621,15 @@ TEST(any_bits_give_values_from_0_to_1)
         sat_image view = sat_image_f32(pixels, W, H, round % 3 == 0 ? 1 : round % 3 == 1 ? 3 : 4);
         shot s;
         for (i = 0; i < N; ++i) pixels[i] = sat__float_from_bits((uint32_t)support_random(&seed));
-        o.operation = (tonemap_operator)(round % 5);
+        o.operation = (tonemap_operator)(round % (TONEMAP_HABLE + 1));
         o.mesopic = (tonemap_mesopic)(round / 5 % 3);
         o.soft = round & 1;
         o.selective = round & 4;
         o.key = round & 8 ? 0.18 : 0;
         o.white = round & 16 ? 0 : (double)INFINITY;
+        o.display = (tonemap_primaries)(round % 3);
+        o.encoding = (tonemap_encoding)(round / 7 % 4);
+        o.dither = round / 3 & 1;
         s = shoot(&view, &o);
         for (i = 0; i < W * H * view.channels; ++i) bad += !(s.f32[i] >= 0 && s.f32[i] <= 1);
         EXPECT(s.stats.nan > 0 && s.stats.negative > 0);
@@ -705,7 +810,6 @@ TEST(codes_are_srgb)
 
 /* ---- leaving out searches */
 
-static double code_of(float linear) { return metrics_code((double)linear); }
 
 /* Michael 2010, section 4.4: where the Sobel gradient is small La is the pixel itself. */
 TEST(selective_searches_only_edges)
@@ -1106,7 +1210,8 @@ static void flicker(double soft, double *rms, double *largest)
         else noisy[i] = noisy[i - i % 3] * pixels[i] ;
         if (i % 3 == 2) noisy[i - 2] *= pixels[i - 2];
     }
-    o.soft = soft;
+    o.soft = soft < 0 ? 0 : soft;
+    if (soft < 0) o.operation = TONEMAP_GUIDED;
     o.metering = TONEMAP_METERING_LOG_AVERAGE; /* which moves with the noise */
     o.gamut = -1; /* about the scales alone: what is clipped does not flicker */
     s = shoot(&view, &o);
@@ -1128,7 +1233,11 @@ static void flicker(double soft, double *rms, double *largest)
 
 TEST(soft_scales_flicker_less)
 {
-    double hard[2], soft[2];
+    double hard[2], soft[2], guided[2];
+    flicker(-1, &guided[0], &guided[1]);
+    REPORT("guided operator under 0.5 % noise, RMS", guided[0], "codes");
+    REPORT("guided operator under 0.5 % noise, largest", guided[1], "codes");
+    EXPECT(guided[0] <= 0.3 && guided[1] < 1);
     flicker(0, &hard[0], &hard[1]);
     flicker(1, &soft[0], &soft[1]);
     REPORT("hard scales under 0.5 % noise, RMS", hard[0], "codes");
@@ -1274,6 +1383,287 @@ TEST(no_black_ring_round_a_lamp)
     shot_free(&s);
     free(flat);
     free(pixels);
+}
+
+/* ---- curves, displays, colours */
+
+/* Light from 2^-14 to 2^10 in strong colours, exposed by 1. */
+static float *curve_pixels(int n, uint64_t seed)
+{
+    float *p = (float *)malloc((size_t)n * 3 * sizeof(float));
+    int i, c;
+    for (i = 0; i < n; ++i) {
+        double light = exp2(-14 + 24 * support_uniform(&seed));
+        for (c = 0; c < 3; ++c) p[3 * i + c] = (float)(light * pow(support_uniform(&seed), 3));
+    }
+    return p;
+}
+
+TEST(curves_are_as_published)
+{
+    enum { W = 80, H = 50 };
+    float *pixels = curve_pixels(W * H, 3);
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    int curve, i, c, k;
+    for (curve = 0; curve < 4; ++curve) {
+        tonemap_options o = tonemap_defaults();
+        double worst = 0, largest = 0;
+        shot s;
+        o.operation = (tonemap_operator)(TONEMAP_NEUTRAL + curve);
+        o.exposure = 1;
+        s = shoot(&view, &o);
+        for (i = 0; i < W * H; ++i) {
+            double in[3], out[3];
+            for (c = 0; c < 3; ++c) in[c] = (double)pixels[3 * i + c];
+            reference_curve(out, in, curve);
+            for (c = 0; c < 3; ++c) {
+                worst = fmax(worst, fabs(out[c] - (double)s.f32[3 * i + c]));
+                largest = fmax(largest, out[c]);
+                k = (int)(metrics_code(out[c]) + 0.5);
+                EXPECT(abs(k - (int)s.u8[3 * i + c]) <= 1);
+            }
+        }
+        EXPECT(worst < 1e-4 && largest > 0.95);
+        shot_free(&s);
+    }
+    free(pixels);
+}
+
+/* Ld = L / (1 + L / peak) in units of paper, white at the peak; bytes have 255 there. */
+TEST(a_bright_display_compresses_less)
+{
+    enum { W = 64, H = 4 };
+    float pixels[W * H * 3];
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    int i, k;
+    for (i = 0; i < W * H * 3; ++i) pixels[i] = (float)exp2(i / 3 % W / 4.0 - 8);
+    o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
+    o.exposure = 1;
+    o.peak = 4;
+    for (k = 0; k < 2; ++k) {
+        shot s;
+        o.white = k ? 100 : (double)INFINITY;
+        s = shoot(&view, &o);
+        for (i = 0; i < W * H * 3; i += 5) {
+            double l = (double)pixels[i], ld = fmin(l * (k ? 1 + l * 4 / 1e4 : 1) / (1 + l / 4), 4);
+            EXPECT_REL(s.f32[i], ld, 1e-5);
+            EXPECT_NEAR(s.u8[i], metrics_code(ld / 4), 1);
+        }
+        shot_free(&s);
+    }
+    /* colours keep their hue up to the peak */
+    for (i = 0; i < W * H * 3; ++i) pixels[i] = i % 3 ? 0.1f : 1e4f;
+    {
+        shot s;
+        o.operation = TONEMAP_GUIDED;
+        s = shoot(&view, &o);
+        EXPECT_NEAR(s.f32[0], 4, 1e-5);
+        EXPECT(s.f32[1] < 4 && s.f32[1] >= 0);
+        shot_free(&s);
+    }
+}
+
+TEST(pq_and_hlg_are_their_standards)
+{
+    enum { W = 64, H = 2 };
+    float pixels[W * H * 3];
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    shot s, linear;
+    int i, c;
+    double cd, pq_white, hlg_white;
+    for (cd = 1e-3; cd <= 1e4; cd *= 1.3) EXPECT_NEAR(tonemap__pq((float)cd), reference_pq(cd), 3e-4);
+    for (cd = 1e-5; cd <= 1; cd *= 1.3) EXPECT_NEAR(tonemap__hlg((float)cd), reference_hlg(cd), 1e-5);
+    EXPECT_NEAR(tonemap__pq(0), 0, 1e-6);
+    EXPECT_NEAR(tonemap__hlg(1), 1, 1e-5);
+    for (i = 0; i < W * H; ++i)
+        for (c = 0; c < 3; ++c) pixels[3 * i + c] = (float)exp2(i % W / 6.0 - 6) * (c == 1 ? 1 : c ? 0.5f : 0.8f);
+    o.operation = TONEMAP_LINEAR;
+    o.white = (double)INFINITY;
+    o.exposure = 1;
+    o.peak = 1000 / 203.0;
+    linear = shoot(&view, &o);
+    o.encoding = TONEMAP_ENCODING_PQ;
+    s = shoot(&view, &o);
+    for (i = 0; i < W * H * 3; ++i) EXPECT_NEAR(s.f32[i], reference_pq(203 * (double)linear.f32[i]), 3e-4);
+    shot_free(&s);
+    o.encoding = TONEMAP_ENCODING_HLG;
+    s = shoot(&view, &o);
+    for (i = 0; i < W * H; ++i) {
+        double y = 0;
+        const double luma[3] = {0.2126, 0.7152, 0.0722};
+        for (c = 0; c < 3; ++c) y += luma[c] * (double)linear.f32[3 * i + c] * 0.203;
+        for (c = 0; c < 3; ++c)
+            EXPECT_NEAR(s.f32[3 * i + c],
+                        reference_hlg(fmin((double)linear.f32[3 * i + c] * 0.203 * pow(y, 1 / 1.2 - 1), 1)), 1e-3);
+    }
+    shot_free(&s);
+    shot_free(&linear);
+    /* ITU-R BT.2408: paper is 58 % of PQ and 75 % of HLG on a display of 1000 cd/m2 */
+    for (i = 0; i < W * H * 3; ++i) pixels[i] = 1;
+    s = shoot(&view, &o);
+    hlg_white = (double)s.f32[0];
+    shot_free(&s);
+    o.encoding = TONEMAP_ENCODING_PQ;
+    s = shoot(&view, &o);
+    pq_white = (double)s.f32[0];
+    shot_free(&s);
+    EXPECT_NEAR(hlg_white, 0.75, 0.005);
+    EXPECT_NEAR(pq_white, 0.58, 0.005);
+}
+
+TEST(primaries_are_converted_and_fade_into_the_display)
+{
+    /* ITU-R BT.2087, table 2: Rec. 709 in Rec. 2020 */
+    static const double published[9] = {0.6274, 0.3293, 0.0433, 0.0691, 0.9195, 0.0114, 0.0164, 0.0880, 0.8956};
+    enum { W = 40, H = 30 };
+    float *pixels = room_pixels(W, H, 5), *wide = (float *)malloc(W * H * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3), other = sat_image_f32(wide, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    tonemap *map = NULL;
+    shot s, t;
+    int i, c, worst = 0, p;
+    o.display = TONEMAP_PRIMARIES_2020;
+    EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
+    for (i = 0; i < 9; ++i) EXPECT_NEAR(map->colours.mix[i], published[i], 1e-4);
+    tonemap_destroy(map);
+    /* the same picture given in Rec. 2020 */
+    for (i = 0; i < W * H; ++i)
+        for (c = 0; c < 3; ++c)
+            wide[3 * i + c] =
+                (float)(published[3 * c] * (double)pixels[3 * i] + published[3 * c + 1] * (double)pixels[3 * i + 1] +
+                        published[3 * c + 2] * (double)pixels[3 * i + 2]);
+    o = tonemap_defaults();
+    s = shoot(&view, &o);
+    o.primaries = TONEMAP_PRIMARIES_2020;
+    t = shoot(&other, &o);
+    for (i = 0; i < W * H * 3; ++i)
+        worst = abs((int)s.u8[i] - (int)t.u8[i]) > worst ? abs((int)s.u8[i] - (int)t.u8[i]) : worst;
+    EXPECT(worst <= 2);
+    shot_free(&s);
+    shot_free(&t);
+    /* pure colours of Rec. 2020 on the others: luminance and hue stay, nothing is negative; grey is grey */
+    for (p = 0; p < 2; ++p)
+        for (c = 0; c < 3; ++c) {
+            float colour[4 * 3];
+            sat_image little = sat_image_f32(colour, 4, 1, 3);
+            for (i = 0; i < 12; ++i) colour[i] = i < 6 ? 0.3f : i % 3 == c ? 0.4f : 0;
+            o.operation = TONEMAP_LINEAR;
+            o.exposure = 1;
+            o.white = (double)INFINITY;
+            o.display = (tonemap_primaries)p;
+            s = shoot(&little, &o);
+            for (i = 0; i < 6; ++i) EXPECT_REL(s.f32[i], 0.3, 1e-5);
+            for (i = 9; i < 12; ++i) EXPECT(s.f32[i] >= 0 && (i % 3 == c || s.f32[i] < s.f32[9 + c]));
+            EXPECT(s.f32[9 + (c + 1) % 3] < 1e-6f || s.f32[9 + (c + 2) % 3] < 1e-6f);
+            shot_free(&s);
+        }
+    free(pixels);
+    free(wide);
+}
+
+TEST(white_balance_undoes_a_cast)
+{
+    enum { W = 70, H = 60 };
+    float *pixels = room_pixels(W, H, 6), *cast = (float *)malloc(W * H * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3), other = sat_image_f32(cast, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    int i, worst = 0;
+    shot s = shoot(&view, &o), t;
+    for (i = 0; i < W * H * 3; ++i) cast[i] = pixels[i] * (i % 3 == 0 ? 2.0f : i % 3 == 1 ? 1.0f : 0.25f);
+    o.balance_red = 0.5;
+    o.balance_blue = 4;
+    t = shoot(&other, &o);
+    for (i = 0; i < W * H * 3; ++i)
+        worst = abs((int)s.u8[i] - (int)t.u8[i]) > worst ? abs((int)s.u8[i] - (int)t.u8[i]) : worst;
+    EXPECT(worst <= 1);
+    EXPECT_REL(t.stats.adapted, s.stats.adapted, 1e-6);
+    shot_free(&s);
+    shot_free(&t);
+    free(pixels);
+    free(cast);
+}
+
+/* A gradient of 10 % over 1024 pixels: without dithering a band of 257 pixels; with it the means of 8 x 8 pixels are
+   those of the codes before rounding. */
+TEST(dithering_leaves_no_bands)
+{
+    enum { W = 1024, H = 8 };
+    float *pixels = (float *)malloc(W * H * 3 * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    double error[2] = {0, 0};
+    int i, k, x, y;
+    for (i = 0; i < W * H * 3; ++i) pixels[i] = 0.2f * (1 + 0.1f * (float)(i / 3 % W) / W);
+    o.operation = TONEMAP_LINEAR;
+    o.exposure = 1;
+    o.white = (double)INFINITY;
+    for (k = 0; k < 2; ++k) {
+        shot s;
+        o.dither = k;
+        s = shoot(&view, &o);
+        for (x = 0; x < W; x += 8) {
+            double sum = 0, wanted = 0;
+            for (i = x; i < x + 8; ++i)
+                for (y = 0; y < H; ++y) {
+                    sum += s.u8[3 * (y * W + i) + 1];
+                    wanted += metrics_code((double)pixels[3 * (y * W + i) + 1]);
+                    EXPECT(fabs((double)s.u8[3 * (y * W + i) + 1] -
+                                metrics_code((double)pixels[3 * (y * W + i) + 1])) <= 1.01);
+                }
+            error[k] += (sum - wanted) / 64 * ((sum - wanted) / 64) / (W / 8);
+        }
+        shot_free(&s);
+    }
+    REPORT("banding: error of 8 x 8 means without dithering", sqrt(error[0]), "codes");
+    REPORT("banding: error of 8 x 8 means with dithering", sqrt(error[1]), "codes");
+    EXPECT(sqrt(error[0]) > 0.2 && sqrt(error[1]) <= 0.02);
+    for (i = 0; i < W * H * 3; ++i) pixels[i] = i / 3 < W ? 0.0f : 10.0f; /* black is 0 and white 255 everywhere */
+    {
+        shot s = shoot(&view, &o);
+        for (i = 0; i < W * H * 3; ++i) EXPECT_EQ(s.u8[i], i / 3 < W ? 0 : 255);
+        shot_free(&s);
+    }
+    free(pixels);
+}
+
+/* What the mask leaves out is not metered, and what it takes is as if it were all. */
+TEST(a_mask_says_what_is_metered)
+{
+    enum { W = 90, H = 64 };
+    float *pixels = room_pixels(W, H, 12), *mask = (float *)malloc(W * H * sizeof(float));
+    sat_image view = sat_image_f32(pixels, W, H, 3), part = sat_image_f32(pixels, W, H / 2, 3);
+    int i, metering;
+    for (metering = 0; metering < 2; ++metering) {
+        tonemap_options o = tonemap_defaults();
+        shot half, masked, all;
+        o.metering = (tonemap_metering)metering;
+        o.key = 0;
+        half = shoot(&part, &o);
+        all = shoot(&view, &o);
+        o.meter_weights = mask;
+        for (i = 0; i < W * H; ++i) mask[i] = i < W * H / 2 ? 1 : i % 3 ? 0 : NAN;
+        masked = shoot(&view, &o);
+        EXPECT_REL(masked.stats.adapted, half.stats.adapted, 1e-9);
+        EXPECT_REL(masked.stats.key, half.stats.key, 1e-9);
+        EXPECT_REL(masked.stats.white, half.stats.white, 1e-9);
+        EXPECT(fabs(all.stats.adapted - half.stats.adapted) > 0.01 * half.stats.adapted);
+        EXPECT(memcmp(masked.u8, half.u8, W * 10 * 3) == 0);
+        shot_free(&masked);
+        for (i = 0; i < W * H; ++i) mask[i] = 1;
+        masked = shoot(&view, &o);
+        EXPECT(memcmp(masked.u8, all.u8, W * H * 3) == 0);
+        shot_free(&masked);
+        for (i = 0; i < W * H; ++i) mask[i] = 0; /* nothing to meter: as a black picture */
+        masked = shoot(&view, &o);
+        EXPECT(masked.stats.positive > 0 && isfinite(masked.stats.adapted));
+        shot_free(&masked);
+        shot_free(&half);
+        shot_free(&all);
+    }
+    free(pixels);
+    free(mask);
 }
 
 /* Nothing that is no part of the scene moves the exposure. */

@@ -90,6 +90,12 @@ static void compare(screen *s, const tonemap_options *options, int width, int he
     int largest = 0;
     EXPECT_EQ(tonemap_create(&map, width, height, options), SAT_OK);
     EXPECT_EQ(tonemap_apply_u8(map, cpu, (ptrdiff_t)width * 4, &view, 0, NULL), SAT_OK);
+    if (options && options->encoding != TONEMAP_ENCODING_AUTO) { /* bytes are sRGB on the CPU */
+        float *codes = (float *)malloc(n * sizeof(float));
+        EXPECT_EQ(tonemap_apply_f32(map, codes, (ptrdiff_t)width * 16, &view, 0, NULL), SAT_OK);
+        for (i = 0; i < n; ++i) cpu[i] = (unsigned char)(codes[i] < 1 ? codes[i] * 255 + 0.5f : 255);
+        free(codes);
+    }
     if (!EXPECT_EQ(tonemap_gl_create(&gl, s->context.get_proc, width, height, options), SAT_OK))
         puts(tonemap_gl_message(gl));
     EXPECT_EQ(tonemap_gl_apply(gl, ldr, hdr, 0), SAT_OK);
@@ -157,6 +163,38 @@ TEST(gl_gives_the_cpus_picture)
     compare(&s, &o, 100, 90, 0, 0.001, "Ashikhmin global");
     o = local_options(), o.operation = TONEMAP_LINEAR, o.white = 2;
     compare(&s, &o, 100, 90, 0, 0, "linear");
+    screen_close(&s);
+}
+
+TEST(gl_has_the_cpus_curves_and_colours)
+{
+    const char *names[4] = {"Neutral", "AgX", "ACES", "Hable"};
+    screen s;
+    tonemap_options o = tonemap_defaults();
+    float mask[100 * 90];
+    int i;
+    if (!screen_open(&s)) return;
+    for (i = 0; i < 4; ++i) {
+        o.operation = (tonemap_operator)(TONEMAP_NEUTRAL + i);
+        compare(&s, &o, 100, 90, 1, 0.001, names[i]);
+    }
+    o = tonemap_defaults(), o.peak = 4;
+    compare(&s, &o, 100, 90, 1, 0.001, "a peak of 4");
+    o.white = 30, o.encoding = TONEMAP_ENCODING_PQ;
+    compare(&s, &o, 100, 90, 1, 0.001, "PQ");
+    o.encoding = TONEMAP_ENCODING_HLG, o.white_cd = 300;
+    compare(&s, &o, 100, 90, 1, 0.001, "HLG");
+    o = tonemap_defaults(), o.primaries = TONEMAP_PRIMARIES_2020, o.mesopic = TONEMAP_MESOPIC_LOCAL;
+    compare(&s, &o, 100, 90, 1, 0.001, "Rec. 2020 to Rec. 709");
+    o.primaries = TONEMAP_PRIMARIES_709, o.display = TONEMAP_PRIMARIES_P3, o.balance_blue = 1.5;
+    compare(&s, &o, 100, 90, 1, 0.001, "to P3, warmer");
+    o = tonemap_defaults(), o.dither = 1;
+    compare(&s, &o, 100, 90, 1, 0.001, "dithered");
+    for (i = 0; i < 9000; ++i) mask[i] = (float)(i % 100) / 99;
+    o = tonemap_defaults(), o.meter_weights = mask;
+    compare(&s, &o, 100, 90, 1, 0.001, "a mask");
+    o.metering = TONEMAP_METERING_LOG_AVERAGE, o.white = 3;
+    compare(&s, &o, 100, 90, 1, 0.001, "a mask and the log-average");
     screen_close(&s);
 }
 
