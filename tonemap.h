@@ -3388,7 +3388,10 @@ static inline sat_result tonemap__gl_make_mask(tonemap_gl *g)
     float *weights = n > SIZE_MAX / sizeof(float) ? NULL : (float *)sat__alloc(&g->allocator, n * sizeof(float));
     sat_result r;
     if (!weights) return SAT_ERR_MEMORY;
-    for (i = 0; i < n; i++) weights[i] = (float)tonemap__mask_weight(g->options.meter_weights[i]);
+    for (i = 0; i < n; i++) {
+        uint32_t weight = tonemap__mask_weight(g->options.meter_weights[i]);
+        weights[i] = (float)weight;
+    }
     r = sat__gl_texture(&g->gl, &g->mask, SAT__GL_R32F, g->width, g->height, weights);
     sat__release(&g->allocator, weights, n * sizeof(float));
     return r;
