@@ -136,8 +136,8 @@ typedef enum softassign_method {
     SOFTASSIGN_AUTO,        /* the optimum: a given matrix densely (wide ones whose rows compete: on lists), others as
                                SOFTASSIGN_EXACT above 100 000 cells */
     SOFTASSIGN_EXACT,       /* the optimum: softassign prices on lists, shortest augmenting paths, finish */
-    SOFTASSIGN_FAST,        /* auction on lists; certified to options.gap. Capacities other than 1: SOFTASSIGN_EXACT,
-                               and stats.method says so */
+    SOFTASSIGN_FAST,        /* auction on lists; certified to options.gap. With minimum_use, and where the auction
+                               does not get there: SOFTASSIGN_EXACT, and stats.method says so */
     SOFTASSIGN_ENTROPIC,    /* softassign with inequality columns over the whole matrix, rounded by paths */
     SOFTASSIGN_PUBLISHED,   /* Slomp 2012, section 3.6, as printed */
     SOFTASSIGN_GREEDY,      /* Slomp 2012, section 3.4.2 */
@@ -499,6 +499,7 @@ struct softassign {
     unsigned char *stale;  /* per row: its list is to be made (anew) */
 
     double *distance, *row_distance; /* path search: per slot, per row */
+    double *bid;           /* auction: what the row pays for its place */
     double *dense_price, *closed_distance; /* the same on the matrix: prices of open slots, distances of closed ones */
     int *parent, *stamp, *row_stamp, *touched, *closed, *heap, *heap_at;
     float *parent_cost;
@@ -1494,7 +1495,8 @@ static void softassign__certify(softassign *s)
 
 /* ------------------------------------------------------------------------------------------------
    Auction on lists (Bertsekas 1988): every row bids for its best slot and pays down to its second best, less eps.
-   A slot that fell below its top price stays taken, so the bound loses at most eps a row. Capacities of 1 only.
+   The places of a slot are alike: one that is full has the price of its cheapest place, which the next bidder takes
+   over (Bertsekas and Castanon 1989); one with room has its top price. So the bound loses at most eps a row.
    ------------------------------------------------------------------------------------------------ */
 
 /* Best slot of a row and the value of its second best, which the limit of the list may stand for. */
@@ -1523,6 +1525,15 @@ static int softassign__best_two(softassign *s, int row, double *best, double *se
     return entry;
 }
 
+/* The row with the cheapest place of a slot. */
+static int softassign__cheapest_place(const softassign *s, int slot)
+{
+    int row = s->first_row[slot], best = row;
+    for (; row >= 0; row = s->next_row[row])
+        if (s->bid[row] > s->bid[best]) best = row;
+    return best;
+}
+
 /* Bids until every row has a slot; 0 when the budget ran out first or a row has no choice at all. */
 static int softassign__auction(softassign *s, double eps, size_t budget)
 {
@@ -1539,13 +1550,15 @@ static int softassign__auction(softassign *s, double eps, size_t budget)
         if (!(second < (double)SOFTASSIGN__INFINITY)) second = best;
         at = (size_t)row * (size_t)s->list + (size_t)entry;
         slot = s->list_slot[at];
-        out = s->first_row[slot];
+        out = softassign__is_free(s, slot) ? -1 : softassign__cheapest_place(s, slot);
         if (out >= 0) {
             softassign__unassign(s, out);
             stack[size++] = out;
         }
         softassign__assign(s, row, slot, s->list_cost[at]);
-        softassign__set_price(s, slot, s->price[slot] - (second - best) - eps);
+        s->bid[row] = s->price[slot] - (second - best) - eps;
+        if (!softassign__is_free(s, slot))
+            softassign__set_price(s, slot, s->bid[softassign__cheapest_place(s, slot)]);
         s->stats.iterations++;
         s->stats.work++;
     }
@@ -2239,6 +2252,7 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->top = (double *)sat__carve(a, seats, sizeof(double));
     s->distance = (double *)sat__carve(a, seats > 2 * (size_t)workers ? seats : 2 * (size_t)workers, sizeof(double));
     s->row_distance = (double *)sat__carve(a, rows, sizeof(double));
+    s->bid = (double *)sat__carve(a, rows, sizeof(double));
     s->dense_price = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
     s->closed_distance = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
     s->list_limit = (double *)sat__carve(a, rows, sizeof(double));
@@ -3570,7 +3584,7 @@ static sat_result softassign__solve_fast(softassign *s)
 {
     double scale, eps;
     int turn, done = 0;
-    if (!s->unit_capacities) return softassign__solve_exact(s);
+    if (s->slot_count > s->columns) return softassign__solve_exact(s); /* bids for a minimum use climb in small steps */
     softassign__list_all(s);
     scale = softassign__mean_least(s);
     eps = 1.6 * fmin(s->options.gap, 1) * scale; /* measured: the certified gap is 0.37 to 0.6 eps */
@@ -3694,7 +3708,7 @@ static sat_result softassign__solve_heuristic(softassign *s)
 
 #if !defined(SOFTASSIGN_NO_HEURISTICS) || !defined(SOFTASSIGN_NO_MATRIX)
 
-/* A bound for the methods that have no prices: from the auction, or from the optimum where slots hold more than one. */
+/* A bound for the methods that have no prices, from the auction. */
 static sat_result softassign__buy_bound(softassign *s)
 {
     double before = s->bound;
@@ -3705,12 +3719,7 @@ static sat_result softassign__buy_bound(softassign *s)
     softassign__keep_best(s, s->kept);
     softassign__reset_assignment(s);
     softassign__reset_prices(s);
-    if (s->unit_capacities) result = softassign__solve_fast(s);
-    else {
-        s->phase = SOFTASSIGN__LISTS;
-        s->next = 0;
-        result = softassign__solve_exact(s);
-    }
+    result = softassign__solve_fast(s);
     s->options.progress = progress;
     if (before > s->bound) s->bound = before;
     s->excess = -1; /* the proof was about the optimum */
