@@ -7,17 +7,8 @@
 #include "../softassign.h"
 #include "png.h"
 
-enum {
-    GRID = 32,
-    SHEET = 64,
-    TILE = 12,
-    SIDE = GRID * TILE,
-    WIDE = SHEET * TILE,
-    CELLS = GRID * GRID,
-    TILES = SHEET * SHEET,
-    PARTS = 2,
-    FEATURES = PARTS * PARTS * 3
-};
+enum { GRID = 32, SHEET = 64, TILE = 12, SIDE = GRID * TILE, WIDE = SHEET * TILE };
+enum { CELLS = GRID * GRID, TILES = SHEET * SHEET, PARTS = 2, FEATURES = PARTS * PARTS * 3 };
 static unsigned char target[3 * SIDE * SIDE], other[3 * WIDE * WIDE], mosaic[3 * SIDE * SIDE];
 static float wanted[CELLS * FEATURES], offered[TILES * FEATURES];
 static int tile_of_cell[CELLS];

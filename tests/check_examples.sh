@@ -108,6 +108,21 @@ check_words() {
     run 1 "has no triangles" ssao empty.obj o.png
     run 1 "tiles/no.png: cannot be opened" photomosaic --grid 2x2 --tiles tiles/no.png
     run 2 "is one of the files that are read" photomosaic --grid 2x2 --tiles tiles --out tiles/a.png
+    # tiles of a folder: what cannot be read is counted, an index gives the same mosaic without opening them, and is no other file
+    mkdir -p "$ground/album/deep"
+    (cd "$ground" && cp in.pfm album/a.pfm && cp in.hdr album/deep/b.hdr && ln -sfn ../album album/again)
+    run 0 "" photomosaic --grid 1x2 --tile 8 --tiles album --index tiles.index --out first.png
+    run 0 "" photomosaic --grid 1x2 --tile 8 --tiles album --index tiles.index --stats --out second.png
+    if cmp -s "$ground/first.png" "$ground/second.png" && grep -q '^2 tiles, 2 of them from the index' "$ground/stdout"; then pass; else fail "an index changes the mosaic" "$(cat "$ground/stdout")"; fi
+    truncate -s -100 "$ground/tiles.index"
+    run 0 "" photomosaic --grid 1x2 --tile 8 --tiles album --index tiles.index --stats --out second.png
+    if cmp -s "$ground/first.png" "$ground/second.png" && grep -q '^2 tiles, 1 of them from the index' "$ground/stdout"; then pass; else fail "a torn index" "$(cat "$ground/stdout")"; fi
+    run 1 "is of tiles of another size" photomosaic --grid 1x2 --tile 9 --tiles album --index tiles.index
+    run 1 "no index of tiles" photomosaic --grid 1x2 --tile 8 --tiles album --index in.hdr
+    run 1 "3 cells need as many tiles, and there are 2; with --capacity 2" photomosaic --grid 1x3 --tile 8 --tiles album
+    : >"$ground/album/c.png"
+    if (cd "$ground" && ../photomosaic --grid 1x2 --tile 8 --tiles album --out third.png 2>&1 >stdout) | grep -q '1 of 3 files could not be read'; then pass; else fail "unreadable tiles are not counted"; fi
+    cmp -s "$ground/first.png" "$ground/third.png" || fail "an unreadable tile changes the mosaic"
     run 0 "" demo ${quick[demo]} --frames 2 --out film.png
     if [ -s "$ground/film_0000.png" ] && [ -s "$ground/film_0001.png" ] && [ ! -e "$ground/film.png" ]; then pass; else fail "demo --frames 2"; fi
     # names that a program makes of the output's are looked at too

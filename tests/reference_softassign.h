@@ -188,9 +188,46 @@ static inline double reference_published(const float *cost, int rows, int column
     return lowest;
 }
 
-/* Jonker and Volgenant's dense solver, plain: two rounds of augmenting row reduction, then shortest augmenting paths,
-   for the benchmark. Doubles; rows <= columns. Scratch: price, distance (columns doubles), the ints: 2 x columns + rows
-   + columns. */
+/* The first two steps of Jonker and Volgenant (Computing 38, 1987) for a square matrix: column reduction, where each
+   column in turn from the last pays down to its least cost and its row takes it unless it has one, and reduction
+   transfer, where a row that was the least of just one column pays down to its second least. Leaves the unassigned
+   rows. */
+static inline int reference_reduce_columns(const float *cost, int n, int *x, int *y, double *v, int *times,
+                                           int *unassigned)
+{
+    int i, j, left = 0;
+    for (j = 0; j < n; j++) {
+        times[j] = y[j] = 0;
+        v[j] = (double)cost[j];
+    }
+    for (i = 1; i < n; i++)
+        for (j = 0; j < n; j++)
+            if ((double)cost[(size_t)i * (size_t)n + (size_t)j] < v[j]) {
+                v[j] = (double)cost[(size_t)i * (size_t)n + (size_t)j];
+                y[j] = i;
+            }
+    for (j = n - 1; j >= 0; j--) {
+        int least = y[j];
+        y[j] = -1;
+        if (++times[least] > 1) continue;
+        x[least] = j;
+        y[j] = least;
+    }
+    for (i = 0; i < n; i++) {
+        const float *c = cost + (size_t)i * (size_t)n;
+        double second = HUGE_VAL;
+        if (times[i] == 0) unassigned[left++] = i;
+        if (times[i] != 1) continue;
+        for (j = 0; j < n; j++)
+            if (j != x[i] && (double)c[j] - v[j] < second) second = (double)c[j] - v[j];
+        if (n > 1) v[x[i]] -= second;
+    }
+    return left;
+}
+
+/* Jonker and Volgenant's dense solver, plain: column reduction where the matrix is square, two rounds of augmenting row
+   reduction, then shortest augmenting paths, for the benchmark. Doubles; rows <= columns. Scratch: price, distance
+   (columns doubles), the ints: 2 x columns + rows + columns. */
 static inline void reference_lapjv(const float *cost, int rows, int columns, int *x, int *y, double *v, double *d,
                                    int *pred, int *list, int *unassigned)
 {
@@ -203,6 +240,7 @@ static inline void reference_lapjv(const float *cost, int rows, int columns, int
         x[i] = -1;
         unassigned[i] = i;
     }
+    if (rows == columns) count = reference_reduce_columns(cost, rows, x, y, v, pred, unassigned);
     for (round = 0; round < 2; round++) {
         int next = 0, left = 0, end = count, budget = 8 * count + 64;
         while (next < end) {
