@@ -256,108 +256,74 @@ static void table_dense(void)
 
 /* ---- given matrices of every kind ---- */
 
-enum {
-  UNIFORM,
-  INTEGERS,
-  ZEROS_ONES,
-  GEOMETRIC,
-  LOW_RANK,
-  PRODUCTS,
-  SPARSE,
-  KINDS
-};
+enum { UNIFORM, INTEGERS, ZEROS_ONES, GEOMETRIC, LOW_RANK, PRODUCTS, SPARSE, KINDS };
 
 /* Machol and Wien 1977: i * j, here with shuffled columns. */
-static void fill_matrix(float *cost, int rows, int columns, int kind) {
-  enum { RANK = 4 };
-  uint64_t seed = (uint64_t)(kind + 1);
-  float *a = (float *)malloc((size_t)rows * RANK * sizeof *a),
-        *b = (float *)malloc((size_t)columns * RANK * sizeof *b);
-  int *order = (int *)malloc((size_t)columns * sizeof *order), i, j, k;
-  for (i = 0; i < rows * RANK; i++)
-    a[i] = (float)support_uniform(&seed);
-  for (i = 0; i < columns * RANK; i++)
-    b[i] = (float)support_uniform(&seed);
-  for (j = 0; j < columns; j++) {
-    k = (int)support_below(&seed, (uint64_t)j + 1);
-    order[j] = order[k];
-    order[k] = j;
-  }
-  for (i = 0; i < rows; i++)
+static void fill_matrix(float *cost, int rows, int columns, int kind)
+{
+    enum { RANK = 4 };
+    uint64_t seed = (uint64_t)(kind + 1);
+    float *a = (float *)malloc((size_t)rows * RANK * sizeof *a),
+          *b = (float *)malloc((size_t)columns * RANK * sizeof *b);
+    int *order = (int *)malloc((size_t)columns * sizeof *order), i, j, k;
+    for (i = 0; i < rows * RANK; i++) a[i] = (float)support_uniform(&seed);
+    for (i = 0; i < columns * RANK; i++) b[i] = (float)support_uniform(&seed);
     for (j = 0; j < columns; j++) {
-      const float *u = a + i * RANK, *v = b + j * RANK;
-      float *c = cost + (size_t)i * (size_t)columns + (size_t)j;
-      if (kind == UNIFORM)
-        *c = (float)support_uniform(&seed);
-      if (kind == INTEGERS)
-        *c = (float)support_below(&seed, (uint64_t)columns);
-      if (kind == ZEROS_ONES)
-        *c = (float)support_below(&seed, 2);
-      if (kind == GEOMETRIC)
-        *c = hypotf(u[0] - v[0], u[1] - v[1]);
-      if (kind == LOW_RANK)
-        *c = u[0] * v[0] + u[1] * v[1] + u[2] * v[2] + u[3] * v[3];
-      if (kind == PRODUCTS)
-        *c = (float)(i + 1) * (float)(order[j] + 1);
-      if (kind == SPARSE)
-        *c = support_uniform(&seed) < 0.05 ? (float)support_uniform(&seed)
-                                           : 1e6f;
+        k = (int)support_below(&seed, (uint64_t)j + 1);
+        order[j] = order[k];
+        order[k] = j;
     }
-  free(a);
-  free(b);
-  free(order);
+    for (i = 0; i < rows; i++)
+        for (j = 0; j < columns; j++) {
+            const float *u = a + i * RANK, *v = b + j * RANK;
+            float *c = cost + (size_t)i * (size_t)columns + (size_t)j;
+            if (kind == UNIFORM) *c = (float)support_uniform(&seed);
+            if (kind == INTEGERS) *c = (float)support_below(&seed, (uint64_t)columns);
+            if (kind == ZEROS_ONES) *c = (float)support_below(&seed, 2);
+            if (kind == GEOMETRIC) *c = hypotf(u[0] - v[0], u[1] - v[1]);
+            if (kind == LOW_RANK) *c = u[0] * v[0] + u[1] * v[1] + u[2] * v[2] + u[3] * v[3];
+            if (kind == PRODUCTS) *c = (float)(i + 1) * (float)(order[j] + 1);
+            if (kind == SPARSE) *c = support_uniform(&seed) < 0.05 ? (float)support_uniform(&seed) : 1e6f;
+        }
+    free(a);
+    free(b);
+    free(order);
 }
 
-static void table_matrices(void) {
-  static const char *const names[KINDS] = {
-      "uniform",  "integers to n", "zeros and ones", "points in a plane",
-      "low rank", "i * j",         "5 % cheap pairs"};
-  static const int sizes[][2] = {{64, 64},     {64, 256},   {128, 128},
-                                 {256, 256},   {256, 1024}, {512, 512},
-                                 {1024, 1024}, {512, 2048}, {1024, 4096},
-                                 {2048, 2048}, {4096, 4096}};
-  size_t k, count = sizeof sizes / sizeof *sizes;
-  int kind,
-      have_scipy =
-          system(
-              "/usr/bin/python3 -c 'import scipy.optimize' >/dev/null 2>&1") ==
-          0;
-  bench_table("Given matrices, AUTO against a plain LAPJV and scipy, one "
-              "thread, in the order of their size",
-              "kind\trows\tcolumns\ttime_ms\tratio_lapjv\tratio_scipy\tratio_"
-              "best\tcertified_gap\tlists\tdefault");
-  bench_plot("Time over that of the better peer; x=time_ms; y=ratio_best; "
-             "by=kind; log=x; style=linespoints");
-  bench_note("ratio_best: over the faster of the two; lists: 1 where AUTO left "
-             "the matrix for lists");
-  if (!have_scipy)
-    bench_missing("scipy", "python3-scipy");
-  for (k = 0; k < count; k++)
-    for (kind = 0; kind < KINDS; kind++) {
-      instance q;
-      bench_times t;
-      double scipy, best;
-      if (bench_quick() && (sizes[k][1] > (bench_smoke() ? 64 : 512) ||
-                            (bench_smoke() && kind > 1)))
-        continue;
-      open_instance(&q, "fig_bowl", sizes[k][0], 1, sizes[k][1], 1);
-      fill_matrix(q.cost, q.p.rows, q.p.columns, kind);
-      q.options = softassign_defaults();
-      t = bench_ratio(run_dense, &q, run_lapjv, &q,
-                      bench_rounds(sizes[k][0] > 1000  ? 1
-                                   : sizes[k][0] > 300 ? 5
-                                                       : 15));
-      run_dense(&q);
-      scipy = have_scipy && !bench_quick()
-                  ? scipy_seconds(&q, sizes[k][0] > 1000 ? 1 : 9)
-                  : -1;
-      best = scipy > 0 && scipy < t.work / t.ratio ? t.work / scipy : t.ratio;
-      bench_row("%s\t%d\t%d\t%.4g\t%.3g\t%s\t%.3g\t%.3g\t%d\t%d", names[kind],
-                q.p.rows, q.p.columns, t.work * 1e3, t.ratio,
-                bench_cell(t.work / scipy, 3, scipy > 0), best, q.report.gap,
-                q.report.method == SOFTASSIGN_EXACT, kind == UNIFORM);
-      close_instance(&q);
-    }
+static void table_matrices(void)
+{
+    static const char *const names[KINDS] = {"uniform",  "integers to n", "zeros and ones", "points in a plane",
+                                             "low rank", "i * j",         "5 % cheap pairs"};
+    static const int sizes[][2] = {{64, 64},     {64, 256},   {128, 128},   {256, 256},   {256, 1024}, {512, 512},
+                                   {1024, 1024}, {512, 2048}, {1024, 4096}, {2048, 2048}, {4096, 4096}};
+    size_t k, count = sizeof sizes / sizeof *sizes;
+    int kind, have_scipy = system("/usr/bin/python3 -c 'import scipy.optimize' >/dev/null 2>&1") == 0;
+    bench_table("Given matrices, AUTO against a plain LAPJV and scipy, one thread, in the order of their size",
+                "kind\trows\tcolumns\ttime_ms\tratio_lapjv\tratio_scipy\tratio_best\tcertified_gap\tlists\tdefault");
+    bench_plot("Time over that of the better peer; x=time_ms; y=ratio_best; by=kind; log=x; style=linespoints");
+    bench_note("ratio_best: over the faster of the two; lists: 1 where AUTO left the matrix for lists");
+    if (!have_scipy) bench_missing("scipy", "python3-scipy");
+    for (k = 0; k < count; k++)
+        for (kind = 0; kind < KINDS; kind++) {
+            instance q;
+            bench_times t;
+            double scipy, best;
+            if (bench_quick() && (sizes[k][1] > (bench_smoke() ? 64 : 512) || (bench_smoke() && kind > 1))) continue;
+            open_instance(&q, "fig_bowl", sizes[k][0], 1, sizes[k][1], 1);
+            fill_matrix(q.cost, q.p.rows, q.p.columns, kind);
+            q.options = softassign_defaults();
+            t = bench_ratio(run_dense, &q, run_lapjv, &q,
+                            bench_rounds(sizes[k][0] > 1000  ? 1
+                                         : sizes[k][0] > 300 ? 5
+                                                             : 15));
+            run_dense(&q);
+            scipy = have_scipy && !bench_quick() ? scipy_seconds(&q, sizes[k][0] > 1000 ? 1 : 9) : -1;
+            best = scipy > 0 && scipy < t.work / t.ratio ? t.work / scipy : t.ratio;
+            bench_row("%s\t%d\t%d\t%.4g\t%.3g\t%s\t%.3g\t%.3g\t%d\t%d", names[kind], q.p.rows, q.p.columns,
+                      t.work * 1e3, t.ratio, bench_cell(t.work / scipy, 3, scipy > 0), best, q.report.gap,
+                      q.report.method == SOFTASSIGN_EXACT, kind == UNIFORM);
+            close_instance(&q);
+        }
 }
 
 /* ---- error against time, all methods ---- */
@@ -717,22 +683,18 @@ static void table_published(void)
 
 int main(int argc, char **argv)
 {
-  static void (*const tables[])(void) = {
-      table_peers, table_dense,        table_matrices, table_error_time,
-      table_3_1,   table_3_2,          table_lists,    table_large,
-      table_video, table_temperatures, table_published};
-  static const char *const names[] = {
-      "peers", "dense", "matrices", "error",        "3_1",      "3_2",
-      "lists", "large", "video",    "temperatures", "published"};
-  size_t k;
-  bench_start("softassign.h");
-  load_tiles();
-  printf("# input: %s\n",
-         real_data ? "photographs and tiles"
-                   : "made here, for want of ../shared/data or libstb-dev");
-  for (k = 0; k < 11; k++)
-    if (argc < 2 || strcmp(argv[1], names[k]) == 0)
-      tables[k]();
-  free(all_tiles);
-  return 0;
+    static void (*const tables[])(void) = {table_peers, table_dense,        table_matrices, table_error_time,
+                                           table_3_1,   table_3_2,          table_lists,    table_large,
+                                           table_video, table_temperatures, table_published};
+    static const char *const names[] = {"peers", "dense", "matrices", "error",        "3_1",      "3_2",
+                                        "lists", "large", "video",    "temperatures", "published"};
+    size_t k;
+    bench_start("softassign.h");
+    load_tiles();
+    printf("# input: %s\n",
+           real_data ? "photographs and tiles" : "made here, for want of ../shared/data or libstb-dev");
+    for (k = 0; k < 11; k++)
+        if (argc < 2 || strcmp(argv[1], names[k]) == 0) tables[k]();
+    free(all_tiles);
+    return 0;
 }
