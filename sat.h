@@ -421,21 +421,25 @@ __attribute__((used)) static int sat__hint(void) { return sat__define_SAT_IMPLEM
 extern "C" {
 #endif
 
-/* How the table texture stores sums. ES 3.0 and WebGL 2 need EXT_color_buffer_float for the first two. */
+/* How sums are stored. ES 3.0 and WebGL 2 need EXT_color_buffer_float for the first two. */
 typedef enum sat_gl_format {
-    SAT_GL_TWO_FLOAT, /* RG32F: the sum of two floats, about 48 bits; for HDR */
+    SAT_GL_TWO_FLOAT, /* RG32F: the sum of two floats, about 48 bits */
     SAT_GL_FLOAT,     /* R32F: as SAT_KIND_FLOAT, only for large boxes or small images */
-    SAT_GL_FIXED32    /* R32UI: the same integers as SAT_KIND_FIXED32, for any algorithm and k */
+    SAT_GL_FIXED32,   /* R32UI: the same integers as SAT_KIND_FIXED32, for any algorithm and k */
+    SAT_GL_TILED      /* as SAT_KIND_TILED with its default tile, cells and quanta bit for bit; for HDR */
 } sat_gl_format;
 
 typedef struct sat_gl_options {
-    sat_gl_format format;         /* SAT_GL_TWO_FLOAT */
+    sat_gl_format format;         /* SAT_GL_TILED; the others are the published passes */
     sat_scan_algorithm algorithm; /* SAT_SCAN_BALANCED_TREE; or RECURSIVE_DOUBLING: half the passes, log_k n times the
                                      pixels, ahead for small tables only */
     int k;                        /* 4; 2..64; texels read for one written */
     int compute;                  /* 0; 0..1; 1: the tree's second half by compute shaders where there is GL 4.3: one
                                      invocation writes k texels, so that k = 32 or 64 is best */
-    int channel;                  /* 0; 0..3; the channel of the input texture */
+    int channel;                  /* 0; 0..3; the (first) channel of the input texture */
+    int channels;                 /* 1; 1..4; TILED: so many channels in one build */
+    int moments;                  /* 0; 0..1; 1 (TILED, at most two channels): for sat_gl_variance; sat_sum and
+                                     sat_gl_box_filter then have no table of the pixels themselves */
     int unsigned_input;           /* 0; 0..1; 1 (FIXED32): the input is an unsigned integer texture and is summed as it
                                      is */
     double quantum;               /* 0; 1e-35..1e35; a power of two. 0: the finest that max_value and max_box_area
@@ -458,11 +462,12 @@ SAT_DEF void sat_gl_destroy(sat_gl *gl); /* NULL is fine */
 /* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 SAT_DEF const char *sat_gl_message(const sat_gl *gl);
 
-/* Inclusive sums of the first width x height texels of a 2D texture, level 0: texel (x, y) of the table is the sum over
-   [0,x] x [0,y]. `table` is a texture of the caller in the format above and at least of that size, or 0 for the
-   object's own, sat_gl_table(). The input is only read. Does not wait for the GPU. */
+/* Inclusive sums of the first width x height texels of a 2D texture, level 0: texel (x, y) of the table is the sum
+   over [0,x] x [0,y]. `table` is a texture of the caller in the format above and at least of that size, or 0 for the
+   object's own, sat_gl_table(); SAT_GL_TILED: 0, and see sat_gl_get_tiles(). The input is only read. Does not wait for
+   the GPU. */
 SAT_DEF sat_result sat_gl_build(sat_gl *gl, unsigned table, unsigned texture, int width, int height);
-/* The same for each row alone: texel (x, y) is the sum over [0,x] of row y. */
+/* The same for each row alone: texel (x, y) is the sum over [0,x] of row y. Not for SAT_GL_TILED. */
 SAT_DEF sat_result sat_gl_scan(sat_gl *gl, unsigned table, unsigned texture, int width, int height);
 /* The texture that the last build or scan with table 0 wrote; another one when the size changes. 0 before. */
 SAT_DEF unsigned sat_gl_table(const sat_gl *gl);
@@ -474,6 +479,27 @@ SAT_DEF double sat_gl_quantum(const sat_gl *gl);
    which waits for the GPU. */
 SAT_DEF sat_result sat_gl_mean(sat_gl *gl, float *mean, unsigned texture, int width, int height);
 SAT_DEF unsigned sat_gl_mean_texture(const sat_gl *gl);
+
+/* SAT_GL_TILED: the textures of the last build. cells: 32-bit integers, a component a channel; tiles: an array of four
+   layers (quanta, spikes), strips: sums of whole tiles. All have the size of the build, so that lookups clip to it. As
+   on the CPU, up to 8 pixels that hold most of a tile are kept apart; there is no list of giants, so that infinity and
+   pixels beyond 1e20 count as the largest other pixel of their tile, and there are no 64-bit tiles. */
+typedef struct sat_gl_tiles {
+    unsigned cells, tiles, strips; /* usampler2D, usampler2DArray, usampler2D */
+} sat_gl_tiles;
+SAT_DEF sat_result sat_gl_get_tiles(sat_gl_tiles *out, const sat_gl *gl);
+/* What the last tiled build met; waits for the GPU. */
+SAT_DEF sat_result sat_gl_get_stats(sat_stats *out, sat_gl *gl);
+/* Means around every pixel, (2 radius + 1)^2 pixels clipped at the borders, from the last tiled build into a texture
+   of the caller that can be drawn to and is at least of that size: channel c in component c. */
+SAT_DEF sat_result sat_gl_box_filter(sat_gl *gl, unsigned texture, int radius);
+/* With moments: mean and variance of the first channel, mean and variance of the second. */
+SAT_DEF sat_result sat_gl_variance(sat_gl *gl, unsigned texture, int radius);
+/* GLSL to put behind sat_gl_glsl(), for the three textures above; the same boxes:
+
+       float sat_sum(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high)
+       float sat_mean(...)                                                  the same arguments */
+SAT_DEF const char *sat_gl_glsl_tiles(void);
 
 /* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader, once or more. Boxes are half-open and clipped:
 
@@ -3362,7 +3388,8 @@ static inline double sat__tiled_sum(const sat_table *t, int channel, int x0, int
 
 /* ---- tables: building tiles */
 
-/* Of |pixel| of a tile, in four lanes: pixel i of a row belongs to lane i modulo 4. */
+/* Of |pixel| of a tile, in four lanes: pixel i of a row belongs to lane i modulo 4. Rows are summed on their own
+   first, so that a GPU can make the same roundings. */
 typedef struct sat__gauge {
     float sum[4], largest[4], smallest[4];
 } sat__gauge;
@@ -3385,7 +3412,7 @@ static inline void sat__gauge_row(sat__gauge *g, const float *p, int n)
 {
     int i, j;
 #ifdef SAT__VECTOR
-    sat__f32x4 sum = sat__f32x4_load(g->sum), largest = sat__f32x4_load(g->largest),
+    sat__f32x4 sum = sat__f32x4_set1(0), largest = sat__f32x4_load(g->largest),
                smallest = sat__f32x4_load(g->smallest);
     (void)j;
     for (i = 0; i < n; i += 4) {
@@ -3394,17 +3421,19 @@ static inline void sat__gauge_row(sat__gauge *g, const float *p, int n)
         largest = sat__f32x4_max(largest, v);
         smallest = sat__f32x4_min(smallest, v);
     }
-    sat__f32x4_store(g->sum, sum);
+    sat__f32x4_store(g->sum, sat__f32x4_add(sat__f32x4_load(g->sum), sum));
     sat__f32x4_store(g->largest, largest);
     sat__f32x4_store(g->smallest, smallest);
 #else
+    float sum[4] = {0, 0, 0, 0};
     for (i = 0; i < n; i += 4)
         for (j = 0; j < 4; j++) {
             float v = fabsf(p[i + j]);
-            g->sum[j] += v;
+            sum[j] += v;
             if (v > g->largest[j]) g->largest[j] = v;
             if (v < g->smallest[j]) g->smallest[j] = v;
         }
+    for (j = 0; j < 4; j++) g->sum[j] += sum[j];
 #endif
 }
 
@@ -3422,11 +3451,12 @@ static sat__extent sat__gauge_extent(const sat__gauge *g)
     return e;
 }
 
-static sat__extent sat__extent_of(const float *p, int n)
+static sat__extent sat__extent_of(const float *p, int n, int side)
 {
     sat__gauge g;
+    int i;
     sat__gauge_clear(&g);
-    sat__gauge_row(&g, p, n);
+    for (i = 0; i < n; i += side) sat__gauge_row(&g, p + i, side);
     return sat__gauge_extent(&g);
 }
 
@@ -3499,7 +3529,7 @@ static sat__extent sat__take_spikes(const sat_table *t, size_t index, float *p, 
             spike->value = p[at[i]];
             p[at[i]] = 0;
         }
-        rest = sat__extent_of(p, n);
+        rest = sat__extent_of(p, n, side);
         if (rest.sum > e.sum / 4) {
             for (i = 0; i < found; i++) p[at[i]] = s[tile->spikes + i].value;
             break;
@@ -3653,7 +3683,7 @@ static sat__extent sat__take_apart(const sat_table *t, float *p, int n, size_t i
     sat__extent e;
     int i, first = tally->giants;
     if (!sat__is_tame(p, n, sat__giant_limit(t))) sat__take_giants(t, p, n, left, list, tally);
-    e = sat__extent_of(p, n);
+    e = sat__extent_of(p, n, t->options.tile);
     tile->spikes = 0;
     if (e.largest > e.sum / 16) e = sat__take_spikes(t, index, p, n, e);
     for (i = 0; i < tile->spikes; i++) tally->sum_abs += fabs((double)t->spikes[index * SAT__SPIKES + (size_t)i].value);
@@ -5669,6 +5699,375 @@ static const char sat__glsl_mean[] =
     "    result = STORED(sum * factor);\n"
     "}\n";
 
+/* ---- tiles: shaders
+
+   The table of SAT_KIND_TILED in passes that stay inside a tile: a row of a tile is gauged (the four lanes of the CPU,
+   row by row, so that the sums round alike), a tile settles its quantum and its spikes, integers are summed along the
+   rows and down the columns by eights (64 = 8 x 8), and whole tiles make the strips. All targets are unsigned
+   integers, which ES 3.0 can draw to without an extension; floats travel as their bits. A plane is a channel, or with
+   moments x - m or its square.
+
+   Lookups: the sum of the parts in at most 3 x 3 tiles, or four corners in each super tile of 16 x 16 tiles. `strips`
+   is a row-major array in a texture: left, above and whole of the CPU table, one after the other. */
+
+static const char sat__glsl_tile_lookups[] =
+    "#ifndef SAT_GLSL_TILES\n"
+    "#define SAT_GLSL_TILES\n"
+    "#ifdef GL_ES\n"
+    "precision highp usampler2DArray;\n"
+    "#endif\n"
+    "vec2 sat_tile_part(usampler2D cells, usampler2DArray tiles, int plane, ivec2 tile, ivec2 a,\n"
+    "  ivec2 b, float one) {\n"
+    " ivec2 first = tile * 64;\n"
+    " uint d = texelFetch(cells, b - 1, 0)[plane];\n"
+    " if (a.x > first.x) d -= texelFetch(cells, ivec2(a.x, b.y) - 1, 0)[plane];\n"
+    " if (a.y > first.y) d -= texelFetch(cells, ivec2(b.x, a.y) - 1, 0)[plane];\n"
+    " if (a.x > first.x && a.y > first.y) d += texelFetch(cells, a - 1, 0)[plane];\n"
+    " ivec2 at = ivec2(tile.x + plane * ((textureSize(cells, 0).x + 63) / 64), tile.y);\n"
+    " uvec4 record = texelFetch(tiles, ivec3(at, 0), 0);\n"
+    " float quantum = uintBitsToFloat(record.x);\n"
+    " int n = int(d), low = n & 4095;\n"
+    " vec2 sum = sat_add(vec2(float(n - low) * quantum, 0.0), vec2(float(low) * quantum, 0.0), one);\n"
+    " int count = int(record.z & 15u);\n"
+    " for (int i = 0; i < count; i++) {\n"
+    "  uint word = texelFetch(tiles, ivec3(at, 1), 0)[i / 2] >> (14 * (i & 1));\n"
+    "  ivec2 p = first + ivec2(int(word & 127u), int(word >> 7 & 127u));\n"
+    "  if (all(greaterThanEqual(p, a)) && all(lessThan(p, b)))\n"
+    "   sum = sat_add(sum, vec2(uintBitsToFloat(texelFetch(tiles, ivec3(at, 2 + i / 4), 0)[i & 3]), 0.0), one);\n"
+    " }\n"
+    " return sum;\n"
+    "}\n"
+    "vec2 sat_strip(usampler2D strips, int width, int index) {\n"
+    " uvec2 v = texelFetch(strips, ivec2(index % width, index / width), 0).xy;\n"
+    " return vec2(uintBitsToFloat(v.x), uintBitsToFloat(v.y));\n"
+    "}\n"
+    "vec2 sat_super_corner(usampler2D cells, usampler2DArray tiles, usampler2D strips, int plane, ivec2 first,\n"
+    "  ivec2 p,\n"
+    "     float one) {\n"
+    " ivec2 size = textureSize(cells, 0), t = p >> 6, inside = p & 63;\n"
+    " int across = (size.x + 63) / 64, planes = textureSize(tiles, 0).x / across;\n"
+    " int above = across * planes * size.y, whole = above + size.x * planes * textureSize(tiles, 0).y;\n"
+    " bool x = t.x > first.x, y = t.y > first.y;\n"
+    " vec2 sum = vec2(0.0);\n"
+    " if (x && y) sum = sat_strip(strips, size.x, whole + ((t.y - 1) * planes + plane) * across + t.x - 1);\n"
+    " if (y && inside.x > 0)\n"
+    "  sum = sat_add(sum, sat_strip(strips, size.x, above + ((t.y - 1) * planes + plane) * size.x + p.x - 1), one);\n"
+    " if (x && inside.y > 0)\n"
+    "  sum = sat_add(sum, sat_strip(strips, size.x, ((p.y - 1) * planes + plane) * across + t.x - 1), one);\n"
+    " if (inside.x > 0 && inside.y > 0)\n"
+    "  sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 64, p, one), one);\n"
+    " return sum;\n"
+    "}\n"
+    "float sat_sum(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high) {\n"
+    " ivec2 size = textureSize(cells, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size), p, q;\n"
+    " float one = size.x > 0 ? 1.0 : 0.0;\n"
+    " if (any(lessThanEqual(b, a))) return 0.0;\n"
+    " ivec2 s = a >> 6, e = (b - 1) >> 6;\n"
+    " vec2 sum = vec2(0.0);\n"
+    " if (all(lessThan(e - s, ivec2(3)))) {\n"
+    "  for (int y = s.y; y <= e.y; y++)\n"
+    "   for (int x = s.x; x <= e.x; x++)\n"
+    "    sum = sat_add(sum, sat_tile_part(cells, tiles, channel, ivec2(x, y), max(a, ivec2(x, y) * 64), min(b, ivec2(x + 1, y + 1) * 64), one),\n"
+    "    one);\n"
+    "  return sum.x + sum.y;\n"
+    " }\n"
+    " for (p.y = a.y; p.y < b.y; p.y = q.y) {\n"
+    "  q.y = min(b.y, (p.y | 1023) + 1);\n"
+    "  for (p.x = a.x; p.x < b.x; p.x = q.x) {\n"
+    "   q.x = min(b.x, (p.x | 1023) + 1);\n"
+    "   ivec2 f = (p >> 10) << 4;\n"
+    "   vec2 v = sat_super_corner(cells, tiles, strips, channel, f, q, one);\n"
+    "   v = sat_add(v, -sat_super_corner(cells, tiles, strips, channel, f, ivec2(p.x, q.y), one), one);\n"
+    "   vec2 u = sat_super_corner(cells, tiles, strips, channel, f, ivec2(q.x, p.y), one);\n"
+    "   u = sat_add(u, -sat_super_corner(cells, tiles, strips, channel, f, p, one), one);\n"
+    "   sum = sat_add(sum, sat_add(v, -u, one), one);\n"
+    "  }\n"
+    " }\n"
+    " return sum.x + sum.y;\n"
+    "}\n"
+    "float sat_mean(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high) {\n"
+    " return sat_sum(cells, tiles, strips, channel, low, high) / sat_area(textureSize(cells, 0), low, high);\n"
+    "}\n"
+    "#endif\n";
+
+static const char sat__glsl_tile_values[] =
+    "uniform sampler2D source;\n"
+    "uniform usampler2D cells, gauges, facts, means;\n"
+    "uniform usampler2DArray tiles;\n"
+    "uniform ivec2 size;\n"
+    "uniform float limit;\n"
+    "int across() { return (size.x + 63) / 64; }\n"
+    "float pixel(ivec2 p, int plane, out int kind) {\n"
+    "    float v = texelFetch(source, p, 0)[CHANNEL + plane % CHANNELS];\n"
+    "    uint bits = floatBitsToUint(v) & 0x7fffffffu;\n"
+    "    kind = bits > 0x7f800000u ? 1 : bits == 0x7f800000u ? 2 : bits > floatBitsToUint(limit) ? 3 : 0;\n"
+    "    v = kind == 1 ? 0.0 : clamp(v, -limit, limit);\n"
+    "    return v;\n"
+    "}\n"
+    "#if MOMENTS\n"
+    "float value(ivec2 p, int plane, out int kind) {\n"
+    "    float v = pixel(p, plane, kind);\n"
+    "    v -= uintBitsToFloat(texelFetch(means, ivec2(p.x / 64 + across() * (plane % CHANNELS), p.y / 64), 0).x);\n"
+    "    if (kind == 1 || kind == 2 || abs(v) > 1e18) v = 0.0;\n"
+    "    return plane < CHANNELS ? v : v * v;\n"
+    "}\n"
+    "#else\n"
+    "#define value pixel\n"
+    "#endif\n";
+
+static const char sat__glsl_tile_means[] =
+    "layout(location = 0) out uvec4 result;\n"
+    "void main() {\n"
+    "    ivec2 at = ivec2(gl_FragCoord.xy), first = ivec2(at.x % across(), at.y) * 64, last = min(first + 64, size);\n"
+    "    int kind;\n"
+    "    float sum = 0.0, count = 0.0;\n"
+    "    for (int y = first.y; y < last.y; y++) {\n"
+    "        float row = 0.0;\n"
+    "        for (int x = first.x; x < last.x; x++) {\n"
+    "            float v = pixel(ivec2(x, y), at.x / across(), kind);\n"
+    "            if (kind == 1 || kind == 2) continue;\n"
+    "            row += v;\n"
+    "            count += 1.0;\n"
+    "        }\n"
+    "        sum += row;\n"
+    "    }\n"
+    "    result = uvec4(floatBitsToUint(count > 0.0 ? sum / count : 0.0), 0u, 0u, 0u);\n"
+    "}\n";
+
+/* A row of a tile: sums and the largest of |value|, pixels beyond 1e20, and how many were replaced. */
+static const char sat__glsl_gauge[] =
+    "layout(location = 0) out uvec4 sums;\n"
+    "layout(location = 1) out uvec4 fact;\n"
+    "void main() {\n"
+    "    ivec2 at = ivec2(gl_FragCoord.xy);\n"
+    "    int plane = at.x / across(), first = at.x % across() * 64, kind, giants = 0;\n"
+    "    ivec3 counts = ivec3(0);\n"
+    "    float largest = 0.0;\n"
+    "    vec4 lanes = vec4(0.0);\n"
+    "    for (int i = 0; i < 64; i += 4)\n"
+    "        for (int j = 0; j < 4; j++) {\n"
+    "            if (first + i + j >= size.x) continue;\n"
+    "            float v = abs(value(ivec2(first + i + j, at.y), plane, kind));\n"
+    "            if (kind > 0) counts[kind - 1]++;\n"
+    "            if (v > 1e20) {\n"
+    "                giants++;\n"
+    "                if (kind == 0) counts[2]++;\n"
+    "                continue;\n"
+    "            }\n"
+    "            lanes[j] += v;\n"
+    "            largest = max(largest, v);\n"
+    "        }\n"
+    "    sums = floatBitsToUint(lanes);\n"
+    "    fact = uvec4(floatBitsToUint(largest), uint(giants), uint(counts.x | counts.y << 8 | counts.z << 16), 0u);\n"
+    "}\n";
+
+/* sat__take_spikes and sat__tile_quantum of the CPU; 8386931 is where sum * 1.0001 reaches the next power of two. */
+static const char sat__glsl_settle[] =
+    "layout(location = 0) out uvec4 record;\n"
+    "layout(location = 1) out uvec4 places;\n"
+    "layout(location = 2) out uvec4 low_values;\n"
+    "layout(location = 3) out uvec4 high_values;\n"
+    "int count, rows, plane;\n"
+    "ivec2 at, first;\n"
+    "float full;\n"
+    "ivec2 place[8];\n"
+    "float held[8];\n"
+    "bool is_spike(ivec2 p) {\n"
+    "    for (int i = 0; i < count; i++)\n"
+    "        if (place[i] == p) return true;\n"
+    "    return false;\n"
+    "}\n"
+    "float rest(ivec2 p) {\n"
+    "    int kind;\n"
+    "    if (p.x >= size.x || is_spike(p)) return 0.0;\n"
+    "    float v = value(p, plane, kind);\n"
+    "    return abs(v) > 1e20 ? sign(v) * full : v;\n"
+    "}\n"
+    "vec2 extent(float giants) {\n"
+    "    vec4 lanes = vec4(0.0);\n"
+    "    float largest = giants > 0.0 ? full : 0.0;\n"
+    "    for (int y = 0; y < rows; y++) {\n"
+    "        bool fresh = false;\n"
+    "        for (int i = 0; i < count; i++) fresh = fresh || place[i].y == first.y + y;\n"
+    "        if (!fresh) {\n"
+    "            lanes += uintBitsToFloat(texelFetch(gauges, ivec2(at.x, first.y + y), 0));\n"
+    "            largest = max(largest, uintBitsToFloat(texelFetch(facts, ivec2(at.x, first.y + y), 0).x));\n"
+    "            continue;\n"
+    "        }\n"
+    "        vec4 row = vec4(0.0);\n"
+    "        for (int i = 0; i < 64; i += 4)\n"
+    "            for (int j = 0; j < 4; j++) {\n"
+    "                float v = abs(rest(first + ivec2(i + j, y)));\n"
+    "                row[j] += v;\n"
+    "                largest = max(largest, v);\n"
+    "            }\n"
+    "        lanes += row;\n"
+    "    }\n"
+    "    return vec2(((lanes.x + lanes.y) + lanes.z) + lanes.w + giants * full, largest);\n"
+    "}\n"
+    "void main() {\n"
+    "    at = ivec2(gl_FragCoord.xy);\n"
+    "    plane = at.x / across();\n"
+    "    first = ivec2(at.x % across(), at.y) * 64;\n"
+    "    rows = min(64, size.y - first.y);\n"
+    "    count = 0;\n"
+    "    full = 0.0;\n"
+    "    int giants = 0;\n"
+    "    ivec3 counts = ivec3(0);\n"
+    "    for (int y = 0; y < rows; y++) {\n"
+    "        uvec4 f = texelFetch(facts, ivec2(at.x, first.y + y), 0);\n"
+    "        full = max(full, uintBitsToFloat(f.x));\n"
+    "        giants += int(f.y);\n"
+    "        counts += ivec3(int(f.z & 255u), int(f.z >> 8 & 255u), int(f.z >> 16));\n"
+    "    }\n"
+    "    if (!(full > 0.0)) full = 1e20;\n"
+    "    vec2 e = extent(float(giants));\n"
+    "    while (giants == 0 && e.y > e.x * 0.0625 && count < 8) {\n"
+    "        int found = 0, room = 8 - count;\n"
+    "        ivec2 p;\n"
+    "        for (p.y = first.y; p.y < first.y + rows && found <= room; p.y++) {\n"
+    "            if (!(uintBitsToFloat(texelFetch(facts, ivec2(at.x, p.y), 0).x) > e.x * 0.0625)) continue;\n"
+    "            for (p.x = first.x; p.x < min(first.x + 64, size.x) && found <= room; p.x++) {\n"
+    "                float v = rest(p);\n"
+    "                if (!(abs(v) > e.x * 0.0625)) continue;\n"
+    "                if (found < room) {\n"
+    "                    place[count + found] = p;\n"
+    "                    held[count + found] = v;\n"
+    "                }\n"
+    "                found++;\n"
+    "            }\n"
+    "        }\n"
+    "        if (found > room) break;\n"
+    "        count += found;\n"
+    "        vec2 less = extent(0.0);\n"
+    "        if (less.x > e.x * 0.25) {\n"
+    "            count -= found;\n"
+    "            break;\n"
+    "        }\n"
+    "        e = less;\n"
+    "    }\n"
+    "    uint bits = floatBitsToUint(e.x), exponent = (bits >> 23) + ((bits & 0x7fffffu) >= 8386931u ? 1u : 0u);\n"
+    "    record = uvec4(e.x > 0.0 ? max(exponent, 31u) - 30u << 23 : 0u, floatBitsToUint(full),\n"
+    "                   uint(count | counts.x << 4 | counts.y << 17), uint(counts.z));\n"
+    "    uvec4 words = uvec4(0u), low = uvec4(0u), high = uvec4(0u);\n"
+    "    for (int i = 0; i < count; i++) {\n"
+    "        ivec2 p = place[i] - first;\n"
+    "        words[i / 2] |= uint(p.x | p.y << 7) << (14 * (i & 1));\n"
+    "        if (i < 4) low[i] = floatBitsToUint(held[i]);\n"
+    "        else high[i - 4] = floatBitsToUint(held[i]);\n"
+    "    }\n"
+    "    places = words;\n"
+    "    low_values = low;\n"
+    "    high_values = high;\n"
+    "}\n";
+
+static const char sat__glsl_tile_scan[] =
+    "layout(location = 0) out uvec4 result;\n"
+    "uniform ivec2 axis;\n"
+    "#if INPUT\n"
+    "uint integer(ivec2 p, int plane) {\n"
+    "    ivec3 at = ivec3(p.x / 64 + plane * across(), p.y / 64, 0);\n"
+    "    uvec4 record = texelFetch(tiles, at, 0);\n"
+    "    int kind, count = int(record.z & 15u);\n"
+    "    float v = value(p, plane, kind), full = uintBitsToFloat(record.y);\n"
+    "    if (record.x == 0u) return 0u;\n"
+    "    if (abs(v) > 1e20) v = sign(v) * full;\n"
+    "    for (int i = 0; i < count; i++) {\n"
+    "        uint word = texelFetch(tiles, at + ivec3(0, 0, 1), 0)[i / 2] >> (14 * (i & 1));\n"
+    "        if (ivec2(int(word & 127u), int(word >> 7 & 127u)) == p % 64) return 0u;\n"
+    "    }\n"
+    "    return uint(int(roundEven(v * uintBitsToFloat((254u << 23) - record.x))));\n"
+    "}\n"
+    "uvec4 load(ivec2 p) {\n"
+    "    uvec4 v = uvec4(0u);\n"
+    "    for (int plane = 0; plane < PLANES; plane++) v[plane] = integer(p, plane);\n"
+    "    return v;\n"
+    "}\n"
+    "#else\n"
+    "uvec4 load(ivec2 p) { return texelFetch(cells, p, 0); }\n"
+    "#endif\n"
+    "void main() {\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+    "    int step = axis.x + axis.y, from = ((axis.x > 0 ? p.x : p.y) & 63);\n"
+    "    uvec4 sum = uvec4(0u);\n"
+    "    for (int d = 0; d < 8 * step && d <= from; d += step)\n"
+    "        sum += load(p - (axis.x > 0 ? ivec2(d, 0) : ivec2(0, d)));\n"
+    "    result = sum;\n"
+    "}\n";
+
+static const char sat__glsl_strips[] =
+    "layout(location = 0) out uvec4 result;\n"
+    "void main() {\n"
+    "    int i = int(gl_FragCoord.y) * size.x + int(gl_FragCoord.x), n = across(),\n"
+    "        down = (size.y + 63) / 64, x, y, plane;\n"
+    "    int left = n * PLANES * size.y, above = size.x * PLANES * down, row, side;\n"
+    "    float one = size.x > 0 ? 1.0 : 0.0;\n"
+    "    ivec2 low, high;\n"
+    "    if (i < left) {\n"
+    "        side = n, row = i / n;\n"
+    "        plane = row % PLANES, y = row / PLANES, x = i % n;\n"
+    "        low = ivec2(x & ~15, y / 64), high = ivec2(min(size.x, (x + 1) * 64), y + 1);\n"
+    "    } else if (i < left + above) {\n"
+    "        i -= left;\n"
+    "        row = i / size.x;\n"
+    "        plane = row % PLANES, y = row / PLANES, x = i % size.x;\n"
+    "        low = ivec2(x / 64, y & ~15), high = ivec2(x + 1, min(size.y, (y + 1) * 64));\n"
+    "    } else {\n"
+    "        i -= left + above;\n"
+    "        row = i / n;\n"
+    "        plane = row % PLANES, y = row / PLANES, x = i % n;\n"
+    "        low = ivec2(x, y) & ~15, high = min(size, (ivec2(x, y) + 1) * 64);\n"
+    "    }\n"
+    "    vec2 sum = vec2(0.0);\n"
+    "    if (y < (size.y + 63) / 64 || i < left)\n"
+    "        for (ivec2 t = low; t.y * 64 < high.y; t.y++)\n"
+    "            for (t.x = low.x; t.x * 64 < high.x; t.x++)\n"
+    "                sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 64,\n"
+    "                                    min(high, (t + 1) * 64), one), one);\n"
+    "    result = uvec4(floatBitsToUint(sum), 0u, 0u);\n"
+    "}\n";
+
+static const char sat__glsl_tile_filter[] =
+    "layout(location = 0) out vec4 result;\n"
+    "uniform usampler2D strips;\n"
+    "uniform int radius;\n"
+    "void main() {\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+    "    vec4 means = vec4(0.0, 0.0, 0.0, 1.0);\n"
+    "    for (int c = 0; c < CHANNELS; c++) means[c] = sat_mean(cells, tiles, strips, c, p - radius, p + radius + 1);\n"
+    "    result = means;\n"
+    "}\n";
+
+/* Chan, Golub, LeVeque 1983, as sat__moment_join. */
+static const char sat__glsl_tile_variance[] =
+    "layout(location = 0) out vec4 result;\n"
+    "uniform int radius;\n"
+    "vec2 moments(int c, ivec2 a, ivec2 b, float one) {\n"
+    "    float n = 0.0, mean = 0.0, squares = 0.0;\n"
+    "    ivec2 s = a >> 6, e = (b - 1) >> 6, t;\n"
+    "    for (t.y = s.y; t.y <= e.y; t.y++)\n"
+    "        for (t.x = s.x; t.x <= e.x; t.x++) {\n"
+    "            ivec2 low = max(a, t * 64), high = min(b, (t + 1) * 64);\n"
+    "            float m = uintBitsToFloat(texelFetch(means, ivec2(t.x + across() * c, t.y), 0).x);\n"
+    "            vec2 d = sat_tile_part(cells, tiles, c, t, low, high, one),\n"
+    "                 q = sat_tile_part(cells, tiles, CHANNELS + c, t, low, high, one);\n"
+    "            float k = float((high.x - low.x) * (high.y - low.y)), both = n + k, sum = d.x + d.y;\n"
+    "            float here = max(0.0, (q.x + q.y) - sum * sum / k), delta = m + sum / k - mean;\n"
+    "            squares += here + delta * delta * (n / both * k);\n"
+    "            mean += delta * (k / both);\n"
+    "            n = both;\n"
+    "        }\n"
+    "    return vec2(mean, squares / n);\n"
+    "}\n"
+    "void main() {\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy), a = max(p - radius, 0), b = min(p + radius + 1, size);\n"
+    "    float one = size.x > 0 ? 1.0 : 0.0;\n"
+    "    result = vec4(moments(0, a, b, one), 0.0, 0.0);\n"
+    "    if (CHANNELS > 1) result.zw = moments(CHANNELS - 1, a, b, one);\n"
+    "}\n";
+
+SAT_DEF const char *sat_gl_glsl_tiles(void) { return sat__glsl_tile_lookups; }
+
 /* ---- the object */
 
 enum { SAT__GL_LEVELS = 32 };
@@ -5689,6 +6088,17 @@ typedef struct sat__gl_level {
     int width, height;
 } sat__gl_level;
 
+/* SAT_GL_TILED: a program for each pass and what they draw into. */
+enum { SAT__GL_MEANS, SAT__GL_GAUGE, SAT__GL_SETTLE, SAT__GL_SCAN, SAT__GL_ADD = SAT__GL_SCAN + 2, SAT__GL_STRIPS,
+       SAT__GL_FILTER, SAT__GL_VARIANCE, SAT__GL_TILE_PASSES };
+
+typedef struct sat__gl_tiled {
+    unsigned programs[SAT__GL_TILE_PASSES];
+    sat__gl_target cells, partial, strips, means;
+    unsigned gauge[2], gauge_framebuffer, tiles, tiles_framebuffer;
+    int width, height, planes; /* of the last build; 0: there was none */
+} sat__gl_tiled;
+
 struct sat_gl {
     sat__gl gl;
     sat_gl_options options;
@@ -5704,15 +6114,18 @@ struct sat_gl {
     int depth[2];                                   /* levels of the rows' tree and of the columns' */
     sat__gl_level means[SAT__GL_LEVELS];
     unsigned borrowed;                              /* framebuffer for a table of the caller */
+    sat__gl_tiled tiled;
 };
 
 static const sat__field sat__gl_fields[] = {
-    SAT__FIELD(sat_gl_options, 'i', format, 0, 0, SAT_GL_FIXED32, ' '),
+    SAT__FIELD(sat_gl_options, 'i', format, SAT_GL_TILED, 0, SAT_GL_TILED, ' '),
     SAT__FIELD(sat_gl_options, 'i', algorithm, SAT_SCAN_BALANCED_TREE, SAT_SCAN_RECURSIVE_DOUBLING,
                SAT_SCAN_BALANCED_TREE, ' '),
     SAT__FIELD(sat_gl_options, 'i', k, 4, 2, 64, ' '),
     SAT__FIELD(sat_gl_options, 'i', compute, 0, 0, 1, ' '),
     SAT__FIELD(sat_gl_options, 'i', channel, 0, 0, 3, ' '),
+    SAT__FIELD(sat_gl_options, 'i', channels, 1, 1, 4, ' '),
+    SAT__FIELD(sat_gl_options, 'i', moments, 0, 0, 1, ' '),
     SAT__FIELD(sat_gl_options, 'i', unsigned_input, 0, 0, 1, ' '),
     SAT__FIELD(sat_gl_options, 'd', quantum, 0, 1e-35, 1e35, '0'),
     SAT__FIELD(sat_gl_options, 'd', max_value, 1e30, 1e-300, 1e300, ' '),
@@ -5735,6 +6148,13 @@ static int sat__explain_gl_options(sat__text *t, const sat_gl_options *o)
     else if (o->unsigned_input && o->format != SAT_GL_FIXED32)
         sat__text_add(t, "unsigned_input is 1; only SAT_GL_FIXED32 takes it");
     else if (o->quantum > 0 && frexp(o->quantum, &exponent) > 0.5) sat__text_add(t, "quantum is not a power of two");
+    else if (o->format != SAT_GL_TILED && (o->channels > 1 || o->moments))
+        sat__text_add(t, o->moments ? "moments is 1; only SAT_GL_TILED takes it"
+                                    : "channels is above 1; only SAT_GL_TILED takes it");
+    else if (o->channel + o->channels > 4)
+        sat__text_range(t, "channel + channels", o->channel + o->channels, 1, 4, ' ');
+    else if (o->moments && o->channels > 2)
+        sat__text_range(t, "channels with moments", o->channels, 1, 2, ' ');
     else return 1;
     return 0;
 }
@@ -5797,6 +6217,295 @@ static sat_result sat__gl_make_kernel(sat_gl *g, sat__gl_kernel *kernel, const c
     return SAT_OK;
 }
 
+static void sat__gl_free_target(sat__gl *gl, sat__gl_target *target)
+{
+    if (target->framebuffer) gl->DeleteFramebuffers(1, &target->framebuffer);
+    if (target->texture) gl->DeleteTextures(1, &target->texture);
+    target->texture = target->framebuffer = 0;
+}
+
+static sat_result sat__gl_make_target(sat__gl *gl, sat__gl_target *target, unsigned internal, int width, int height)
+{
+    sat_result result = sat__gl_texture(gl, &target->texture, internal, width, height, NULL);
+    if (result == SAT_OK) result = sat__gl_framebuffer(gl, &target->framebuffer, &target->texture, 1, 0);
+    if (result != SAT_OK) sat__gl_free_target(gl, target);
+    return result;
+}
+
+/* ---- tiles: programs and passes */
+
+static sat_result sat__gl_make_tile_program(sat_gl *g, int pass, const char *name, const char *body, int input)
+{
+    sat__gl *gl = &g->gl;
+    const char *library[5], *text[2];
+    sat__gl_shaders shaders;
+    sat_result result;
+    unsigned program;
+    int channels = g->options.channels;
+    memset(&shaders, 0, sizeof shaders);
+    library[0] = sat_gl_glsl();
+    library[1] = sat_gl_glsl_tiles();
+    library[2] = sat__glsl_tile_values;
+    library[3] = NULL;
+    text[0] = body;
+    text[1] = NULL;
+    shaders.name = name;
+    shaders.library = library;
+    shaders.fragment = text;
+    sat__gl_define(gl, "CHANNEL", g->options.channel);
+    sat__gl_define(gl, "CHANNELS", channels);
+    sat__gl_define(gl, "PLANES", g->options.moments ? 2 * channels : channels);
+    sat__gl_define(gl, "MOMENTS", g->options.moments);
+    sat__gl_define(gl, "INPUT", input);
+    result = sat__gl_build(gl, &g->tiled.programs[pass], &shaders);
+    if (result != SAT_OK) return result;
+    program = g->tiled.programs[pass];
+    gl->UseProgram(program);
+    sat__gl_set_int(gl, program, "source", 0);
+    sat__gl_set_int(gl, program, "cells", 1);
+    sat__gl_set_int(gl, program, "tiles", 2);
+    sat__gl_set_int(gl, program, "gauges", 3);
+    sat__gl_set_int(gl, program, "strips", 3);
+    sat__gl_set_int(gl, program, "facts", 4);
+    sat__gl_set_int(gl, program, "means", 5);
+    return SAT_OK;
+}
+
+static sat_result sat__gl_make_tile_programs(sat_gl *g)
+{
+    static const struct {
+        int pass;
+        const char *name, *body;
+        int input, moments; /* moments: -1 always, else where the option has this value */
+    } list[] = {{SAT__GL_MEANS, "sat: means of tiles", sat__glsl_tile_means, 1, 1},
+                {SAT__GL_GAUGE, "sat: gauge", sat__glsl_gauge, 1, -1},
+                {SAT__GL_SETTLE, "sat: quanta and spikes", sat__glsl_settle, 1, -1},
+                {SAT__GL_SCAN, "sat: integers", sat__glsl_tile_scan, 1, -1},
+                {SAT__GL_ADD, "sat: sums in tiles", sat__glsl_tile_scan, 0, -1},
+                {SAT__GL_STRIPS, "sat: strips", sat__glsl_strips, 0, -1},
+                {SAT__GL_FILTER, "sat: box filter", sat__glsl_tile_filter, 0, 0},
+                {SAT__GL_VARIANCE, "sat: variance", sat__glsl_tile_variance, 0, 1}};
+    sat_result result = SAT_OK;
+    int i;
+    for (i = 0; i < SAT__COUNT(list) && result == SAT_OK; i++)
+        if (list[i].moments < 0 || list[i].moments == g->options.moments)
+            result = sat__gl_make_tile_program(g, list[i].pass, list[i].name, list[i].body, list[i].input);
+    return result;
+}
+
+static void sat__gl_free_tiles(sat_gl *g)
+{
+    sat__gl_tiled *t = &g->tiled;
+    sat__gl *gl = &g->gl;
+    sat__gl_free_target(gl, &t->cells);
+    sat__gl_free_target(gl, &t->partial);
+    sat__gl_free_target(gl, &t->strips);
+    sat__gl_free_target(gl, &t->means);
+    if (t->gauge_framebuffer) gl->DeleteFramebuffers(1, &t->gauge_framebuffer);
+    if (t->tiles_framebuffer) gl->DeleteFramebuffers(1, &t->tiles_framebuffer);
+    if (t->gauge[0]) gl->DeleteTextures(1, &t->gauge[0]);
+    if (t->gauge[1]) gl->DeleteTextures(1, &t->gauge[1]);
+    if (t->tiles) gl->DeleteTextures(1, &t->tiles);
+    t->gauge_framebuffer = t->tiles_framebuffer = t->gauge[0] = t->gauge[1] = t->tiles = 0;
+    t->width = t->height = 0;
+}
+
+/* An array of four layers that one pass draws to at once. */
+static sat_result sat__gl_make_layers(sat__gl *gl, unsigned *texture, unsigned *framebuffer, int width, int height)
+{
+    unsigned buffers[4];
+    int i;
+    gl->GenTextures(1, texture);
+    gl->ActiveTexture(SAT__GL_TEXTURE0);
+    gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, *texture);
+    gl->TexImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, SAT__GL_RGBA32UI, width, height, 4, 0, SAT__GL_RGBA_INTEGER,
+                   SAT__GL_UNSIGNED_INT, NULL);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D_ARRAY, SAT__GL_TEXTURE_MAX_LEVEL, 0);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D_ARRAY, SAT__GL_TEXTURE_MIN_FILTER, SAT__GL_NEAREST);
+    gl->TexParameteri(SAT__GL_TEXTURE_2D_ARRAY, SAT__GL_TEXTURE_MAG_FILTER, SAT__GL_NEAREST);
+    gl->GenFramebuffers(1, framebuffer);
+    gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, *framebuffer);
+    for (i = 0; i < 4; i++) {
+        buffers[i] = SAT__GL_COLOR_ATTACHMENT0 + (unsigned)i;
+        gl->FramebufferTextureLayer(SAT__GL_FRAMEBUFFER, buffers[i], *texture, 0, i);
+    }
+    gl->DrawBuffers(4, buffers);
+    if (gl->CheckFramebufferStatus(SAT__GL_FRAMEBUFFER) != SAT__GL_FRAMEBUFFER_COMPLETE)
+        return sat__gl_fail(gl, SAT_ERR_GL_STATE, "OpenGL refused the layers of the tiles", NULL);
+    return sat__gl_check(gl, "OpenGL refused a texture array");
+}
+
+static sat_result sat__gl_fit_tiles(sat_gl *g, int width, int height)
+{
+    sat__gl_tiled *t = &g->tiled;
+    sat__gl *gl = &g->gl;
+    int planes = g->options.channels << g->options.moments, tiles_x = (width - 1) / 64 + 1,
+        tiles_y = (height - 1) / 64 + 1;
+    unsigned internal = planes == 1 ? SAT__GL_R32UI : planes == 2 ? SAT__GL_RG32UI : SAT__GL_RGBA32UI;
+    double strips = (double)tiles_x * planes * ((double)height + tiles_y) + (double)width * planes * tiles_y;
+    sat_result result;
+    if (t->width == width && t->height == height) return SAT_OK;
+    sat__gl_free_tiles(g);
+    result = sat__gl_make_target(gl, &t->cells, internal, width, height);
+    if (strips > 2e9) result = sat__gl_fail(gl, SAT_ERR_SIZE, "an index into the strips does not fit into int", NULL);
+    if (result == SAT_OK) result = sat__gl_make_target(gl, &t->partial, internal, width, height);
+    if (result == SAT_OK)
+        result = sat__gl_make_target(gl, &t->strips, SAT__GL_RG32UI, width, (int)((strips - 1) / width) + 1);
+    if (result == SAT_OK && g->options.moments)
+        result = sat__gl_make_target(gl, &t->means, SAT__GL_R32UI, tiles_x * g->options.channels, tiles_y);
+    if (result == SAT_OK)
+        result = sat__gl_texture(gl, &t->gauge[0], SAT__GL_RGBA32UI, tiles_x * planes, height, NULL);
+    if (result == SAT_OK)
+        result = sat__gl_texture(gl, &t->gauge[1], SAT__GL_RGBA32UI, tiles_x * planes, height, NULL);
+    if (result == SAT_OK) result = sat__gl_framebuffer(gl, &t->gauge_framebuffer, t->gauge, 2, 0);
+    if (result == SAT_OK)
+        result = sat__gl_make_layers(gl, &t->tiles, &t->tiles_framebuffer, tiles_x * planes, tiles_y);
+    if (result != SAT_OK) sat__gl_free_tiles(g);
+    else {
+        t->width = width;
+        t->height = height;
+        t->planes = planes;
+    }
+    return result;
+}
+
+/* Everything of a pass but what is special to it; `cells` is what unit 1 reads. */
+static unsigned sat__gl_tile_pass(sat_gl *g, int pass, unsigned framebuffer, int width, int height, unsigned cells)
+{
+    const sat__gl_tiled *t = &g->tiled;
+    sat__gl *gl = &g->gl;
+    unsigned program = t->programs[pass], units[6];
+    int i, gauging = pass == SAT__GL_SETTLE;
+    units[0] = 0;
+    units[1] = cells;
+    units[2] = gauging ? 0 : t->tiles; /* what is drawn to is not bound */
+    units[3] = gauging ? t->gauge[0] : pass == SAT__GL_STRIPS ? 0 : t->strips.texture;
+    units[4] = gauging ? t->gauge[1] : 0;
+    units[5] = pass == SAT__GL_MEANS ? 0 : t->means.texture;
+    sat__gl_pass(gl, program, framebuffer, width, height);
+    for (i = 1; i < 6; i++) {
+        gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)i);
+        gl->BindTexture(i == 2 ? SAT__GL_TEXTURE_2D_ARRAY : SAT__GL_TEXTURE_2D, units[i]);
+        gl->BindSampler((unsigned)i, 0);
+    }
+    sat__gl_set_int2(gl, program, "size", t->width, t->height);
+    sat__gl_set_float(gl, program, "limit",
+                      g->options.max_value < 3.4028234663852886e38 ? (float)g->options.max_value : 3.4028235e38f);
+    return program;
+}
+
+/* The sums of a row and of a column by eights, twice each, from one texture to the other and back. */
+static void sat__gl_scan_tiles(sat_gl *g)
+{
+    sat__gl_tiled *t = &g->tiled;
+    int i;
+    for (i = 0; i < 4; i++) {
+        const sat__gl_target *from = i & 1 ? &t->partial : &t->cells, *to = i & 1 ? &t->cells : &t->partial;
+        unsigned program = sat__gl_tile_pass(g, i ? SAT__GL_ADD : SAT__GL_SCAN, to->framebuffer, t->width, t->height,
+                                             i ? from->texture : 0);
+        int step = i & 1 ? 8 : 1;
+        sat__gl_set_int2(&g->gl, program, "axis", i < 2 ? step : 0, i < 2 ? 0 : step);
+        sat__gl_draw(&g->gl);
+    }
+}
+
+static sat_result sat__gl_build_tiles(sat_gl *g, unsigned texture, int width, int height)
+{
+    sat__gl_tiled *t = &g->tiled;
+    sat__gl *gl = &g->gl;
+    sat__gl_state state;
+    sat_result result;
+    int tiles_x = (width - 1) / 64 + 1, tiles_y = (height - 1) / 64 + 1;
+    sat__gl_begin(gl, &state, 6);
+    result = sat__gl_fit_tiles(g, width, height);
+    if (result == SAT_OK) {
+        gl->ActiveTexture(SAT__GL_TEXTURE0);
+        gl->BindTexture(SAT__GL_TEXTURE_2D, texture);
+        gl->BindSampler(0, 0);
+        if (g->options.moments) {
+            sat__gl_tile_pass(g, SAT__GL_MEANS, t->means.framebuffer, tiles_x * g->options.channels, tiles_y, 0);
+            sat__gl_draw(gl);
+        }
+        sat__gl_tile_pass(g, SAT__GL_GAUGE, t->gauge_framebuffer, tiles_x * t->planes, height, 0);
+        sat__gl_draw(gl);
+        sat__gl_tile_pass(g, SAT__GL_SETTLE, t->tiles_framebuffer, tiles_x * t->planes, tiles_y, 0);
+        sat__gl_draw(gl);
+        sat__gl_scan_tiles(g);
+        sat__gl_tile_pass(g, SAT__GL_STRIPS, t->strips.framebuffer, width,
+                          (tiles_x * t->planes * (height + tiles_y) + width * t->planes * tiles_y - 1) / width + 1,
+                          t->cells.texture);
+        sat__gl_draw(gl);
+    }
+    sat__gl_end(gl, &state);
+    return result;
+}
+
+SAT_DEF sat_result sat_gl_get_tiles(sat_gl_tiles *out, const sat_gl *gl)
+{
+    if (!out || !gl || !gl->tiled.width) return SAT_ERR_ARGUMENT;
+    out->cells = gl->tiled.cells.texture;
+    out->tiles = gl->tiled.tiles;
+    out->strips = gl->tiled.strips.texture;
+    return SAT_OK;
+}
+
+/* The counts stand in the first layer of the tiles. */
+SAT_DEF sat_result sat_gl_get_stats(sat_stats *out, sat_gl *gl)
+{
+    sat__gl_state state;
+    uint32_t *records;
+    size_t count, i;
+    if (!out || !gl || !gl->tiled.width) return SAT_ERR_ARGUMENT;
+    count = ((size_t)gl->tiled.width + 63) / 64 * (size_t)gl->options.channels;
+    count *= ((size_t)gl->tiled.height + 63) / 64;
+    records = (uint32_t *)sat__alloc(&gl->options.allocator, count * 16);
+    if (!records) return SAT_ERR_MEMORY;
+    memset(out, 0, sizeof *out);
+    sat__gl_begin(&gl->gl, &state, 1);
+    gl->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, gl->tiled.tiles_framebuffer);
+    gl->gl.ReadBuffer(SAT__GL_COLOR_ATTACHMENT0);
+    gl->gl.ReadPixels(0, 0, (gl->tiled.width + 63) / 64 * gl->options.channels, (gl->tiled.height + 63) / 64,
+                      SAT__GL_RGBA_INTEGER, SAT__GL_UNSIGNED_INT, records);
+    sat__gl_end(&gl->gl, &state);
+    for (i = 0; i < count; i++) {
+        out->nan += records[4 * i + 2] >> 4 & 8191;
+        out->infinite += records[4 * i + 2] >> 17 & 8191;
+        out->clamped += records[4 * i + 3];
+    }
+    sat__release(&gl->options.allocator, records, count * 16);
+    return SAT_OK;
+}
+
+static sat_result sat__gl_filter_tiles(sat_gl *g, int pass, unsigned texture, int radius)
+{
+    sat__gl_state state;
+    sat_result result;
+    if (!g || !g->ready || !g->tiled.width || !texture || radius < 0 || radius > 0x3fffffff || !g->tiled.programs[pass])
+        return SAT_ERR_ARGUMENT;
+    sat__gl_begin(&g->gl, &state, 6);
+    result = sat__gl_attach(&g->gl, g->borrowed, &texture, 1, 0);
+    if (result == SAT_OK) {
+        unsigned program = sat__gl_tile_pass(g, pass, g->borrowed, g->tiled.width, g->tiled.height,
+                                             g->tiled.cells.texture);
+        sat__gl_set_int(&g->gl, program, "radius", radius);
+        sat__gl_draw(&g->gl);
+    }
+    sat__gl_end(&g->gl, &state);
+    return result;
+}
+
+SAT_DEF sat_result sat_gl_box_filter(sat_gl *gl, unsigned texture, int radius)
+{
+    return sat__gl_filter_tiles(gl, SAT__GL_FILTER, texture, radius);
+}
+
+SAT_DEF sat_result sat_gl_variance(sat_gl *gl, unsigned texture, int radius)
+{
+    return sat__gl_filter_tiles(gl, SAT__GL_VARIANCE, texture, radius);
+}
+
+/* ---- programs of the flat tables */
+
 static sat_result sat__gl_make_kernels(sat_gl *g)
 {
     const sat_gl_options *o = &g->options;
@@ -5804,8 +6513,10 @@ static sat_result sat__gl_make_kernels(sat_gl *g)
     sat_gl_format format = o->format;
     sat_result result = SAT_OK;
     int i, k = o->k;
+    if (format == SAT_GL_TILED) result = sat__gl_make_tile_programs(g);
     for (i = 0; i < 2 && result == SAT_OK; i++) {
-        if (o->algorithm == SAT_SCAN_RECURSIVE_DOUBLING) {
+        if (format == SAT_GL_TILED) result = SAT_OK;
+        else if (o->algorithm == SAT_SCAN_RECURSIVE_DOUBLING) {
             result = sat__gl_make_kernel(g, &g->doubling[i], "sat: recursive doubling", sat__glsl_double, i, format, k);
         } else {
             result = sat__gl_make_kernel(g, &g->reduce[i], "sat: reduction", sat__glsl_reduce, i, format, k);
@@ -5820,13 +6531,6 @@ static sat_result sat__gl_make_kernels(sat_gl *g)
 
 /* ---- textures of one size */
 
-static void sat__gl_free_target(sat__gl *gl, sat__gl_target *target)
-{
-    if (target->framebuffer) gl->DeleteFramebuffers(1, &target->framebuffer);
-    if (target->texture) gl->DeleteTextures(1, &target->texture);
-    target->texture = target->framebuffer = 0;
-}
-
 static void sat__gl_free_levels(sat__gl *gl, sat__gl_level *levels)
 {
     int i;
@@ -5838,6 +6542,7 @@ static void sat__gl_free_levels(sat__gl *gl, sat__gl_level *levels)
 
 static void sat__gl_free_textures(sat_gl *g)
 {
+    sat__gl_free_tiles(g);
     sat__gl_free_target(&g->gl, &g->table);
     sat__gl_free_target(&g->gl, &g->partial);
     sat__gl_free_levels(&g->gl, g->levels[0]);
@@ -5849,14 +6554,6 @@ static void sat__gl_free_means(sat_gl *g)
 {
     sat__gl_free_levels(&g->gl, g->means);
     g->mean_width = g->mean_height = 0;
-}
-
-static sat_result sat__gl_make_target(sat__gl *gl, sat__gl_target *target, unsigned internal, int width, int height)
-{
-    sat_result result = sat__gl_texture(gl, &target->texture, internal, width, height, NULL);
-    if (result == SAT_OK) result = sat__gl_framebuffer(gl, &target->framebuffer, &target->texture, 1, 0);
-    if (result != SAT_OK) sat__gl_free_target(gl, target);
-    return result;
 }
 
 /* The tree along one axis ends above the level that one group can hold: its root is never asked for. */
@@ -6042,6 +6739,8 @@ static sat_result sat__gl_run(sat_gl *g, int axes, unsigned table, unsigned text
     sat__gl_target target;
     sat_result result;
     if (!g || !g->ready || !texture || texture == table || width < 1 || height < 1) return SAT_ERR_ARGUMENT;
+    if (g->options.format == SAT_GL_TILED)
+        return table || axes == 1 ? SAT_ERR_ARGUMENT : sat__gl_build_tiles(g, texture, width, height);
     sat__gl_begin(&g->gl, &state, 2);
     result = sat__gl_fit(g, width, height, !table);
     target = g->table;
@@ -6179,6 +6878,7 @@ SAT_DEF void sat_gl_destroy(sat_gl *gl)
             gl->gl.DeleteProgram(gl->doubling[i].program);
             gl->gl.DeleteProgram(gl->mean[i].program);
         }
+        for (i = 0; i < SAT__GL_TILE_PASSES; i++) gl->gl.DeleteProgram(gl->tiled.programs[i]);
         gl->gl.DeleteFramebuffers(1, &gl->borrowed);
         sat__gl_close(&gl->gl);
     }

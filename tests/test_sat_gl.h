@@ -133,6 +133,14 @@ static void test_read(void *out, unsigned texture, unsigned internal, int width,
 
 static void test_delete(unsigned texture) { test_f.real.DeleteTextures(1, &texture); }
 
+/* The options of the published passes. */
+static sat_gl_options test_flat(void)
+{
+    sat_gl_options options = sat_gl_defaults();
+    options.format = SAT_GL_TWO_FLOAT;
+    return options;
+}
+
 /* ---- references ---- */
 
 /* The value that a table counts a float as. */
@@ -263,7 +271,7 @@ enum { TEST_SIZES = 7 };
 
 static sat_gl *test_create(sat_gl_format format, sat_scan_algorithm algorithm, int k, int compute)
 {
-    sat_gl_options options = sat_gl_defaults();
+    sat_gl_options options = test_flat();
     sat_gl *g = NULL;
     options.format = format;
     options.algorithm = algorithm;
@@ -354,7 +362,7 @@ TEST(larger_tables)
 TEST(fixed_equals_the_cpu_table)
 {
     sat_options cpu_options = sat_defaults();
-    sat_gl_options options = sat_gl_defaults();
+    sat_gl_options options = test_flat();
     sat_table *cpu = NULL;
     sat_gl *g = NULL;
     test_case t;
@@ -400,7 +408,7 @@ TEST(channels_and_unsigned_input)
     float rgba[5 * 4 * 4], table[20];
     uint32_t values[6] = {0xffffffffu, 3, 0x80000000u, 7, 0x80000000u, 1}, sums[6];
     const uint32_t want[6] = {0xffffffffu, 2, 0x80000002u, 6, 0x80000009u, 10};
-    sat_gl_options options = sat_gl_defaults();
+    sat_gl_options options = test_flat();
     sat_gl *g = NULL;
     unsigned texture;
     int c, i;
@@ -649,6 +657,263 @@ TEST(lookups_in_a_shader)
     test_close();
 }
 
+/* ---- tiles ---- */
+
+/* The image of a case: 0 smooth decades, 1 spikes in every tile, 2 signed, 3 NaN, infinity and beyond 1e20,
+   4 a constant, 5 eight bits. */
+static void test_tile_image(float *p, int width, int height, int channels, int which)
+{
+    uint64_t state = 77;
+    int i, n = width * height * channels;
+    for (i = 0; i < n; i++) {
+        double u = support_uniform(&state), x = i / channels % width / 40.0, y = i / channels / width / 31.0;
+        p[i] = which == 0   ? (float)pow(10, 4 * sin(x) * cos(y) + u)
+               : which == 1 ? (float)(u < 0.0009 ? 1e5 * (1 + u) : u < 0.002 ? -3e3 : u)
+               : which == 2 ? (float)support_gaussian(&state)
+               : which == 4 ? 0.1f
+               : which == 5 ? (float)(int)(256 * u)
+                            : (float)(1 + u);
+        if (which == 3 && i % 997 == 5) p[i] = sat__float_from_bits(0x7fc00000u);
+        if (which == 3 && i % 1511 == 9) p[i] = i & 1 ? (float)HUGE_VAL : -(float)HUGE_VAL;
+        if (which == 3 && i % 2003 == 11) p[i] = 1e25f;
+    }
+}
+
+static unsigned test_tile_input(const float *p, int width, int height, int channels)
+{
+    float *four = (float *)calloc((size_t)(width * height), 4 * sizeof *four);
+    unsigned texture;
+    int i, c;
+    for (i = 0; i < width * height && four; i++)
+        for (c = 0; c < channels; c++) four[4 * i + c] = p[i * channels + c];
+    texture = test_texture(SAT__GL_RGBA32F, width, height, four);
+    free(four);
+    return texture;
+}
+
+/* Cells, quanta and spikes of the two tables. */
+static void test_tiles_equal(const sat_gl *g, const sat_table *t, int channels)
+{
+    const int width = t->width, height = t->height, n = channels == 1 ? 1 : channels == 2 ? 2 : 4;
+    unsigned internal = n == 1 ? SAT__GL_R32UI : n == 2 ? SAT__GL_RG32UI : SAT__GL_RGBA32UI;
+    uint32_t *cells = (uint32_t *)malloc((size_t)(width * height * n) * 4),
+             *records[4];
+    int x, y, c, i, wrong = 0, quanta = 0, spikes = 0;
+    sat__gl *gl = &test_f.real;
+    sat__gl_state state;
+    test_read(cells, g->tiled.cells.texture, internal, width, height);
+    sat__gl_begin(gl, &state, 1);
+    gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, g->tiled.tiles_framebuffer);
+    for (i = 0; i < 4; i++) {
+        records[i] = (uint32_t *)malloc((size_t)(t->tiles_x * channels * t->tiles_y) * 16);
+        gl->ReadBuffer(SAT__GL_COLOR_ATTACHMENT0 + (unsigned)i);
+        gl->ReadPixels(0, 0, t->tiles_x * channels, t->tiles_y, SAT__GL_RGBA_INTEGER, SAT__GL_UNSIGNED_INT,
+                       records[i]);
+    }
+    sat__gl_end(gl, &state);
+    for (c = 0; c < channels; c++) {
+        for (y = 0; y < height; y++)
+            for (x = 0; x < width; x++)
+                wrong += sat__cells(t, c, y / 64, y % 64)[x] != cells[(y * width + x) * n + c];
+        for (y = 0; y < t->tiles_y; y++)
+            for (x = 0; x < t->tiles_x; x++) {
+                size_t at = (size_t)(y * t->tiles_x * channels + c * t->tiles_x + x) * 4;
+                size_t index = sat__tile_index(t, c, y, x);
+                const sat__tile *tile = &t->tiles[index];
+                int count = (int)(records[0][at + 2] & 15);
+                quanta += sat__float_bits((float)tile->quantum) != records[0][at];
+                spikes += tile->spikes != count;
+                for (i = 0; i < count; i++) {
+                    const sat__spike *s = &t->spikes[index * SAT__SPIKES + (size_t)i];
+                    uint32_t place = records[1][at + (size_t)i / 2] >> (14 * (i & 1));
+                    spikes += s->x != (place & 127) || s->y != (place >> 7 & 127) ||
+                              sat__float_bits(s->value) != records[2 + i / 4][at + (size_t)(i & 3)];
+                }
+            }
+    }
+    EXPECT_EQ(wrong, 0);
+    EXPECT_EQ(quanta, 0);
+    EXPECT_EQ(spikes, 0);
+    for (i = 0; i < 4; i++) free(records[i]);
+    free(cells);
+}
+
+/* Means by the filter pass against the CPU's: half a quantum more where that has 64-bit cells, and floats. */
+static void test_tile_filter(sat_gl *g, const sat_table *t, int channels, int radius)
+{
+    size_t n = (size_t)t->width * (size_t)t->height, i;
+    float *means = (float *)malloc(n * (size_t)channels * 4), *drawn = (float *)malloc(n * 16);
+    unsigned target = test_texture(SAT__GL_RGBA32F, t->width, t->height, NULL);
+    double worst = 0, quantum = 0;
+    int c;
+    for (i = 0; i < (size_t)(t->tiles_x * t->tiles_y * channels); i++)
+        if (t->tiles[i].slot) quantum = fmax(quantum, t->tiles[i].quantum);
+    EXPECT_EQ(sat_box_filter(means, 0, t, radius), SAT_OK);
+    EXPECT_EQ(sat_gl_box_filter(g, target, radius), SAT_OK);
+    test_read(drawn, target, SAT__GL_RGBA32F, t->width, t->height);
+    for (i = 0; i < n; i++)
+        for (c = 0; c < channels; c++) {
+            double a = (double)drawn[4 * i + (size_t)c], b = (double)means[i * (size_t)channels + (size_t)c];
+            double e = (fabs(a - b) - 0.51 * quantum) / (fabs(b) + 1e-2);
+            if (!(e <= worst)) worst = e;
+        }
+    if (!EXPECT(worst <= 4e-7)) printf("radius %d: %g\n", radius, worst);
+    test_delete(target);
+    free(means);
+    free(drawn);
+}
+
+TEST(tiles_equal_the_cpu_table_bit_for_bit)
+{
+    static const int sizes[][3] = {{1, 1, 1},     {130, 1, 1},  {1, 130, 2}, {64, 64, 1},
+                                   {200, 150, 1}, {131, 97, 3}, {70, 200, 4}};
+    int size, which, es;
+    if (!test_open()) return;
+    for (es = 0; es < 2; es++)
+        for (size = 0; size < 7; size++) {
+            int w = sizes[size][0], h = sizes[size][1], c = sizes[size][2], made = 0;
+            sat_gl_options options = sat_gl_defaults();
+            sat_gl *g = NULL;
+            test_as_es = es;
+            if (es && size != 5) continue;
+            options.channels = c;
+            if (!EXPECT_EQ(sat_gl_create(&g, test_get_proc, &options), SAT_OK)) puts(sat_gl_message(g));
+            for (which = 0; which < 6; which++) {
+                float *p = (float *)malloc((size_t)(w * h * c) * 4);
+                sat_image view = sat_image_f32(p, w, h, c);
+                sat_table *t = NULL;
+                unsigned input;
+                sat_stats stats, expected;
+                test_tile_image(p, w, h, c, which);
+                input = test_tile_input(p, w, h, c);
+                EXPECT_EQ(sat_create(&t, w, h, c, NULL), SAT_OK);
+                EXPECT_EQ(sat_build(t, &view), SAT_OK);
+                made = test_generated;
+                if (!EXPECT_EQ(sat_gl_build(g, 0, input, w, h), SAT_OK)) puts(sat_gl_message(g));
+                EXPECT(!which || test_generated == made);
+                EXPECT_EQ(sat_gl_get_stats(&stats, g), SAT_OK);
+                expected = sat_get_stats(t);
+                EXPECT_EQ(stats.nan, expected.nan);
+                EXPECT_EQ(stats.infinite, expected.infinite);
+                if (which != 3) { /* there the CPU has a list of giants */
+                    test_tiles_equal(g, t, c);
+                    test_tile_filter(g, t, c, 1);
+                    test_tile_filter(g, t, c, 40);
+                    test_tile_filter(g, t, c, 100);
+                }
+                test_delete(input);
+                sat_destroy(t);
+                free(p);
+            }
+            EXPECT_EQ(sat_gl_variance(g, 1, 3), SAT_ERR_ARGUMENT);
+            EXPECT_EQ(sat_gl_box_filter(g, 0, 3), SAT_ERR_ARGUMENT);
+            EXPECT_EQ(sat_gl_box_filter(g, 1, -1), SAT_ERR_ARGUMENT);
+            EXPECT_EQ(sat_gl_build(g, 1, 2, w, h), SAT_ERR_ARGUMENT);
+            EXPECT_EQ(sat_gl_scan(g, 0, 2, w, h), SAT_ERR_ARGUMENT);
+            sat_gl_destroy(g);
+            test_as_es = 0;
+        }
+    test_close();
+}
+
+/* A bad pixel changes no box without it; boxes of more than three tiles; two super tiles. */
+TEST(tiles_keep_what_bad_pixels_do_to_themselves)
+{
+    enum { W = 1100, H = 200 };
+    float *p = (float *)malloc(sizeof(float) * W * H), *drawn = (float *)malloc(sizeof(float) * W * H * 4);
+    sat_gl *g = NULL;
+    unsigned input, target;
+    sat_gl_tiles tiles;
+    double worst = 0;
+    int x, y, i;
+    if (!test_open()) return;
+    EXPECT_EQ(sat_gl_get_tiles(&tiles, NULL), SAT_ERR_ARGUMENT);
+    for (i = 0; i < W * H; i++) p[i] = 1;
+    p[100 * W + 500] = (float)HUGE_VAL;
+    p[20 * W + 1050] = sat__float_from_bits(0x7fc00000u);
+    p[150 * W + 90] = 1e30f;
+    p[60 * W + 700] = 1e8f;
+    EXPECT_EQ(sat_gl_create(&g, test_get_proc, NULL), SAT_OK);
+    EXPECT_EQ(sat_gl_get_tiles(&tiles, g), SAT_ERR_ARGUMENT);
+    input = test_texture(SAT__GL_R32F, W, H, p);
+    target = test_texture(SAT__GL_RGBA32F, W, H, NULL);
+    EXPECT_EQ(sat_gl_build(g, 0, input, W, H), SAT_OK);
+    EXPECT_EQ(sat_gl_get_tiles(&tiles, g), SAT_OK);
+    EXPECT(tiles.cells && tiles.tiles && tiles.strips);
+    for (i = 4; i < 90; i += 81) {
+        EXPECT_EQ(sat_gl_box_filter(g, target, i), SAT_OK);
+        test_read(drawn, target, SAT__GL_RGBA32F, W, H);
+        worst = 0;
+        for (y = 0; y < H; y++)
+            for (x = 0; x < W; x++) {
+                double e = fabs((double)drawn[4 * (y * W + x)] - 1);
+                if (abs(x - 700) <= i && abs(y - 60) <= i) continue;
+                if (abs(x - 1050) <= i && abs(y - 20) <= i) continue;
+                if (!(e <= worst)) worst = e;
+            }
+        EXPECT(worst < 2e-6);
+    }
+    test_delete(input);
+    test_delete(target);
+    sat_gl_destroy(g);
+    free(p);
+    free(drawn);
+    test_close();
+}
+
+TEST(variance_of_tiles)
+{
+    enum { W = 150, H = 140 };
+    float *p = (float *)malloc(sizeof(float) * W * H * 2), *drawn = (float *)malloc(sizeof(float) * W * H * 4);
+    sat_image view = sat_image_f32(p, W, H, 2);
+    sat_gl_options options = sat_gl_defaults();
+    sat_gl *g = NULL;
+    sat_moments *m = NULL;
+    unsigned input, target;
+    uint64_t state = 3;
+    int x, y, i, r;
+    if (!test_open()) return;
+    for (i = 0; i < W * H; i++) {
+        p[2 * i] = (float)(1e4 + support_gaussian(&state));
+        p[2 * i + 1] = (float)(i % W / 64 + 3 * support_uniform(&state));
+    }
+    p[40 * W] = sat__float_from_bits(0x7fc00000u);
+    options.channels = 2;
+    options.moments = 1;
+    if (!EXPECT_EQ(sat_gl_create(&g, test_get_proc, &options), SAT_OK)) puts(sat_gl_message(g));
+    EXPECT_EQ(sat_moments_create(&m, W, H, 2, NULL), SAT_OK);
+    EXPECT_EQ(sat_moments_build(m, &view), SAT_OK);
+    input = test_tile_input(p, W, H, 2);
+    target = test_texture(SAT__GL_RGBA32F, W, H, NULL);
+    EXPECT_EQ(sat_gl_build(g, 0, input, W, H), SAT_OK);
+    EXPECT_EQ(sat_gl_box_filter(g, target, 2), SAT_ERR_ARGUMENT);
+    for (r = 2; r < 60; r += 27) {
+        double worst = 0, means = 0;
+        EXPECT_EQ(sat_gl_variance(g, target, r), SAT_OK);
+        test_read(drawn, target, SAT__GL_RGBA32F, W, H);
+        for (y = 0; y < H; y++)
+            for (x = 0; x < W; x++)
+                for (i = 0; i < 2; i++) {
+                    double v = sat_variance(m, i, x - r, y - r, x + r + 1, y + r + 1),
+                           mean = sat_moments_mean(m, i, x - r, y - r, x + r + 1, y + r + 1),
+                           e = fabs((double)drawn[4 * (y * W + x) + 2 * i + 1] / v - 1),
+                           d = fabs((double)drawn[4 * (y * W + x) + 2 * i] / mean - 1);
+                    if (!(e <= worst)) worst = e;
+                    if (!(d <= means)) means = d;
+                }
+        REPORT("variance of N(1e4, 1), relative to the CPU's", worst, "");
+        EXPECT(worst < 1e-3);
+        EXPECT(means < 1e-5);
+    }
+    test_delete(input);
+    test_delete(target);
+    sat_moments_destroy(m);
+    sat_gl_destroy(g);
+    free(p);
+    free(drawn);
+    test_close();
+}
+
 /* ---- state ---- */
 
 typedef struct test_state {
@@ -842,7 +1107,7 @@ TEST(state_is_restored)
 TEST(repeated_builds_make_nothing)
 {
     support_memory memory;
-    sat_gl_options options = sat_gl_defaults();
+    sat_gl_options options = test_flat();
     sat_gl *g = NULL;
     unsigned texture;
     int i, made;
@@ -916,7 +1181,7 @@ TEST(bad_arguments)
         options = sat_gl_defaults();
         if (i == 0) options.k = 1;
         if (i == 1) options.k = 65;
-        if (i == 2) options.format = (sat_gl_format)3;
+        if (i == 2) options.format = (sat_gl_format)4;
         if (i == 3) options.algorithm = SAT_SCAN_SEQUENTIAL;
         if (i == 4) options.channel = 4;
         if (i == 5) options.channel = -1;
@@ -954,7 +1219,7 @@ TEST(bad_arguments)
 TEST(no_memory)
 {
     support_memory memory;
-    sat_gl_options options = sat_gl_defaults();
+    sat_gl_options options = test_flat();
     sat_gl *g = (sat_gl *)&memory;
     if (!test_open()) return;
     options.allocator = support_allocator(&memory);
@@ -987,7 +1252,7 @@ TEST(missing_function_is_named)
 
 TEST(missing_compute_falls_back)
 {
-    sat_gl_options options = sat_gl_defaults();
+    sat_gl_options options = test_flat();
     sat_gl *g;
     if (!test_open()) return;
     options.compute = 1;
@@ -1004,7 +1269,7 @@ TEST(broken_shader_is_explained)
     sat_gl *g;
     int good, failed = 0;
     if (!test_open()) return;
-    for (good = 0; good < 12; good++) {
+    for (good = 0; good < 16; good++) {
         test_garbage = "this is no GLSL;\n";
         test_good_shaders = good;
         EXPECT_EQ(sat_gl_create(&g, test_get_proc, NULL), SAT_ERR_GL_SHADER);
@@ -1015,8 +1280,8 @@ TEST(broken_shader_is_explained)
         sat_gl_destroy(g);
         EXPECT_EQ(test_objects, 0);
     }
-    EXPECT_EQ(failed, 12); /* 6 programs of 2 shaders */
-    test_good_shaders = 12;
+    EXPECT_EQ(failed, 16); /* 8 programs of 2 shaders */
+    test_good_shaders = 16;
     EXPECT_EQ(sat_gl_create(&g, test_get_proc, NULL), SAT_OK);
     sat_gl_destroy(g);
     test_close();
@@ -1024,11 +1289,12 @@ TEST(broken_shader_is_explained)
 
 TEST(refused_textures)
 {
+    sat_gl_options options = test_flat();
     sat_gl *g;
     unsigned texture;
     if (!test_open()) return;
     texture = test_texture(SAT__GL_R32F, 40, 30, NULL);
-    EXPECT_EQ(sat_gl_create(&g, test_get_proc, NULL), SAT_OK);
+    EXPECT_EQ(sat_gl_create(&g, test_get_proc, &options), SAT_OK);
     test_bad_textures = 1;
     EXPECT_EQ(sat_gl_build(g, 0, texture, 40, 30), SAT_ERR_GL_STATE);
     EXPECT(sat_gl_message(g)[0] != 0);
@@ -1046,7 +1312,7 @@ TEST(refused_textures)
 
 TEST(range_of_fixed_tables)
 {
-    sat_gl_options options = sat_gl_defaults();
+    sat_gl_options options = test_flat();
     sat_gl *g;
     unsigned texture;
     if (!test_open()) return;
@@ -1093,6 +1359,14 @@ TEST(shaders_are_valid_es)
         for (kind = 0; kind < 2; kind++)
             sat_gl_destroy(
                 test_create((sat_gl_format)format, kind ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE, 4, 0));
+    for (kind = 0; kind < 2; kind++) {
+        sat_gl_options options = sat_gl_defaults();
+        sat_gl *g = NULL;
+        options.channels = 2;
+        options.moments = kind;
+        EXPECT_EQ(sat_gl_create(&g, test_get_proc, &options), SAT_OK);
+        sat_gl_destroy(g);
+    }
     rewind(test_shader_file);
     size = fread(text, 1, sizeof text - 1, test_shader_file);
     text[size] = 0;
@@ -1106,7 +1380,7 @@ TEST(shaders_are_valid_es)
         EXPECT(strstr(part, "#version 300 es") == part);
     }
     EXPECT_EQ(valid, shaders);
-    EXPECT_EQ(shaders, 3 * 2 * (6 + 4));
+    EXPECT_EQ(shaders, 3 * 2 * (6 + 4) + 16 + 18);
     EXPECT(!test_validate(path, "#version 300 es\nvoid main() { int x = 1u; }\n", "frag")); /* it does look */
     remove(path);
     strcat(path, ".log");
