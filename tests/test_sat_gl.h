@@ -1181,7 +1181,7 @@ TEST(bad_arguments)
         options = sat_gl_defaults();
         if (i == 0) options.k = 1;
         if (i == 1) options.k = 65;
-        if (i == 2) options.format = (sat_gl_format)4;
+        if (i == 2) options.format = (sat_gl_format)(i + 2);
         if (i == 3) options.algorithm = SAT_SCAN_SEQUENTIAL;
         if (i == 4) options.channel = 4;
         if (i == 5) options.channel = -1;

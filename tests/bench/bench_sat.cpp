@@ -267,7 +267,43 @@ struct lookup_work {
     const int *x, *y;
     int radius;
     double sink;
+    int *boxes;
+    double *out;
 };
+
+/* What a program would write by hand over a float table. */
+static void look_up_bare(void *user)
+{
+    lookup_work *w = (lookup_work *)user;
+    const float *table = (const float *)(const void *)sat__row(w->table, 0, 0);
+    const size_t stride = w->table->stride;
+    double sum = 0;
+    for (int i = 0; i < LOOKUPS; i++) {
+        int x0 = w->x[i] - w->radius, y0 = w->y[i] - w->radius, x1 = x0 + 2 * w->radius + 1, y1 = y0 + 2 * w->radius + 1;
+        const float *low = table + (size_t)y0 * stride, *high = table + (size_t)y1 * stride;
+        sum += (double)((high[x1] - high[x0]) - (low[x1] - low[x0]));
+    }
+    w->sink += sum;
+}
+
+/* The boxes are written down, too. */
+static void look_up_many(void *user)
+{
+    lookup_work *w = (lookup_work *)user;
+    enum { BLOCK = 4096 };
+    double sum = 0;
+    for (int first = 0; first < LOOKUPS; first += BLOCK) {
+        for (int i = 0; i < BLOCK; i++) {
+            w->boxes[4 * i] = w->x[first + i] - w->radius;
+            w->boxes[4 * i + 1] = w->y[first + i] - w->radius;
+            w->boxes[4 * i + 2] = w->x[first + i] + w->radius + 1;
+            w->boxes[4 * i + 3] = w->y[first + i] + w->radius + 1;
+        }
+        sat_sums(w->out, w->table, 0, w->boxes, BLOCK);
+        for (int i = 0; i < BLOCK; i++) sum += w->out[i];
+    }
+    w->sink += sum;
+}
 
 static void look_up(void *user)
 {
@@ -294,8 +330,12 @@ static void bench_lookups(void)
         o.kind = (sat_kind)k;
         if (sat_create(&tables[k], n, n, 1, &o) == SAT_OK) sat_build(tables[k], &image);
     }
-    bench_table("Lookup: random boxes, time against the float table", "kind\tradius\ttime_ratio\tdefault");
-    bench_plot("Lookup time; x=radius; y=time_ratio; by=kind; log=x; style=linespoints");
+    bench_table("Lookup: random boxes, time against four corners of a float table read by hand",
+                "kind\tradius\ttime_ratio\tmany_time_ratio\tdefault");
+    bench_plot("Lookup time of sat_sums; x=radius; y=many_time_ratio; by=kind; log=x; style=linespoints");
+    bench_note("time_ratio: a loop of sat_sum; many_time_ratio: sat_sums, which asks memory ahead");
+    int *boxes = (int *)malloc(4 * 4096 * sizeof(int));
+    double *sums = (double *)malloc(4096 * sizeof(double));
     for (int r = 0; r < 6; r++) {
         uint64_t state = 9;
         for (int i = 0; i < LOOKUPS; i++) {
@@ -303,14 +343,19 @@ static void bench_lookups(void)
             y[i] = radii[r] + support_below(&state, n - 2 * radii[r]);
         }
         for (int k = 0; k < 5; k++) {
-            lookup_work work = {tables[k], x, y, radii[r], 0}, peer = {tables[SAT_KIND_FLOAT], x, y, radii[r], 0};
-            bench_row("%s\t%d\t%.2f\t%d", kind_names[k], radii[r], bench_ratio(look_up, &work, look_up, &peer, bench_rounds(11)).ratio, k == 0);
+            lookup_work work = {tables[k], x, y, radii[r], 0, boxes, sums},
+                        peer = {tables[SAT_KIND_FLOAT], x, y, radii[r], 0, NULL, NULL};
+            double one = bench_ratio(look_up, &work, look_up_bare, &peer, bench_rounds(11)).ratio;
+            bench_row("%s\t%d\t%.2f\t%.2f\t%d", kind_names[k], radii[r], one,
+                      bench_ratio(look_up_many, &work, look_up_bare, &peer, bench_rounds(11)).ratio, k == 0);
         }
     }
     for (int k = 0; k < 5; k++) sat_destroy(tables[k]);
     free(p);
     free(x);
     free(y);
+    free(boxes);
+    free(sums);
 }
 
 /* ---- filters and updates */
@@ -319,6 +364,8 @@ struct filter_work {
     const sat_table *table;
     float *out;
     int radius, n;
+    sat_table *build;
+    sat_image image;
 };
 
 static void filter(void *user)
@@ -326,6 +373,52 @@ static void filter(void *user)
     filter_work *w = (filter_work *)user;
     sat_box_filter(w->out, (ptrdiff_t)w->n * 4, w->table, w->radius);
 }
+
+#ifdef HAVE_OPENCV
+static void blur(void *user)
+{
+    filter_work *w = (filter_work *)user;
+    cv::Mat in(w->n, w->n, CV_32F, const_cast<void *>(w->image.pixels)), out(w->n, w->n, CV_32F, w->out);
+    cv::blur(in, out, cv::Size(2 * w->radius + 1, 2 * w->radius + 1));
+}
+
+static void build_and_filter(void *user)
+{
+    filter_work *w = (filter_work *)user;
+    sat_build(w->build, &w->image);
+    sat_box_filter(w->out, 0, w->table, w->radius);
+}
+
+static void bench_blur(void)
+{
+    static const int radii[] = {1, 5, 20, 100};
+    int n = bench_quick() ? 1024 : 2048;
+    float *p = (float *)malloc((size_t)n * (size_t)n * 4), *out = (float *)malloc((size_t)n * (size_t)n * 4);
+    make_picture(p, n, UNIFORM);
+    cv::setNumThreads(1);
+    bench_table("Box filter of a whole image: time against cv::blur",
+                "kind\tradius\tside\ttime_blur_ratio\ttime_with_build_blur_ratio\tdefault");
+    for (int k = 0; k < 5; k++) {
+        sat_options o = sat_defaults();
+        sat_table *t;
+        o.kind = (sat_kind)k;
+        if (k >= SAT_KIND_FIXED32) o.max_value = 1;
+        o.max_box_area = 201 * 201;
+        if (sat_create(&t, n, n, 1, &o) != SAT_OK) continue;
+        filter_work w = {t, out, 0, n, t, sat_image_f32(p, n, n, 1)};
+        sat_build(t, &w.image);
+        for (int r = 0; r < 4; r++) {
+            w.radius = radii[r];
+            double alone = bench_ratio(filter, &w, blur, &w, bench_rounds(7)).ratio;
+            bench_row("%s\t%d\t%d\t%.2f\t%.2f\t%d", kind_names[k], radii[r], n, alone,
+                      bench_ratio(build_and_filter, &w, blur, &w, bench_rounds(7)).ratio, k == 0);
+        }
+        sat_destroy(t);
+    }
+    free(p);
+    free(out);
+}
+#endif
 
 static void update(void *user)
 {
@@ -359,7 +452,7 @@ static void bench_whole_images(void)
                       n, ratio, 1 / ratio, 1);
         }
         for (int radius = 1; radius <= 100; radius *= 10) {
-            filter_work f = {w.table, out, radius, n};
+            filter_work f = {w.table, out, radius, n, w.table, image};
             bench_row("%s\tbox %d\t%d\t%.2f\t%.2f\t%d", kind_names[k], radius, n, bench_ratio(filter, &f, build, &w, bench_rounds(5)).ratio, 1.0, k == 0);
         }
         sat_destroy(w.table);
@@ -462,6 +555,9 @@ int main(void)
 #ifndef BENCH_BUILD_ONLY
     bench_lookups();
     bench_whole_images();
+#ifdef HAVE_OPENCV
+    bench_blur();
+#endif
     bench_bounds();
     bench_scans();
     bench_precision();
