@@ -489,7 +489,7 @@ typedef struct sat_gl_tiles {
 } sat_gl_tiles;
 SAT_DEF sat_result sat_gl_get_tiles(sat_gl_tiles *out, const sat_gl *gl);
 /* What the last tiled build met; waits for the GPU. */
-SAT_DEF sat_result sat_gl_get_stats(sat_stats *out, sat_gl *gl);
+SAT_DEF sat_result sat_gl_get_stats(sat_gl *gl, sat_stats *stats);
 /* Means around every pixel, (2 radius + 1)^2 pixels clipped at the borders, from the last tiled build into a texture
    of the caller that can be drawn to and is at least of that size: channel c in component c. */
 SAT_DEF sat_result sat_gl_box_filter(sat_gl *gl, unsigned texture, int radius);
@@ -4538,51 +4538,81 @@ typedef struct sat__filter {
 static inline void sat__filter_kind(float *out, const sat_table *t, sat_kind kind, const sat__rows *rows, int channel,
                                     int radius, int height)
 {
-    int x, step = t->channels, width = t->width;
-    for (x = 0; x < width; x++) {
-        int x0 = x > radius ? x - radius : 0, x1 = width - x > radius ? x + radius + 1 : width;
-        out[(size_t)x * (size_t)step] =
-            (float)(sat__rows_sum(t, kind, rows, channel, x0, x1, height) / ((double)(x1 - x0) * (double)height));
+    int x = 0, step = t->channels, width = t->width, inside = sat__max_int(0, width - radius), x0, x1;
+    double inverse = 1 / ((2.0 * radius + 1) * (double)height);
+    for (;; x++) {
+        if (x == radius) /* boxes that no border cuts */
+            for (; x < inside; x++)
+                out[(size_t)x * (size_t)step] =
+                    (float)(sat__rows_sum(t, kind, rows, channel, x - radius, x + radius + 1, height) * inverse);
+        if (x >= width) return;
+        x0 = x > radius ? x - radius : 0;
+        x1 = width - x > radius ? x + radius + 1 : width;
+        out[(size_t)x * (size_t)step] = (float)(sat__rows_sum(t, kind, rows, channel, x0, x1, height) *
+                                                (1 / ((double)(x1 - x0) * (double)height)));
     }
 }
 
-/* v[i] += (high[i] - low[i]) quantum, for differences modulo 2^32; low may be NULL. */
-static void sat__add_cells(double *v, const uint32_t *high, const uint32_t *low, int n, double quantum)
+/* v[i] = (high[i] - low[i]) quantum for differences modulo 2^32, or v[i] += that; low may be NULL. */
+static void sat__add_cells(double *v, const uint32_t *high, const uint32_t *low, int n, double quantum, int add)
 {
     int i = 0;
 #ifdef SAT__SSE2
     const __m128d q = _mm_set1_pd(quantum);
     for (; i + 4 <= n; i += 4) {
         __m128i d = _mm_loadu_si128((const __m128i *)(const void *)(high + i));
+        __m128d a, b;
         if (low) d = _mm_sub_epi32(d, _mm_loadu_si128((const __m128i *)(const void *)(low + i)));
-        _mm_storeu_pd(v + i, _mm_add_pd(_mm_loadu_pd(v + i), _mm_mul_pd(_mm_cvtepi32_pd(d), q)));
-        d = _mm_shuffle_epi32(d, 0xee);
-        _mm_storeu_pd(v + i + 2, _mm_add_pd(_mm_loadu_pd(v + i + 2), _mm_mul_pd(_mm_cvtepi32_pd(d), q)));
+        a = _mm_mul_pd(_mm_cvtepi32_pd(d), q);
+        b = _mm_mul_pd(_mm_cvtepi32_pd(_mm_shuffle_epi32(d, 0xee)), q);
+        if (add) {
+            a = _mm_add_pd(_mm_loadu_pd(v + i), a);
+            b = _mm_add_pd(_mm_loadu_pd(v + i + 2), b);
+        }
+        _mm_storeu_pd(v + i, a);
+        _mm_storeu_pd(v + i + 2, b);
     }
 #endif
-    for (; i < n; i++) v[i] += (double)(int32_t)(low ? high[i] - low[i] : high[i]) * quantum;
+    for (; i < n; i++) {
+        double d = (double)(int32_t)(low ? high[i] - low[i] : high[i]) * quantum;
+        v[i] = add ? v[i] + d : d;
+    }
 }
 
-/* v[i]: the rows of a span, spikes left out, in columns from the left side of a tile up to its column x + i. */
-static void sat__tile_columns(double *v, const sat_table *t, int channel, const sat__span *y, int tx, int x, int n)
+/* v[i] += high[i] - low[i]; low may be NULL. */
+static void sat__add_strips(double *v, const double *high, const double *low, int n)
+{
+    int i = 0;
+#ifdef SAT__SSE2
+    for (; i + 2 <= n; i += 2) {
+        __m128d d = _mm_loadu_pd(high + i);
+        if (low) d = _mm_sub_pd(d, _mm_loadu_pd(low + i));
+        _mm_storeu_pd(v + i, _mm_add_pd(_mm_loadu_pd(v + i), d));
+    }
+#endif
+    for (; i < n; i++) v[i] += low ? high[i] - low[i] : high[i];
+}
+
+/* v[i]: the rows of a span, spikes left out, in columns from the left side of a tile up to its column i. */
+static void sat__tile_columns(double *v, const sat_table *t, int channel, const sat__span *y, int tx, int n)
 {
     int i, j, b = y->run0, super = SAT__SUPER >> t->shift;
-    for (i = 0; i < n; i++) v[i] = 0;
     for (j = 0; j < y->count; j++) {
         const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, y->tile[j], tx)];
         if (tile->slot)
-            for (i = 0; i < n; i++) v[i] += sat__wide_part(t, tile, 0, y->begin[j], x + i + 1, y->end[j]);
+            for (i = 0; i < n; i++)
+                v[i] = (j ? v[i] : 0) + sat__wide_part(t, tile, 0, y->begin[j], i + 1, y->end[j]);
         else {
-            const uint32_t *high = sat__cells(t, channel, y->tile[j], y->end[j] - 1) + ((size_t)tx << t->shift) + x;
-            sat__add_cells(v, high, y->begin[j] ? high - (size_t)(y->end[j] - y->begin[j]) * t->stride : NULL, n,
-                           tile->quantum);
+            const uint32_t *high = sat__cells(t, channel, y->tile[j], y->end[j] - 1) + ((size_t)tx << t->shift),
+                           *low = y->begin[j] ? high - (size_t)(y->end[j] - y->begin[j]) * t->stride : NULL;
+            sat__add_cells(v, high, low, n, tile->quantum, j > 0);
         }
     }
     while (b < y->run1) {
         int stop = sat__min_int(y->run1, (b | (super - 1)) + 1);
-        const double *high = sat__above(t, channel, stop - 1) + ((size_t)tx << t->shift) + x;
-        const double *low = b & (super - 1) ? sat__above(t, channel, b - 1) + ((size_t)tx << t->shift) + x : NULL;
-        for (i = 0; i < n; i++) v[i] += low ? high[i] - low[i] : high[i];
+        const double *high = sat__above(t, channel, stop - 1) + ((size_t)tx << t->shift);
+        const double *low = b & (super - 1) ? sat__above(t, channel, b - 1) + ((size_t)tx << t->shift) : NULL;
+        sat__add_strips(v, high, low, n);
         b = stop;
     }
 }
@@ -4603,49 +4633,72 @@ static void sat__add_spikes(double *sum, const sat_table *t, int channel, const 
     }
 }
 
+/* Tiles of the rows that one output row needs, each computed once unless the radius is very large. */
+enum { SAT__LINE_COLUMNS = 2048, SAT__LINE_TILES = 256 };
+
 typedef struct sat__filter_line {
     const sat_table *table;
     sat__span y;
     int channel, radius, y0, y1, giants;
-    double edge[512]; /* whole tiles of the rows, by tile modulo 512 */
-    int edge_end;     /* tiles below have theirs */
+    int held[SAT__LINE_TILES];          /* which tile a slot holds, -1: none */
+    double columns[SAT__LINE_COLUMNS];  /* a slot holds the columns of one tile */
+    double edges[SAT__LINE_TILES];      /* whole tiles of the rows */
+    int edge_of[SAT__LINE_TILES];
 } sat__filter_line;
+
+static int sat__tile_width(const sat_table *t, int tx)
+{
+    return sat__min_int(t->options.tile, t->width - (tx << t->shift));
+}
+
+static const double *sat__line_columns(sat__filter_line *f, int tx)
+{
+    const sat_table *t = f->table;
+    int slot = tx & ((SAT__LINE_COLUMNS >> t->shift) - 1);
+    double *columns = f->columns + ((size_t)slot << t->shift);
+    if (f->held[slot] != tx) {
+        sat__tile_columns(columns, t, f->channel, &f->y, tx, sat__tile_width(t, tx));
+        f->held[slot] = tx;
+    }
+    return columns;
+}
 
 static double sat__line_edge(sat__filter_line *f, int tx)
 {
-    const sat_table *t = f->table;
-    for (; f->edge_end <= tx; f->edge_end++)
-        sat__tile_columns(&f->edge[f->edge_end & 511], t, f->channel, &f->y, f->edge_end,
-                          sat__min_int(t->options.tile, t->width - (f->edge_end << t->shift)) - 1, 1);
-    if (f->edge_end - tx <= 512) return f->edge[tx & 511];
-    else {
-        double e;
-        sat__tile_columns(&e, t, f->channel, &f->y, tx, sat__min_int(t->options.tile, t->width - (tx << t->shift)) - 1,
-                          1);
-        return e;
+    int slot = tx & (SAT__LINE_TILES - 1);
+    if (f->edge_of[slot] != tx) {
+        f->edges[slot] = sat__line_columns(f, tx)[sat__tile_width(f->table, tx) - 1];
+        f->edge_of[slot] = tx;
     }
+    return f->edges[slot];
 }
 
-/* Sums around n pixels from x on, whose boxes all begin in one tile and end in one tile. */
+/* Sums around n pixels from x on, whose boxes all begin in one tile and end in one tile. Where a radius spans more
+   tiles than there are slots, the columns of the first tile are put aside. */
 static void sat__line_sums(double *sum, sat__filter_line *f, int x, int n, int first, int last)
 {
     const sat_table *t = f->table;
-    double low[SAT__MAX_TILE_SIDE], rest = 0;
-    int i, r = f->radius, tx, begin = first << t->shift, skip = sat__clamp_int(begin + r + 1 - x, 0, n);
-    int inside = sat__clamp_int(t->width - r - x, 0, n);
-    for (i = 0; i < skip; i++) low[i] = 0;
-    if (skip < n) sat__tile_columns(low + skip, t, f->channel, &f->y, first, x + skip - r - 1 - begin, n - skip);
-    if (inside) sat__tile_columns(sum, t, f->channel, &f->y, last, x + r - (last << t->shift), inside);
-    if (inside < n) {
-        double edge = sat__line_edge(f, last);
-        for (i = inside; i < n; i++) sum[i] = edge;
+    double edge = 0, rest = 0, whole = 0, aside[SAT__MAX_TILE_SIDE];
+    const double *low = NULL;
+    int i, r = f->radius, tx, one = first == last, begin = first << t->shift;
+    int skip = sat__clamp_int(begin + r + 1 - x, 0, n), inside = sat__clamp_int(t->width - r - x, 0, n);
+    if (!one) edge = sat__line_edge(f, first);
+    for (tx = first + 1; tx < last; tx++) rest += sat__line_edge(f, tx);
+    if (inside < n) whole = sat__line_edge(f, last);
+    if (skip < n) low = sat__line_columns(f, first) + (x + skip - r - 1 - begin);
+    if (low && last - first >= SAT__LINE_COLUMNS >> t->shift) {
+        memcpy(aside, low, (size_t)(n - skip) * sizeof *low);
+        low = aside;
     }
-    if (first == last)
-        for (i = 0; i < n; i++) sum[i] -= low[i];
-    else {
-        double edge = sat__line_edge(f, first);
-        for (tx = first + 1; tx < last; tx++) rest += sat__line_edge(f, tx);
-        for (i = 0; i < n; i++) sum[i] = ((edge - low[i]) + rest) + sum[i];
+    if (inside) {
+        const double *high = sat__line_columns(f, last) + (x + r - (last << t->shift));
+        for (i = 0; i < sat__min_int(skip, inside); i++) sum[i] = one ? high[i] : (edge + rest) + high[i];
+        for (i = skip; i < inside; i++)
+            sum[i] = one ? high[i] - low[i - skip] : ((edge - low[i - skip]) + rest) + high[i];
+    }
+    for (i = inside; i < n; i++) {
+        double left = i < skip ? 0 : low[i - skip];
+        sum[i] = one ? whole - left : ((edge - left) + rest) + whole;
     }
     for (tx = first; tx <= last; tx++) sat__add_spikes(sum, t, f->channel, &f->y, tx, r, x, n);
     /* spikes of whole tile rows are in the strips already */
@@ -4655,31 +4708,75 @@ static void sat__line_sums(double *sum, sat__filter_line *f, int x, int n, int f
                                      sat__min_int(x + i + r + 1, t->width), f->y1);
 }
 
+/* The same where no border cuts a box and no spike or giant is near: straight to the means. */
+static void sat__line_means(float *out, size_t step, sat__filter_line *f, int x, int n, int first, int last,
+                            double inverse)
+{
+    const sat_table *t = f->table;
+    double edge = 0, rest = 0;
+    const double *low, *high;
+    int i = 0, tx, one = first == last;
+    if (!one) edge = sat__line_edge(f, first);
+    for (tx = first + 1; tx < last; tx++) rest += sat__line_edge(f, tx);
+    low = sat__line_columns(f, first) + (x - f->radius - 1 - (first << t->shift));
+    high = sat__line_columns(f, last) + (x + f->radius - (last << t->shift));
+#ifdef SAT__SSE2
+    for (; step == 1 && i + 4 <= n; i += 4) {
+        const __m128d e = _mm_set1_pd(edge), r = _mm_set1_pd(rest), v = _mm_set1_pd(inverse);
+        __m128d a = _mm_loadu_pd(low + i), b = _mm_loadu_pd(low + i + 2), c = _mm_loadu_pd(high + i),
+                d = _mm_loadu_pd(high + i + 2);
+        a = one ? _mm_sub_pd(c, a) : _mm_add_pd(_mm_add_pd(_mm_sub_pd(e, a), r), c);
+        b = one ? _mm_sub_pd(d, b) : _mm_add_pd(_mm_add_pd(_mm_sub_pd(e, b), r), d);
+        _mm_storeu_ps(out + i, _mm_movelh_ps(_mm_cvtpd_ps(_mm_mul_pd(a, v)), _mm_cvtpd_ps(_mm_mul_pd(b, v))));
+    }
+#endif
+    for (; i < n; i++)
+        out[(size_t)i * step] =
+            (float)((one ? high[i] - low[i] : ((edge - low[i]) + rest) + high[i]) * inverse);
+}
+
+static int sat__has_spikes(const sat_table *t, int channel, int band)
+{
+    const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, 0)];
+    int tx, spikes = 0;
+    for (tx = 0; tx < t->tiles_x; tx++) spikes |= tile[tx].spikes;
+    return spikes;
+}
+
 /* The same of a tiled table, from its rows [y0, y1): a vertical difference in each tile, then a loop over the pixels
    whose boxes touch the same tiles. */
 static void sat__filter_tiled(float *out, const sat_table *t, int channel, int radius, int y0, int y1)
 {
     sat__filter_line f;
-    double sum[SAT__MAX_TILE_SIDE];
-    int x, i, n, step = t->channels, width = t->width, r = sat__min_int(radius, width);
+    double sum[SAT__MAX_TILE_SIDE], height = (double)(y1 - y0);
+    int x, i, n, skip, spiky = 0, slots = SAT__LINE_COLUMNS >> t->shift;
+    int step = t->channels, width = t->width, r = sat__min_int(radius, width);
     f.table = t;
     f.channel = channel;
     f.radius = r;
     f.y0 = y0;
     f.y1 = y1;
-    f.edge_end = 0;
     f.giants = 0;
+    for (i = 0; i < SAT__LINE_TILES; i++) f.held[i] = f.edge_of[i] = -1;
     sat__span_of(&f.y, y0, y1, t->shift);
+    for (i = 0; i < f.y.count; i++) spiky |= sat__has_spikes(t, channel, f.y.tile[i]);
     for (i = y0 >> t->shift; t->has_giants && i <= (y1 - 1) >> t->shift; i++)
         f.giants |= t->tallies[(size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, i)].giants > 0;
     for (x = 0; x < width; x += n) {
         int first = sat__max_int(0, x - r) >> t->shift, last = sat__min_int(width - 1, x + r) >> t->shift;
         n = sat__min_int(SAT__MAX_TILE_SIDE, sat__min_int(width - x, ((first + 1) << t->shift) + r - x));
         if (last < t->tiles_x - 1) n = sat__min_int(n, ((last + 1) << t->shift) - r - x);
+        skip = (first << t->shift) + r + 1 - x; /* of these the left side is the tile's */
+        if (x >= r && x + n <= width - r && skip <= 0 && !spiky && !f.giants && last - first < slots) {
+            sat__line_means(out + (size_t)x * (size_t)step, (size_t)step, &f, x, n, first, last,
+                            1 / ((2.0 * r + 1) * height));
+            continue;
+        }
+        if (x >= r && x + n <= width - r && skip > 0) n = sat__min_int(n, skip);
         sat__line_sums(sum, &f, x, n, first, last);
         for (i = 0; i < n; i++) {
             int x0 = x + i > r ? x + i - r : 0, x1 = width - (x + i) > r ? x + i + r + 1 : width;
-            out[(size_t)(x + i) * (size_t)step] = (float)(sum[i] / ((double)(x1 - x0) * (double)(y1 - y0)));
+            out[(size_t)(x + i) * (size_t)step] = (float)(sum[i] * (1 / ((double)(x1 - x0) * height)));
         }
     }
 }
@@ -6450,17 +6547,17 @@ SAT_DEF sat_result sat_gl_get_tiles(sat_gl_tiles *out, const sat_gl *gl)
 }
 
 /* The counts stand in the first layer of the tiles. */
-SAT_DEF sat_result sat_gl_get_stats(sat_stats *out, sat_gl *gl)
+SAT_DEF sat_result sat_gl_get_stats(sat_gl *gl, sat_stats *stats)
 {
     sat__gl_state state;
     uint32_t *records;
     size_t count, i;
-    if (!out || !gl || !gl->tiled.width) return SAT_ERR_ARGUMENT;
+    if (!stats || !gl || !gl->tiled.width) return SAT_ERR_ARGUMENT;
     count = ((size_t)gl->tiled.width + 63) / 64 * (size_t)gl->options.channels;
     count *= ((size_t)gl->tiled.height + 63) / 64;
     records = (uint32_t *)sat__alloc(&gl->options.allocator, count * 16);
     if (!records) return SAT_ERR_MEMORY;
-    memset(out, 0, sizeof *out);
+    memset(stats, 0, sizeof *stats);
     sat__gl_begin(&gl->gl, &state, 1);
     gl->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, gl->tiled.tiles_framebuffer);
     gl->gl.ReadBuffer(SAT__GL_COLOR_ATTACHMENT0);
@@ -6468,9 +6565,9 @@ SAT_DEF sat_result sat_gl_get_stats(sat_stats *out, sat_gl *gl)
                       SAT__GL_RGBA_INTEGER, SAT__GL_UNSIGNED_INT, records);
     sat__gl_end(&gl->gl, &state);
     for (i = 0; i < count; i++) {
-        out->nan += records[4 * i + 2] >> 4 & 8191;
-        out->infinite += records[4 * i + 2] >> 17 & 8191;
-        out->clamped += records[4 * i + 3];
+        stats->nan += records[4 * i + 2] >> 4 & 8191;
+        stats->infinite += records[4 * i + 2] >> 17 & 8191;
+        stats->clamped += records[4 * i + 3];
     }
     sat__release(&gl->options.allocator, records, count * 16);
     return SAT_OK;

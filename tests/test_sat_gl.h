@@ -791,7 +791,7 @@ TEST(tiles_equal_the_cpu_table_bit_for_bit)
                 made = test_generated;
                 if (!EXPECT_EQ(sat_gl_build(g, 0, input, w, h), SAT_OK)) puts(sat_gl_message(g));
                 EXPECT(!which || test_generated == made);
-                EXPECT_EQ(sat_gl_get_stats(&stats, g), SAT_OK);
+                EXPECT_EQ(sat_gl_get_stats(g, &stats), SAT_OK);
                 expected = sat_get_stats(t);
                 EXPECT_EQ(stats.nan, expected.nan);
                 EXPECT_EQ(stats.infinite, expected.infinite);
@@ -858,6 +858,80 @@ TEST(tiles_keep_what_bad_pixels_do_to_themselves)
     sat_gl_destroy(g);
     free(p);
     free(drawn);
+    test_close();
+}
+
+static const char *const test_tile_shader[] = {
+    "uniform usampler2D cells, strips;\n"
+    "uniform usampler2DArray tiles;\n"
+    "layout(location = 0) out vec4 result;\n"
+    "void main() {\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy), low = p * 3 - 5, high = low + p + 1;\n"
+    "    result = vec4(sat_sum(cells, tiles, strips, 1, low, high), sat_mean(cells, tiles, strips, 0, low, high), 0, 1);\n"
+    "}\n", NULL};
+
+/* A shader of the caller. */
+TEST(lookups_in_tiles)
+{
+    enum { W = 200, H = 180, N = 60 };
+    static float out[N * N][4];
+    float *p = (float *)malloc(sizeof(float) * W * H * 2);
+    sat_image view = sat_image_f32(p, W, H, 2);
+    sat_gl_options options = sat_gl_defaults();
+    const char *library[3];
+    sat__gl *gl = &test_f.real;
+    sat__gl_shaders shaders;
+    sat__gl_state state;
+    sat_gl_tiles tiles;
+    sat_table *t = NULL;
+    sat_gl *g = NULL;
+    unsigned input, target = 0, framebuffer = 0, program = 0;
+    int x, y;
+    if (!test_open()) return;
+    test_tile_image(p, W, H, 2, 5);
+    EXPECT_EQ(sat_create(&t, W, H, 2, NULL), SAT_OK);
+    EXPECT_EQ(sat_build(t, &view), SAT_OK);
+    options.channels = 2;
+    EXPECT_EQ(sat_gl_create(&g, test_get_proc, &options), SAT_OK);
+    input = test_tile_input(p, W, H, 2);
+    EXPECT_EQ(sat_gl_build(g, 0, input, W, H), SAT_OK);
+    EXPECT_EQ(sat_gl_get_tiles(&tiles, g), SAT_OK);
+    memset(&shaders, 0, sizeof shaders);
+    library[0] = sat_gl_glsl();
+    library[1] = sat_gl_glsl_tiles();
+    library[2] = NULL;
+    shaders.name = "lookups in tiles";
+    shaders.library = library;
+    shaders.fragment = test_tile_shader;
+    sat__gl_begin(gl, &state, 3);
+    if (!EXPECT_EQ(sat__gl_build(gl, &program, &shaders), SAT_OK)) puts(gl->message);
+    EXPECT_EQ(sat__gl_texture(gl, &target, SAT__GL_RGBA32F, N, N, NULL), SAT_OK);
+    EXPECT_EQ(sat__gl_framebuffer(gl, &framebuffer, &target, 1, 0), SAT_OK);
+    sat__gl_pass(gl, program, framebuffer, N, N);
+    sat__gl_set_texture(gl, program, "cells", 0, tiles.cells);
+    sat__gl_set_texture(gl, program, "strips", 1, tiles.strips);
+    sat__gl_set_int(gl, program, "tiles", 2);
+    gl->ActiveTexture(SAT__GL_TEXTURE0 + 2);
+    gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, tiles.tiles);
+    gl->BindSampler(2, 0);
+    sat__gl_draw(gl);
+    EXPECT_EQ(sat__gl_read(gl, out, target, SAT__GL_RGBA32F, N, N), SAT_OK);
+    gl->DeleteProgram(program);
+    gl->DeleteFramebuffers(1, &framebuffer);
+    sat__gl_end(gl, &state);
+    for (y = 0; y < N; y++)
+        for (x = 0; x < N; x++) {
+            int x0 = 3 * x - 5, y0 = 3 * y - 5;
+            double sum = sat_sum(t, 1, x0, y0, x0 + x + 1, y0 + y + 1);
+            EXPECT_NEAR(out[y * N + x][0], sum, 3e-7 * sum);
+            sum = sat_mean(t, 0, x0, y0, x0 + x + 1, y0 + y + 1);
+            EXPECT_NEAR(out[y * N + x][1], sum, 4e-7 * sum);
+        }
+    test_delete(target);
+    test_delete(input);
+    sat_destroy(t);
+    sat_gl_destroy(g);
+    free(p);
     test_close();
 }
 

@@ -279,7 +279,7 @@ static void look_up_bare(void *user)
     const size_t stride = w->table->stride;
     double sum = 0;
     for (int i = 0; i < LOOKUPS; i++) {
-        int x0 = w->x[i] - w->radius, y0 = w->y[i] - w->radius, x1 = x0 + 2 * w->radius + 1, y1 = y0 + 2 * w->radius + 1;
+        int side = 2 * w->radius + 1, x0 = w->x[i] - w->radius, y0 = w->y[i] - w->radius, x1 = x0 + side, y1 = y0 + side;
         const float *low = table + (size_t)y0 * stride, *high = table + (size_t)y1 * stride;
         sum += (double)((high[x1] - high[x0]) - (low[x1] - low[x0]));
     }
