@@ -197,7 +197,7 @@ static void precision_rows(const float *p, int n, const char *picture, const rep
         qsort(relative, (size_t)count, sizeof *relative, support_compare_doubles);
         bench_row("%s\t%s\t%d\t%d\t%.2g\t%.2g\t%.2g\t%.2g\t%.2g\t%.3f\t%.2f\t%d", picture, r->name, n, side, rms / mean,
                   worst / mean, relative[count / 2] + 1e-17, relative[count * 99 / 100] + 1e-17, relative[count - 1],
-                  (double)negative / count, time, r->kind == SAT_KIND_TILED && r->tile == 32);
+                  (double)negative / count, time, r->kind == SAT_KIND_TILED && r->tile == 64);
     }
     sat_destroy(t);
 }
@@ -250,7 +250,7 @@ static void bench_luminance_range(void)
             }
             qsort(relative, MOST, sizeof *relative, support_compare_doubles);
             bench_row("%d\t%s\t%.2g\t%.2g\t%d", decades, representations[r].name, relative[MOST / 2] + 1e-17, relative[MOST * 99 / 100] + 1e-17,
-                      representations[r].kind == SAT_KIND_TILED && representations[r].tile == 32);
+                      representations[r].kind == SAT_KIND_TILED && representations[r].tile == 64);
             sat_destroy(t);
         }
     }
@@ -279,7 +279,8 @@ static void look_up_bare(void *user)
     const size_t stride = w->table->stride;
     double sum = 0;
     for (int i = 0; i < LOOKUPS; i++) {
-        int side = 2 * w->radius + 1, x0 = w->x[i] - w->radius, y0 = w->y[i] - w->radius, x1 = x0 + side, y1 = y0 + side;
+        int side = 2 * w->radius + 1, x0 = w->x[i] - w->radius, y0 = w->y[i] - w->radius;
+        int x1 = x0 + side, y1 = y0 + side;
         const float *low = table + (size_t)y0 * stride, *high = table + (size_t)y1 * stride;
         sum += (double)((high[x1] - high[x0]) - (low[x1] - low[x0]));
     }
