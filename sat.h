@@ -3675,15 +3675,16 @@ static void sat__settle_tile(const sat_table *t, sat__tile *tile, const sat__sou
     tile->wants = count >= 8;
 }
 
-/* Takes a tile apart: scratch memory then holds what its cells sum. */
+/* Takes a tile apart: scratch memory then holds what its cells sum. `e`: what is known of a tile without giants. */
 static sat__extent sat__take_apart(const sat_table *t, float *p, int n, size_t index, int left, sat__giant *list,
-                                   sat__tally *tally)
+                                   sat__tally *tally, sat__extent e, int known)
 {
     sat__tile *tile = &t->tiles[index];
-    sat__extent e;
     int i, first = tally->giants;
-    if (!sat__is_tame(p, n, sat__giant_limit(t))) sat__take_giants(t, p, n, left, list, tally);
-    e = sat__extent_of(p, n, t->options.tile);
+    if (!known) {
+        if (!sat__is_tame(p, n, sat__giant_limit(t))) sat__take_giants(t, p, n, left, list, tally);
+        e = sat__extent_of(p, n, t->options.tile);
+    }
     tile->spikes = 0;
     if (e.largest > e.sum / 16) e = sat__take_spikes(t, index, p, n, e);
     for (i = 0; i < tile->spikes; i++) tally->sum_abs += fabs((double)t->spikes[index * SAT__SPIKES + (size_t)i].value);
@@ -3736,15 +3737,18 @@ static void sat__settle_band(const sat_table *t, const sat_image *image, int cha
             size_t index = sat__tile_index(t, channel, band, tx);
             sat__extent e;
             sat__source from;
+            int known;
             e.sum = e.largest = e.smallest = 0;
             if (tx < direct) e = sat__gauge_extent(&gauge[tx - panel]);
-            if (tx < direct && e.sum <= 3.4028235e38f && e.largest <= sat__giant_limit(t) && e.largest <= e.sum / 16) {
+            known = tx < direct && e.sum <= 3.4028235e38f && e.largest <= sat__giant_limit(t);
+            if (known && e.largest <= e.sum / 16) {
                 from.p = (const float *)sat__image_row(image, y0) + ((size_t)tx << t->shift);
                 from.step = sat__image_stride(image) / (ptrdiff_t)sizeof(float);
                 t->tiles[index].spikes = 0;
             } else {
                 int n = sat__gather(t, image, channel, y0, tx << t->shift, p);
-                e = sat__take_apart(t, p, n, index, tx << t->shift, t->giants + at * (size_t)t->giant_room, tally);
+                e = sat__take_apart(t, p, n, index, tx << t->shift, t->giants + at * (size_t)t->giant_room, tally, e,
+                                    known);
                 from.p = p;
                 from.step = side;
             }
@@ -3821,6 +3825,46 @@ static void sat__finish_band(const sat_table *t, const sat_image *image, int cha
     }
 }
 
+/* v[i] = (high[i] - low[i]) quantum for differences modulo 2^32, or v[i] += that; low may be NULL. */
+static void sat__add_cells(double *v, const uint32_t *high, const uint32_t *low, int n, double quantum, int add)
+{
+    int i = 0;
+#ifdef SAT__SSE2
+    const __m128d q = _mm_set1_pd(quantum);
+    for (; i + 4 <= n; i += 4) {
+        __m128i d = _mm_loadu_si128((const __m128i *)(const void *)(high + i));
+        __m128d a, b;
+        if (low) d = _mm_sub_epi32(d, _mm_loadu_si128((const __m128i *)(const void *)(low + i)));
+        a = _mm_mul_pd(_mm_cvtepi32_pd(d), q);
+        b = _mm_mul_pd(_mm_cvtepi32_pd(_mm_shuffle_epi32(d, 0xee)), q);
+        if (add) {
+            a = _mm_add_pd(_mm_loadu_pd(v + i), a);
+            b = _mm_add_pd(_mm_loadu_pd(v + i + 2), b);
+        }
+        _mm_storeu_pd(v + i, a);
+        _mm_storeu_pd(v + i + 2, b);
+    }
+#endif
+    for (; i < n; i++) {
+        double d = (double)(int32_t)(low ? high[i] - low[i] : high[i]) * quantum;
+        v[i] = add ? v[i] + d : d;
+    }
+}
+
+/* v[i] += high[i] - low[i]; low may be NULL. */
+static void sat__add_strips(double *v, const double *high, const double *low, int n)
+{
+    int i = 0;
+#ifdef SAT__SSE2
+    for (; i + 2 <= n; i += 2) {
+        __m128d d = _mm_loadu_pd(high + i);
+        if (low) d = _mm_sub_pd(d, _mm_loadu_pd(low + i));
+        _mm_storeu_pd(v + i, _mm_add_pd(_mm_loadu_pd(v + i), d));
+    }
+#endif
+    for (; i < n; i++) v[i] += low ? high[i] - low[i] : high[i];
+}
+
 /* The strips above: this tile row onto the one before. */
 static void sat__build_above(const sat_table *t, int channel, int band, int rows)
 {
@@ -3832,16 +3876,19 @@ static void sat__build_above(const sat_table *t, int channel, int band, int rows
         const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
         int x0 = tx << t->shift, w = sat__min_int(t->options.tile, t->width - x0);
         double last;
-        if (tile->slot || tile->spikes)
+        if (tile->slot)
             for (x = 0; x < w; x++) above[x0 + x] = sat__tile_part(t, channel, band, tx, 0, 0, x + 1, rows);
         else {
-            const int32_t *cells = (const int32_t *)(const void *)(sat__cells(t, channel, band, rows - 1) + x0);
-            for (x = 0; x < w; x++) above[x0 + x] = (double)cells[x] * tile->quantum;
+            const sat__spike *spikes = t->spikes + sat__tile_index(t, channel, band, tx) * SAT__SPIKES;
+            int i;
+            sat__add_cells(above + x0, sat__cells(t, channel, band, rows - 1) + x0, NULL, w, tile->quantum, 0);
+            for (i = 0; i < tile->spikes; i++)
+                for (x = spikes[i].x; x < w; x++) above[x0 + x] += (double)spikes[i].value;
         }
         last = above[x0 + w - 1];
         run = tx & (super - 1) ? run + last : last;
         whole[tx] = whole_up ? whole_up[tx] + run : run;
-        for (x = x0; up && x < x0 + w; x++) above[x] += up[x];
+        if (up) sat__add_strips(above + x0, up + x0, NULL, w);
     }
 }
 
@@ -4553,46 +4600,6 @@ static inline void sat__filter_kind(float *out, const sat_table *t, sat_kind kin
     }
 }
 
-/* v[i] = (high[i] - low[i]) quantum for differences modulo 2^32, or v[i] += that; low may be NULL. */
-static void sat__add_cells(double *v, const uint32_t *high, const uint32_t *low, int n, double quantum, int add)
-{
-    int i = 0;
-#ifdef SAT__SSE2
-    const __m128d q = _mm_set1_pd(quantum);
-    for (; i + 4 <= n; i += 4) {
-        __m128i d = _mm_loadu_si128((const __m128i *)(const void *)(high + i));
-        __m128d a, b;
-        if (low) d = _mm_sub_epi32(d, _mm_loadu_si128((const __m128i *)(const void *)(low + i)));
-        a = _mm_mul_pd(_mm_cvtepi32_pd(d), q);
-        b = _mm_mul_pd(_mm_cvtepi32_pd(_mm_shuffle_epi32(d, 0xee)), q);
-        if (add) {
-            a = _mm_add_pd(_mm_loadu_pd(v + i), a);
-            b = _mm_add_pd(_mm_loadu_pd(v + i + 2), b);
-        }
-        _mm_storeu_pd(v + i, a);
-        _mm_storeu_pd(v + i + 2, b);
-    }
-#endif
-    for (; i < n; i++) {
-        double d = (double)(int32_t)(low ? high[i] - low[i] : high[i]) * quantum;
-        v[i] = add ? v[i] + d : d;
-    }
-}
-
-/* v[i] += high[i] - low[i]; low may be NULL. */
-static void sat__add_strips(double *v, const double *high, const double *low, int n)
-{
-    int i = 0;
-#ifdef SAT__SSE2
-    for (; i + 2 <= n; i += 2) {
-        __m128d d = _mm_loadu_pd(high + i);
-        if (low) d = _mm_sub_pd(d, _mm_loadu_pd(low + i));
-        _mm_storeu_pd(v + i, _mm_add_pd(_mm_loadu_pd(v + i), d));
-    }
-#endif
-    for (; i < n; i++) v[i] += low ? high[i] - low[i] : high[i];
-}
-
 /* v[i]: the rows of a span, spikes left out, in columns from the left side of a tile up to its column i. */
 static void sat__tile_columns(double *v, const sat_table *t, int channel, const sat__span *y, int tx, int n)
 {
@@ -4749,7 +4756,7 @@ static void sat__filter_tiled(float *out, const sat_table *t, int channel, int r
 {
     sat__filter_line f;
     double sum[SAT__MAX_TILE_SIDE], height = (double)(y1 - y0);
-    int x, i, n, skip, spiky = 0, slots = SAT__LINE_COLUMNS >> t->shift;
+    int x, i, n, skip, spiky = 0, room = SAT__LINE_COLUMNS >> t->shift;
     int step = t->channels, width = t->width, r = sat__min_int(radius, width);
     f.table = t;
     f.channel = channel;
@@ -4767,7 +4774,7 @@ static void sat__filter_tiled(float *out, const sat_table *t, int channel, int r
         n = sat__min_int(SAT__MAX_TILE_SIDE, sat__min_int(width - x, ((first + 1) << t->shift) + r - x));
         if (last < t->tiles_x - 1) n = sat__min_int(n, ((last + 1) << t->shift) - r - x);
         skip = (first << t->shift) + r + 1 - x; /* of these the left side is the tile's */
-        if (x >= r && x + n <= width - r && skip <= 0 && !spiky && !f.giants && last - first < slots) {
+        if (x >= r && x + n <= width - r && skip <= 0 && !spiky && !f.giants && last - first < room) {
             sat__line_means(out + (size_t)x * (size_t)step, (size_t)step, &f, x, n, first, last,
                             1 / ((2.0 * r + 1) * height));
             continue;
