@@ -4,7 +4,7 @@
 
 # Small work for each program; all of them are compiled without any package, so that inputs are .pfm, .hdr and .obj.
 declare -A quick=(
-    [tonemap]="--size 40x30" [ssao]="--size 32" [fiv_shadows]="--size 24x18 --theta 8" [raindrops]="--size 40x30 --count 100"
+    [tonemap]="--size 40x30" [guided]="--size 40x30" [ssao]="--size 32" [fiv_shadows]="--size 24x18 --theta 8" [raindrops]="--size 40x30 --count 100"
     [photomosaic]="--grid 4x4 --tile 8" [demo]="--size 32x32 --samples 1 --no-shadows --no-occlusion")
 
 # run STATUS SENTENCE PROGRAM ARGUMENT...: ends so, with one line on stderr that holds the words ('' : nothing on stderr)
@@ -146,7 +146,7 @@ check_programs() {
         mount -t tmpfs -o ro none "$ground/fixed" 2>/dev/null && mounted="$mounted $ground/fixed"
     else skip "no full disk and no read-only one: mounting is for root"; fi
     sums=$(cd "$ground" && cksum in.pfm in.hdr mesh.obj other.pfm half.hdr tiles/a.png)
-    for program in tonemap ssao fiv_shadows raindrops photomosaic demo demo_web; do
+    for program in tonemap guided ssao fiv_shadows raindrops photomosaic demo demo_web; do
         [ -x "$dir/$program" ] || { fail "there is no $program"; continue; }
         check_ranges $program
         case $program in

@@ -823,7 +823,7 @@ TEST(tiles_keep_what_bad_pixels_do_to_themselves)
     float *p = (float *)malloc(sizeof(float) * W * H), *drawn = (float *)malloc(sizeof(float) * W * H * 4);
     sat_gl *g = NULL;
     unsigned input, target;
-    sat_gl_tiles tiles;
+    sat_gl_tiles tiles = {0, 0, 0};
     double worst = 0;
     int x, y, i;
     if (!test_open()) return;
@@ -882,7 +882,7 @@ TEST(lookups_in_tiles)
     sat__gl *gl = &test_f.real;
     sat__gl_shaders shaders;
     sat__gl_state state;
-    sat_gl_tiles tiles;
+    sat_gl_tiles tiles = {0, 0, 0};
     sat_table *t = NULL;
     sat_gl *g = NULL;
     unsigned input, target = 0, framebuffer = 0, program = 0;
