@@ -3388,6 +3388,15 @@ static inline double sat__tiled_sum(const sat_table *t, int channel, int x0, int
 
 /* ---- tables: building tiles */
 
+#if defined(SAT__SSE2)
+#define SAT__PREFETCH(p) _mm_prefetch((const char *)(const void *)(p), _MM_HINT_T0)
+#elif defined(__GNUC__)
+#define SAT__PREFETCH(p) __builtin_prefetch(p)
+#else
+#define SAT__PREFETCH(p) (void)(p)
+#endif
+
+
 /* Of |pixel| of a tile, in four lanes: pixel i of a row belongs to lane i modulo 4. Rows are summed on their own
    first, so that a GPU can make the same roundings. */
 typedef struct sat__gauge {
@@ -3729,9 +3738,13 @@ static void sat__settle_band(const sat_table *t, const sat_image *image, int cha
             direct = sat__is_direct(image) ? sat__min_int(stop, t->width >> t->shift) : 0;
         for (tx = panel; tx < direct; tx++) sat__gauge_clear(&gauge[tx - panel]);
         for (y = 0; y < rows; y++) {
-            const float *row = (const float *)sat__image_row(image, y0 + y);
-            for (tx = panel; tx < direct; tx++)
-                sat__gauge_row(&gauge[tx - panel], row + ((size_t)tx << t->shift), side);
+            const float *row = (const float *)sat__image_row(image, y0 + y),
+                        *ahead = (const float *)sat__image_row(image, y0 + sat__min_int(y + 2, rows - 1));
+            for (tx = panel; tx < direct; tx++) {
+                int x = tx << t->shift, end = x + side;
+                sat__gauge_row(&gauge[tx - panel], row + x, side);
+                for (; x < end; x += SAT__LINE / (int)sizeof(float)) SAT__PREFETCH(ahead + x);
+            }
         }
         for (tx = panel; tx < stop; tx++) {
             size_t index = sat__tile_index(t, channel, band, tx);
@@ -4366,14 +4379,6 @@ SAT_DEF double sat_sum(const sat_table *table, int channel, int x0, int y0, int 
 }
 
 /* Asks for the cells that a box will read. Which ones these are may be guessed: a wrong line costs little. */
-#if defined(SAT__SSE2)
-#define SAT__PREFETCH(p) _mm_prefetch((const char *)(const void *)(p), _MM_HINT_T0)
-#elif defined(__GNUC__)
-#define SAT__PREFETCH(p) __builtin_prefetch(p)
-#else
-#define SAT__PREFETCH(p) (void)(p)
-#endif
-
 static inline void sat__prefetch_row(const sat_table *t, int channel, int y, int x0, int x1)
 {
     const unsigned char *row = sat__row(t, channel, y);

@@ -4,10 +4,10 @@
        guided                                        a noisy map of depths about 1000 m: out/guided.png
        guided --stats                                errors and times beside the same filter in plain sums
 
-   The guided filter (He, Sun, Tang 2010): around each pixel a line q = a I + b is fitted to the pixels p by their variance
-   and covariance, a = cov(I, p) / (var(I) + epsilon), b = mean(p) - a mean(I); then the lines that a pixel lies in are
-   averaged. Here I is the luminance and p each channel. Where the variance is small beside the mean, sums of x and x * x
-   have lost it; sat.h keeps moments about the mean of each tile. */
+   The guided filter (He, Sun, Tang 2010): around each pixel a line q = a I + b is fitted to the pixels p by their
+   variance and covariance, a = cov(I, p) / (var(I) + epsilon), b = mean(p) - a mean(I); then the lines that a pixel
+   lies in are averaged. Here I is the luminance and p each channel. Where the variance is small beside the mean, sums
+   of x and x * x have lost it; sat.h keeps moments about the mean of each tile. */
 
 #define _POSIX_C_SOURCE 200809L
 #define SAT_IMPLEMENTATION
@@ -184,7 +184,8 @@ static image copy_of(const image *picture)
 {
     image copy;
     if (image_create(&copy, picture->width, picture->height, picture->channels))
-        memcpy(copy.pixels, picture->pixels, (size_t)copy.width * (size_t)copy.height * (size_t)copy.channels * sizeof(float));
+        memcpy(copy.pixels, picture->pixels,
+               (size_t)copy.width * (size_t)copy.height * (size_t)copy.channels * sizeof(float));
     return copy;
 }
 
