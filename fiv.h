@@ -131,23 +131,25 @@ extern "C" {
    ------------------------------------------------------------------------------------------------ */
 
 enum {
-    FIV_MAX_LIGHTS = 8,     /* directional lights split off an environment */
+    FIV_MAX_LIGHTS = 32,    /* directional lights split off an environment */
     FIV_MAX_INSTANCES = 256 /* occluders of one fiv_irradiance call */
 };
 
 typedef struct fiv_environment_options {
     int resolution;        /* 32; 8..64; texels along an edge of the light's cube and of every mask */
-    float delta_ratio;     /* 400; 0..1e38; a patch this many times brighter than the mean, and half a texel wide,
-                              becomes a directional light; 0: none does */
-    int max_lights;        /* 8; 0..FIV_MAX_LIGHTS; the strongest ones are kept, the rest stays in the cube */
+    float delta_ratio;     /* 100; 0..1e38; a patch this many times brighter than the mean, and half a texel wide (so:
+                              with 0.4 % of all light), becomes a directional light; those around it join at a quarter of
+                              that; 0: none does */
+    int max_lights;        /* 32; 0..FIV_MAX_LIGHTS; strongest patches first; those beyond stay in the cube, each
+                              spread over its texel */
     float max_radiance;    /* 1e10; 1e-30..1e38; larger values, infinity included, count as this much */
     sat_allocator allocator; /* malloc; used by create and destroy only */
     sat_threads threads;     /* serial; used by create and update; same bits for any worker count */
 } fiv_environment_options;
 FIV_DEF fiv_environment_options fiv_environment_defaults(void);
-/* One sentence on what create would refuse about these options ("resolution is 99; 8..64"), "" when nothing; returns
-   text. */
-FIV_DEF const char *fiv_explain_environment(char *text, size_t size, const fiv_environment_options *options);
+/* One sentence on what create would refuse ("resolution is 99; 8..64"), "" when nothing; returns text. */
+FIV_DEF const char *fiv_explain_environment(char *text, size_t size, const sat_image *equirect_rgb,
+                                            const fiv_environment_options *options);
 
 typedef struct fiv_environment_stats {
     size_t nan, negative, clamped; /* channel values that counted as 0, as 0 and as max_radiance */
@@ -192,16 +194,17 @@ typedef enum fiv_storage {
 typedef int fiv_progress_fn(float done, void *user);
 
 typedef struct fiv_occluder_options {
-    int theta, phi, rho;           /* 32, 17, 15; 4..4096 (even), 3..2049, 2..256: azimuths, polar angles with both
-                                      poles, shells at logarithmic distances */
-    float first_shell, last_shell; /* 0.3, 6; bounding radii; 0 < first < last <= 1000 */
-    int resolution;                /* 32; 8..64: that of the environments that will light it */
-    fiv_storage storage;           /* FIV_STORAGE_FLOAT */
-    int keep_masks;                /* 1; 0: each fiv_occluder_light rasterises all masks anew; no FIV_MASK, no save */
-    int lazy;                      /* 0; 1 (without keep_masks): only what fiv_occluder_prepare asks for is computed */
-    int max_lights;                /* 8; 0..FIV_MAX_LIGHTS: one byte a sample each */
-    int keep_mesh;                 /* 0; 1: the triangles stay, for receivers near contact and for edges of suns: see
-                                      fiv_irradiance_options.own_masks. Load has none to keep */
+    int theta;               /* 32; 4..4096; azimuths of the samples; even */
+    int phi;                 /* 17; 3..2049; polar angles, both poles among them */
+    int rho;                 /* 15; 2..256; shells at logarithmic distances */
+    float first_shell;       /* 0.3; 1e-6..1000; bounding radii */
+    float last_shell;        /* 6; 1e-6..1000; bounding radii; beyond first_shell */
+    int resolution;          /* 32; 8..64; that of the environments that will light it */
+    fiv_storage storage;     /* FIV_STORAGE_FLOAT */
+    int keep_masks;          /* 1; 0..1; 0: each fiv_occluder_light rasterises all masks anew; no FIV_MASK, no save */
+    int lazy;                /* 0; 0..1; 1 (without keep_masks): only what fiv_occluder_prepare asks for is computed */
+    int sun_map;             /* 512; 64..4096; side of the square in which all split-off lights have their depth maps: one
+                                light the whole of it, two to four a quarter each, five to nine a ninth ... */
     fiv_progress_fn *progress;     /* NULL */
     void *progress_user;
     sat_allocator allocator; /* malloc; not used after create */
@@ -218,7 +221,8 @@ typedef struct fiv_occluder_stats {
     size_t samples, rasterised;    /* positions of the occluder; masks made (shared ones once, stale ones not) */
     size_t inside;                 /* samples whose receiver lies inside the mesh */
     size_t spans;                  /* mask words; 2 bytes each */
-    size_t table_bytes, mask_bytes, bytes; /* vectors; masks; everything held */
+    size_t table_bytes, mask_bytes, mesh_bytes, map_bytes, bytes; /* vectors; masks; triangles; depth maps of the
+                                                                     lights; everything held */
 } fiv_occluder_stats;
 
 typedef struct fiv_occluder fiv_occluder;
@@ -229,6 +233,9 @@ typedef struct fiv_occluder fiv_occluder;
 FIV_DEF sat_result fiv_occluder_create(fiv_occluder **out, const float *positions, size_t vertex_count,
                                        const unsigned *indices, size_t triangle_count,
                                        const fiv_occluder_options *options, fiv_occluder_stats *stats);
+FIV_DEF const char *fiv_explain_occluder(char *text, size_t size, const float *positions, size_t vertex_count,
+                                         const unsigned *indices, size_t triangle_count,
+                                         const fiv_occluder_options *options);
 /* Integrates the light over the masks (eq 10); `rotation` of the occluder about its own origin, row-major, NULL: none.
    No allocation. The environment must stay unchanged and alive until the next fiv_occluder_light. */
 FIV_DEF sat_result fiv_occluder_light(fiv_occluder *occluder, const fiv_environment *environment,
@@ -241,11 +248,11 @@ FIV_DEF void fiv_occluder_destroy(fiv_occluder *occluder); /* NULL is fine */
 #ifndef FIV_NO_MASKS
 /* Bytes that fiv_occluder_save writes; 0 when the occluder has no masks of its own. */
 FIV_DEF size_t fiv_occluder_save_size(const fiv_occluder *occluder);
-/* Masks and geometry, not the light. size is at least fiv_occluder_save_size; the bytes depend on the arguments of
+/* Masks and triangles, not the light. size is at least fiv_occluder_save_size; the bytes depend on the arguments of
    create alone. */
 FIV_DEF sat_result fiv_occluder_save(void *memory, size_t size, const fiv_occluder *occluder);
-/* Takes nothing on trust: SAT_ERR_DATA for anything but a complete save of this version. `options` gives storage,
-   max_lights, allocator and threads; the rest comes from the save. Light it before use. */
+/* Takes nothing on trust: SAT_ERR_DATA for anything but a complete save of this version. `options` gives sun_map,
+   allocator and threads; the rest comes from the save. Light it before use. */
 FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, size_t size,
                                      const fiv_occluder_options *options);
 #endif
@@ -270,12 +277,16 @@ typedef enum fiv_accuracy {
 
 typedef struct fiv_irradiance_options {
     fiv_accuracy accuracy; /* FIV_SCALED */
-    int partial;           /* 1; 0: no correction where the horizon cuts an occluder (figure 23, left) */
-    int overlap;           /* 1; 0: no correction where occluders overlap (figure 21, left) */
-    float cutoff;          /* 0.001; 0..1: an occluder that cannot take more than this part of I_tot is left out */
-    int own_masks;         /* 64; 0..64: of each 64 receivers so many may get masks of their own of the occluders that
-                              keep their mesh, from FIV_SCALED on: those in a cell with a sample inside the mesh, or
-                              from which it may cover 2 sr; 0: none */
+    int partial;           /* 1; 0..1; 0: no correction where the horizon cuts an occluder (figure 23, left) */
+    int overlap;           /* 1; 0..1; 0: no correction where occluders overlap (figure 21, left) */
+    float cutoff;          /* 0.001; 0..1; an occluder that cannot take more than this part of I_tot is left out */
+    int own_masks;         /* 64; 0..64; of each 64 receivers so many may get masks of their own, from FIV_SCALED on:
+                              those in a cell with a sample inside the mesh, or from which it may cover 2 sr; 0: none */
+    int own_triangles;     /* 20000; 0..2147483647; an occluder of more gets none: a mask takes 50 ns a triangle */
+    float own_tolerance;   /* 0.01; 0..1; of up to 16 receivers in a row, within R / 16, those between two whose masks
+                              take the same to this part of I_tot get what lies between; 0: each its own */
+    int rays;              /* 1; 0..1; 0: where a sharp sun's depth map is not sure, its texels say, not a ray */
+    float penumbra;        /* 1; 0..100; times the measured radius of a sun; 0: all of them points */
     sat_threads threads;   /* serial; same bits for any worker count */
 } fiv_irradiance_options;
 FIV_DEF fiv_irradiance_options fiv_irradiance_defaults(void);
@@ -286,7 +297,8 @@ typedef struct fiv_irradiance_stats {
     size_t whole, clipped;              /* looked up: entirely above the horizon, cut by it */
     size_t overlaps;                    /* receivers that see occluders overlap */
     size_t masks;                       /* masks integrated for the last two */
-    size_t own_masks, rays;             /* of occluders that keep their mesh: masks made, rays to split-off lights */
+    size_t own_receivers, own_masks;    /* near contact: with masks of their own, or between two; masks made */
+    size_t rays;                        /* to split-off lights */
     size_t non_finite;                  /* receivers with NaN or infinity: black */
     size_t missing;                     /* lookups that met stale samples only: no shadow */
 } fiv_irradiance_stats;
@@ -298,6 +310,11 @@ FIV_DEF sat_result fiv_irradiance(float *rgb, const float *points, const float *
                                   const fiv_environment *environment, const fiv_instance *instances,
                                   size_t instance_count, const fiv_irradiance_options *options,
                                   fiv_irradiance_stats *stats);
+/* What fiv_irradiance would refuse about the scene or the options ("instance 1: lit by another environment"), "" when
+   nothing. */
+FIV_DEF const char *fiv_explain_irradiance(char *text, size_t size, const fiv_environment *environment,
+                                           const fiv_instance *instances, size_t instance_count,
+                                           const fiv_irradiance_options *options);
 
 #ifndef FIV_NO_SELF
 /* The same for receivers on the surface of the mesh `self` (eq 13), which casts shadows on itself; `others` as
@@ -339,11 +356,14 @@ extern "C" {
 #endif
 
 typedef struct fiv_gl_options {
-    int max_instances;       /* 8; 1..64: of one scene; the shader keeps an array of so many */
-    int self;                /* 0; 1: shadows on the occluders themselves, see fiv_gl_irradiance */
-    sat_allocator allocator; /* malloc; used by create, destroy and, when tables grow, by fiv_gl_set_scene */
+    int max_instances;       /* 8; 1..64; of one scene; the shader keeps an array of so many */
+    int self;                /* 0; 0..1; 1: shadows on the occluders themselves, see fiv_gl_irradiance */
+    float penumbra;          /* 1; 0..100; times the measured radius of a sun; 0: all of them points */
+    sat_allocator allocator; /* malloc; used by create and destroy */
 } fiv_gl_options;
 FIV_DEF fiv_gl_options fiv_gl_defaults(void);
+/* What create would refuse, "" when nothing; also in fiv_gl_message. */
+FIV_DEF const char *fiv_explain_gl(char *text, size_t size, int width, int height, const fiv_gl_options *options);
 
 typedef struct fiv_gl fiv_gl;
 
@@ -351,8 +371,8 @@ typedef struct fiv_gl fiv_gl;
    *out still is an object, for its message alone. */
 FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int width, int height,
                                  const fiv_gl_options *options);
-/* Uploads the environment and the vectors of the occluders: after each fiv_occluder_light. Arguments that are refused
-   leave the last scene as it was. */
+/* After each fiv_occluder_light. Uploads the environment and those occluders that differ from the last scene; no
+   allocation but, when tables grow, that of OpenGL. On an error the last scene stays as it was. */
 FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *gl, const fiv_environment *environment, const fiv_instance *instances,
                                     size_t count);
 /* Only places and scales differ from the last fiv_gl_set_scene: what moving occluders cost a frame. */
@@ -371,7 +391,7 @@ FIV_DEF void fiv_gl_destroy(fiv_gl *gl); /* NULL is fine */
 /* For a shader of one's own: `vec3 fiv_irradiance(vec3 point, vec3 normal)` and `vec3 fiv_self_irradiance(int self,
    vec3 point, vec3 normal)` on the surface of instance `self` (-1: none), as a list of strings that ends with NULL.
    Define FIV_INSTANCES as max_instances in front of it. fiv_gl_bind uses the program and sets its uniforms; it takes
-   three texture units and leaves them bound. */
+   five texture units and leaves them bound. */
 FIV_DEF const char *const *fiv_gl_glsl(void);
 FIV_DEF sat_result fiv_gl_bind(fiv_gl *gl, unsigned program, int first_unit);
 
@@ -545,6 +565,7 @@ enum {
 typedef struct fiv__light {
     float direction[3]; /* in the image's frame */
     float power[3];     /* radiance times solid angle */
+    float radius;       /* of the disc that is spread as widely: half its angle */
 } fiv__light;
 
 /* sums[row * (face + 1) + x]: the integral over texels 0..x-1 of a row, so that a span costs one difference. Doubles: a
@@ -572,8 +593,8 @@ struct fiv_environment {
 
 static const sat__field fiv__environment_fields[] = {
     SAT__FIELD(fiv_environment_options, 'i', resolution, 32, 8, 64, ' '),
-    SAT__FIELD(fiv_environment_options, 'f', delta_ratio, 400, 0, 1e38, ' '),
-    SAT__FIELD(fiv_environment_options, 'i', max_lights, 8, 0, FIV_MAX_LIGHTS, ' '),
+    SAT__FIELD(fiv_environment_options, 'f', delta_ratio, 100, 0, 1e38, ' '),
+    SAT__FIELD(fiv_environment_options, 'i', max_lights, 32, 0, FIV_MAX_LIGHTS, ' '),
     SAT__FIELD(fiv_environment_options, 'f', max_radiance, 1e10, 1e-30, 1e38, ' '),
     SAT__FIELD(fiv_environment_options, 'a', allocator, 0, 0, 0, ' '),
     SAT__FIELD(fiv_environment_options, 't', threads, 0, 0, 0, ' '),
@@ -586,13 +607,18 @@ FIV_DEF fiv_environment_options fiv_environment_defaults(void)
     return o;
 }
 
-FIV_DEF const char *fiv_explain_environment(char *text, size_t size, const fiv_environment_options *options)
+FIV_DEF const char *fiv_explain_environment(char *text, size_t size, const sat_image *image,
+                                            const fiv_environment_options *options)
 {
     sat__text t = sat__text_begin(text, size);
     const sat__field *wrong =
         options ? sat__fields_check(options, fiv__environment_fields, SAT__COUNT(fiv__environment_fields)) : NULL;
-    if (wrong) sat__text_field(&t, wrong, options);
-    return text && size ? text : "";
+    if (!sat__image_is_valid(image)) return sat_explain_image(text, size, image);
+    if (image->channels == 2) sat__text_add(&t, "channels is 2; 1, 3 or 4");
+    else if (image->width > 1 << 20) sat__text_range(&t, "width", image->width, 1, 1 << 20, ' ');
+    else if (image->height > 1 << 20) sat__text_range(&t, "height", image->height, 1, 1 << 20, ' ');
+    else if (wrong) sat__text_field(&t, wrong, options);
+    return t.size ? text : "";
 }
 
 /* ---- from the image to the source cube: every image texel is cut into `cut` x `cut` points, and a patch of the cube
@@ -788,15 +814,33 @@ static void fiv__measure_light(double power[3], double direction[3], fiv_environ
     }
 }
 
-/* The brightest patch above the limit; 0 when there is none. */
-static int fiv__brightest_patch(size_t *patch, const fiv_environment *e, double limit)
+/* 1 when a patch lies within one texel of the masks of a light. */
+static int fiv__is_beside_light(const fiv_environment *e, double sums[FIV_MAX_LIGHTS][3], size_t patch)
+{
+    float d[3];
+    int i, size = e->patch;
+    double cosine = cos(2.0 / e->face);
+    fiv__cube_direction(d, (int)(patch / (size_t)(size * size)), fiv__texel_coordinate((int)(patch % (size_t)size), size),
+                        fiv__texel_coordinate((int)(patch / (size_t)size % (size_t)size), size));
+    fiv__normalise(d, d);
+    for (i = 0; i < e->light_count; i++) {
+        const double *s = sums[i];
+        double length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+        if ((double)d[0] * s[0] + (double)d[1] * s[1] + (double)d[2] * s[2] > cosine * length) return 1;
+    }
+    return 0;
+}
+
+/* The brightest patch above the limit, or above a quarter of it beside a light; 0 when there is none. */
+static int fiv__brightest_patch(size_t *patch, const fiv_environment *e, double limit, double sums[FIV_MAX_LIGHTS][3])
 {
     size_t i, n = (size_t)e->patch * (size_t)e->patch * 6;
     double best = 0;
     int found = 0;
     for (i = 0; i < n; i++) {
         double light = fiv__patch_light(e->source + 4 * i);
-        if (light > best && light > limit * (double)e->source[4 * i + 3]) {
+        double least = limit * (double)e->source[4 * i + 3];
+        if (light > best && (light > least || (light > 0.25 * least && fiv__is_beside_light(e, sums, i)))) {
             best = light;
             *patch = i;
             found = 1;
@@ -844,25 +888,28 @@ static void fiv__split_lights(fiv_environment *e, const sat_image *image)
         limit = total / 12.566370614359172 * (double)e->delta_ratio;
         for (i = 0, rest = 0; i < n; i++) {
             double light = fiv__patch_light(e->source + 4 * i);
-            if (light <= limit * (double)e->source[4 * i + 3]) rest += light;
+            if (light <= 0.25 * limit * (double)e->source[4 * i + 3]) rest += light;
         }
         rest /= 3 * 12.566370614359172; /* bright patches keep the mean of the others */
-        for (tries = 0; tries < 4 * FIV_MAX_LIGHTS && fiv__brightest_patch(&patch, e, limit); tries++) {
+        for (tries = 0; tries < 8 * FIV_MAX_LIGHTS && fiv__brightest_patch(&patch, e, limit, sums); tries++) {
             double power[3], direction[3];
             for (c = 0; c < 3; c++) {
                 float *cell = e->source + 4 * patch;
                 floor_rgb[c] = cell[c] < (float)rest ? cell[c] : (float)rest;
             }
             fiv__measure_light(power, direction, e, image, patch, floor_rgb);
-            if (!fiv__add_light(e, sums, power, direction)) break;
+            if (!fiv__add_light(e, sums, power, direction)) break; /* no room: this and weaker patches stay */
             split += power[0] + power[1] + power[2];
             for (c = 0; c < 3; c++) e->source[4 * patch + (size_t)c] = floor_rgb[c];
         }
         e->stats.light_share = (float)(split / total < 1 ? split / total : 1);
     }
-    for (k = 0; k < e->light_count; k++) {
+    for (k = 0; k < e->light_count; k++) { /* a disc of half angle a has the mean direction (1 + cos a) / 2 */
+        fiv__light *l = &e->lights[k];
         double length = sqrt(sums[k][0] * sums[k][0] + sums[k][1] * sums[k][1] + sums[k][2] * sums[k][2]);
-        for (c = 0; c < 3; c++) e->lights[k].direction[c] = (float)(sums[k][c] / length);
+        double cosine = 2 * length / ((double)l->power[0] + (double)l->power[1] + (double)l->power[2]) - 1;
+        for (c = 0; c < 3; c++) l->direction[c] = (float)(sums[k][c] / length);
+        l->radius = cosine < 1 ? (float)acos(cosine > 0 ? cosine : 0) : 0;
     }
     e->stats.lights = e->light_count;
 }
@@ -1745,22 +1792,29 @@ static int fiv__cluster_faces_eye(const fiv__cluster *c, const float centre[3])
     return along * c->cosine + sqrtf(square > 0 ? square : 0) * sine <= -c->radius;
 }
 
-static void fiv__raster_mesh(uint64_t *rows, const fiv__mesh *mesh, const float offset[3], int size)
+/* normal: texels below its horizon do not matter, and may be set; NULL: all of them matter. */
+static void fiv__raster_mesh(uint64_t *rows, const fiv__mesh *mesh, const float offset[3], int size,
+                             const float *normal)
 {
     fiv__raster r;
     size_t i;
-    int face;
+    int face, low, high;
     r.mesh = mesh;
     r.rows = rows;
     r.size = size;
     memcpy(r.offset, offset, sizeof r.offset);
     memset(rows, 0, (size_t)(6 * size) * sizeof *rows);
+    for (face = 0; normal && face < 6 * size; face++) {
+        fiv__half_space(&low, &high, normal, face, size);
+        rows[face] = fiv__bits(0, size) & (low < high ? ~fiv__bits(low, high) : ~(uint64_t)0);
+    }
     for (i = 0; i < mesh->cluster_count; i++) {
         const fiv__cluster *c = &mesh->clusters[i];
         float centre[3], reach = c->radius * 1.4143f;
         int k;
         for (k = 0; k < 3; k++) centre[k] = c->centre[k] + offset[k];
         if (mesh->closed && fiv__cluster_faces_eye(c, centre)) continue;
+        if (normal && fiv__dot(centre, normal) < -c->radius) continue;
         for (face = 0; face < 6; face++) {
             fiv__axes ax = fiv__face_axes(face);
             float w = centre[ax.w] * ax.sign, u = fabsf(centre[ax.u]), v = fabsf(centre[ax.v]), side = u > v ? u : v;
@@ -2053,19 +2107,9 @@ static void fiv__locate(fiv__cell *cell, const fiv__grid *g, const float c[3])
 
 enum {
     FIV__SUPPORT = 33,  /* side of the octahedral table of the support function */
-    FIV__BATCH = 256,   /* masks between two calls of the progress function */
-    FIV__NEAR = 768,    /* texels around a light whose distance is measured */
-    FIV__NEAR_ROWS = 128
+    FIV__BATCH = 256    /* masks between two calls of the progress function */
 };
 enum { FIV__VALID, FIV__INSIDE, FIV__STALE, FIV__WANTED };
-
-/* The texels around a split-off light. */
-typedef struct fiv__near {
-    int count, row_count;
-    uint64_t texel[FIV__NEAR];     /* by rising distance: distance (21 a texel) << 32 | row << 8 | x */
-    int row[FIV__NEAR_ROWS];       /* the same texels as bits */
-    uint64_t bits[FIV__NEAR_ROWS];
-} fiv__near;
 
 struct fiv_occluder {
     sat_allocator allocator;
@@ -2074,18 +2118,20 @@ struct fiv_occluder {
     size_t block_size, mesh_size, words_size;
     int share;             /* masks belong to another occluder */
     fiv__grid grid;
-    int face, keep_masks, keep_mesh, lazy, max_lights, half_floats;
+    int face, keep_masks, lazy, half_floats;
     float centre[3], radius;
     fiv_occluder_stats stats;
     const fiv_environment *environment; /* that lit it; NULL: none yet */
-    unsigned stamp;
+    unsigned stamp, lit;   /* times that it was lit */
+    uint64_t signature;    /* differs where what OpenGL holds of it differs */
     int light_count;
     float rotation[9], table_scale;     /* stored vector = table_scale rho^2 vector */
     fiv__mesh mesh;
     float *table;          /* FIV__TERMS a sample: rho^2 times vector and solid angle, the latter < 0 where not valid */
     uint16_t *half_table;  /* the same as half floats */
-    signed char *distance; /* max_lights a sample: from the silhouette to the light, + covered; 21 = one mask texel */
-    fiv__near *lights;     /* max_lights: the lights in the occluder's frame */
+    int map_side, cell_side, cells;              /* of the depth maps; of the cell of one; cells along the side */
+    uint16_t *map;                               /* map_side^2 */
+    float light_axes[FIV_MAX_LIGHTS][3][3];      /* right, up, towards the light, in the occluder's frame */
     double *sums;          /* integrals of the environment in the occluder's frame */
     unsigned char *state;  /* FIV__VALID ... a sample */
     float *support;        /* largest extent along a direction, in radii */
@@ -2099,34 +2145,78 @@ static inline uint16_t *fiv__half_sample(const fiv_occluder *o, size_t sample)
     return o->half_table + 1 + FIV__TERMS * sample;
 }
 
+static const sat__field fiv__occluder_fields[] = {
+    SAT__FIELD(fiv_occluder_options, 'i', theta, 32, 4, 4096, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', phi, 17, 3, 2049, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', rho, 15, 2, 256, ' '),
+    SAT__FIELD(fiv_occluder_options, 'f', first_shell, 0.3, 1e-6, 1000, ' '),
+    SAT__FIELD(fiv_occluder_options, 'f', last_shell, 6, 1e-6, 1000, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', resolution, 32, 8, 64, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', storage, FIV_STORAGE_FLOAT, FIV_STORAGE_FLOAT, FIV_STORAGE_HALF_OCTAHEDRAL, ' '),
+#ifdef FIV_NO_MASKS
+    SAT__FIELD(fiv_occluder_options, 'i', keep_masks, 1, 0, 0, ' '),
+#else
+    SAT__FIELD(fiv_occluder_options, 'i', keep_masks, 1, 0, 1, ' '),
+#endif
+    SAT__FIELD(fiv_occluder_options, 'i', lazy, 0, 0, 1, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', sun_map, 512, 64, 4096, ' '),
+    SAT__FIELD(fiv_occluder_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(fiv_occluder_options, 't', threads, 0, 0, 0, ' '),
+};
+
 FIV_DEF fiv_occluder_options fiv_occluder_defaults(void)
 {
     fiv_occluder_options o;
-    memset(&o, 0, sizeof o);
-    o.theta = 32;
-    o.phi = 17;
-    o.rho = 15;
-    o.first_shell = 0.3f;
-    o.last_shell = 6;
-    o.resolution = 32;
-    o.keep_masks = 1;
-    o.max_lights = FIV_MAX_LIGHTS;
+    sat__fields_default(&o, sizeof o, fiv__occluder_fields, SAT__COUNT(fiv__occluder_fields));
     return o;
+}
+
+static int fiv__explain_occluder_options(sat__text *t, const fiv_occluder_options *o)
+{
+    const sat__field *wrong = sat__fields_check(o, fiv__occluder_fields, SAT__COUNT(fiv__occluder_fields));
+    if (wrong) sat__text_field(t, wrong, o);
+    else if (o->theta & 1) sat__text_add(t, "theta is odd");
+    else if (!(o->first_shell < o->last_shell)) sat__text_add(t, "last_shell is not beyond first_shell");
+    else if (o->keep_masks && o->lazy) sat__text_add(t, "lazy is 1 with keep_masks; an occluder that deforms keeps none");
+    else return 1;
+    return 0;
 }
 
 static int fiv__occluder_options_are_valid(const fiv_occluder_options *o)
 {
-    if (o->theta < 4 || o->theta > 4096 || o->theta & 1 || o->phi < 3 || o->phi > 2049 || o->rho < 2 || o->rho > 256)
-        return 0;
-    if (!(o->first_shell > 1e-6f) || !(o->last_shell <= 1000) || !(o->first_shell < o->last_shell)) return 0;
-    if (o->resolution < 8 || o->resolution > FIV__MAX_FACE) return 0;
-    if (o->max_lights < 0 || o->max_lights > FIV_MAX_LIGHTS) return 0;
-    if (o->storage != FIV_STORAGE_FLOAT && o->storage != FIV_STORAGE_HALF_OCTAHEDRAL) return 0;
-#ifdef FIV_NO_MASKS
-    if (o->keep_masks) return 0;
-#endif
-    if (o->keep_masks && o->lazy) return 0;
-    return sat__threads_are_valid(&o->threads);
+    sat__text ignored = sat__text_begin(NULL, 0);
+    return fiv__explain_occluder_options(&ignored, o);
+}
+
+/* 0 and a sentence where an index is beyond the vertices, or a pointer is missing. */
+static int fiv__explain_mesh(sat__text *t, const float *positions, size_t vertex_count, const unsigned *indices,
+                             size_t triangle_count)
+{
+    size_t i;
+    if (triangle_count && (!positions || !indices)) sat__text_add(t, "positions or indices are NULL");
+    else {
+        for (i = 0; i < 3 * triangle_count && indices[i] < vertex_count; i++) {}
+        if (i == 3 * triangle_count) return 1;
+        sat__text_add(t, "triangle ");
+        sat__text_number(t, (double)(i / 3));
+        sat__text_add(t, ": its index is ");
+        sat__text_number(t, (double)indices[i]);
+        sat__text_add(t, " of ");
+        sat__text_number(t, (double)vertex_count);
+        sat__text_add(t, " vertices");
+    }
+    return 0;
+}
+
+FIV_DEF const char *fiv_explain_occluder(char *text, size_t size, const float *positions, size_t vertex_count,
+                                         const unsigned *indices, size_t triangle_count,
+                                         const fiv_occluder_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (vertex_count > 0x7fffffff || triangle_count > 0x7fffffff / 3) sat__text_add(&t, "more than 2147483647 vertices or indices");
+    else if (!options || fiv__explain_occluder_options(&t, options))
+        fiv__explain_mesh(&t, positions, vertex_count, indices, triangle_count);
+    return t.size ? text : "";
 }
 
 static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
@@ -2146,9 +2236,8 @@ static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
     o->half_floats = g->octahedral;
     o->face = options->resolution;
     o->keep_masks = options->keep_masks != 0;
-    o->keep_mesh = options->keep_mesh != 0;
     o->lazy = options->lazy != 0;
-    o->max_lights = options->max_lights;
+    o->map_side = options->sun_map;
 }
 
 /* Arrays of its own; those of a share's masks are set by the caller. */
@@ -2158,8 +2247,9 @@ static void fiv__occluder_layout(fiv_occluder *o, sat__arena *arena)
     o->sums = (double *)sat__carve(arena, 6 * face * (face + 1) * FIV__TERMS, sizeof(double));
     o->table = (float *)sat__carve(arena, o->half_floats ? 0 : n, FIV__TERMS * sizeof(float));
     o->half_table = (uint16_t *)sat__carve(arena, o->half_floats ? FIV__TERMS * n + 8 : 0, sizeof(uint16_t));
-    o->distance = (signed char *)sat__carve(arena, n, (size_t)o->max_lights);
-    o->lights = (fiv__near *)sat__carve(arena, (size_t)o->max_lights, sizeof *o->lights);
+#ifndef FIV_NO_DELTA
+    o->map = (uint16_t *)sat__carve(arena, (size_t)o->map_side * (size_t)o->map_side, sizeof(uint16_t));
+#endif
     if (o->share) return;
     o->state = (unsigned char *)sat__carve(arena, n, 1);
     o->support = (float *)sat__carve(arena, FIV__SUPPORT * FIV__SUPPORT, sizeof(float));
@@ -2183,7 +2273,10 @@ static sat_result fiv__allocate_occluder(fiv_occluder **out, const fiv_occluder 
     made = (fiv_occluder *)sat__carve(&arena, 1, sizeof o);
     fiv__occluder_layout(&o, &arena);
     o.stats.samples = fiv__grid_samples(&o.grid);
-    o.stats.table_bytes = o.stats.samples * (FIV__TERMS * (o.half_floats ? 2u : 4u) + (size_t)o.max_lights);
+    o.stats.table_bytes = o.stats.samples * FIV__TERMS * (o.half_floats ? 2u : 4u);
+#ifndef FIV_NO_DELTA
+    o.stats.map_bytes = (size_t)o.map_side * (size_t)o.map_side * sizeof(uint16_t);
+#endif
     *made = o;
     *out = made;
     return SAT_OK;
@@ -2210,6 +2303,7 @@ static void fiv__count_bytes(fiv_occluder *o)
 {
     size_t n = o->stats.samples, counts = o->keep_masks && !o->share ? (n + 1) * sizeof(uint32_t) : 0;
     o->stats.mask_bytes = (o->share ? 0 : o->words_size) + counts;
+    o->stats.mesh_bytes = o->mesh_size;
     o->stats.bytes = o->block_size + o->mesh_size + (o->share ? 0 : o->words_size);
 }
 
@@ -2283,7 +2377,7 @@ static void fiv__make_masks(int begin, int end, int worker, void *context)
         float offset[3];
         if (fiv__first_twin(&o->grid, sample) != sample) continue;
         fiv__sample_offset(offset, &o->grid, sample);
-        fiv__raster_mesh(rows, &o->mesh, offset, o->face);
+        fiv__raster_mesh(rows, &o->mesh, offset, o->face, NULL);
         o->state[sample] = fiv__judge_mask(rows, o->face, o->mesh.closed);
     }
 }
@@ -2413,16 +2507,15 @@ FIV_DEF sat_result fiv_occluder_create(fiv_occluder **out, const float *position
 {
     fiv_occluder_options o = options ? *options : fiv_occluder_defaults();
     fiv_occluder from, *made = NULL;
+    sat__text ignored = sat__text_begin(NULL, 0);
     sat_result result;
-    size_t i;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
     if (!fiv__occluder_options_are_valid(&o)) return SAT_ERR_ARGUMENT;
     if (triangle_count && (!positions || !indices)) return SAT_ERR_ARGUMENT;
     if (vertex_count > 0x7fffffff || triangle_count > 0x7fffffff / 3) return SAT_ERR_SIZE;
-    for (i = 0; i < 3 * triangle_count; i++)
-        if (indices[i] >= vertex_count) return SAT_ERR_ARGUMENT;
+    if (!fiv__explain_mesh(&ignored, positions, vertex_count, indices, triangle_count)) return SAT_ERR_ARGUMENT;
     memset(&from, 0, sizeof from);
     if (!sat__resolve_allocator(&from.allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     from.threads = o.threads;
@@ -2435,11 +2528,6 @@ FIV_DEF sat_result fiv_occluder_create(fiv_occluder **out, const float *position
     memset(made->state, FIV__STALE, made->stats.samples);
 #ifndef FIV_NO_MASKS
     if (!result && made->keep_masks) result = fiv__precompute(made, &o);
-    if (!result && made->keep_masks && !made->keep_mesh) {
-        sat__release(&made->allocator, made->mesh_block, made->mesh_size);
-        made->mesh_block = NULL;
-        made->mesh_size = 0;
-    }
 #endif
     if (result) {
         fiv_occluder_destroy(made);
@@ -2468,56 +2556,120 @@ FIV_DEF sat_result fiv_occluder_share(fiv_occluder **out, const fiv_occluder *ma
     return result;
 }
 
-/* ---- distance from a silhouette to a light. A light's visibility is a step in space; interpolated between samples it
-   would blur over a whole cell. The angle from the light to the mask's border changes smoothly, so that is what is
-   interpolated, and the step is taken afterwards. */
+/* ---- split-off lights: a depth map each, seen along the light (orthographic), which says how far the mesh reaches
+   towards it. All of them share a square of map_side^2 texels: cells of a grid, the middle of each the bounding ball,
+   two texels at its border empty. A texel is 0 where there is nothing, else 1 + 65534 (z + 1) / 2. */
 
-static void fiv__find_near(fiv__near *near_light, const float direction[3], int size)
+#ifndef FIV_NO_DELTA
+
+enum { FIV__MAP_BORDER = 2 };
+
+/* Right, up and towards the light, right-handed. */
+static void fiv__light_frame(float axes[3][3], const float direction[3])
 {
-    uint64_t scratch[FIV__NEAR], *sorted;
-    float limit = cosf(12.0f / (float)size); /* six texels */
-    int row, x, n = 0;
-    near_light->row_count = 0;
-    for (row = 0; row < 6 * size; row++) {
-        uint64_t bits = 0;
-        for (x = 0; x < size && n < FIV__NEAR; x++) {
-            float d[3], cosine;
-            fiv__cube_direction(d, row / size, fiv__texel_coordinate(x, size), fiv__texel_coordinate(row % size, size));
-            cosine = fiv__dot(d, direction) / sqrtf(fiv__dot(d, d));
-            if (cosine < limit) continue;
-            near_light->texel[n++] = (uint64_t)(acosf(cosine < 1 ? cosine : 1) * (float)size * 10.5f * 65536) << 16 |
-                                     (uint64_t)(row << 6 | x);
-            bits |= (uint64_t)1 << x;
-        }
-        if (bits && near_light->row_count < FIV__NEAR_ROWS) {
-            near_light->row[near_light->row_count] = row;
-            near_light->bits[near_light->row_count++] = bits;
-        }
-    }
-    sorted = fiv__sort(near_light->texel, scratch, (size_t)n, 2, 5);
-    if (sorted != near_light->texel) memcpy(near_light->texel, sorted, (size_t)n * sizeof *sorted);
-    near_light->count = n;
+    int k, least = 0;
+    for (k = 1; k < 3; k++)
+        if (fabsf(direction[k]) < fabsf(direction[least])) least = k;
+    for (k = 0; k < 3; k++) axes[0][k] = (k == least ? 1.0f : 0.0f) - direction[k] * direction[least];
+    fiv__normalise(axes[0], axes[0]);
+    for (k = 0; k < 3; k++)
+        axes[1][k] = direction[(k + 1) % 3] * axes[0][(k + 2) % 3] - direction[(k + 2) % 3] * axes[0][(k + 1) % 3];
+    memcpy(axes[2], direction, sizeof axes[2]);
 }
 
-static int fiv__silhouette_distance(const fiv__near *near_light, const uint64_t *rows)
+static inline float fiv__map_scale(const fiv_occluder *o) { return 0.5f * (float)(o->cell_side - 2 * FIV__MAP_BORDER); }
+
+static inline size_t fiv__map_cell(const fiv_occluder *o, int light)
 {
-    int i, covered, any = 0, all = 1;
-    for (i = 0; i < near_light->row_count; i++) {
-        uint64_t bits = rows[near_light->row[i]] & near_light->bits[i];
-        any |= bits != 0;
-        all &= bits == near_light->bits[i];
-    }
-    if (!any || all) return any ? 126 : -126;
-    covered = (int)(rows[near_light->texel[0] >> 6 & 0x3ff] >> (near_light->texel[0] & 63) & 1);
-    for (i = 1; i < near_light->count; i++) {
-        uint64_t t = near_light->texel[i];
-        int distance = (int)(t >> 32);
-        if ((int)(rows[t >> 6 & 0x3ff] >> (t & 63) & 1) == covered) continue;
-        distance = sat__clamp_int(distance - 10, 0, 126);
-        return covered ? distance : -distance;
-    }
-    return covered ? 126 : -126;
+    return (size_t)(light / o->cells * o->cell_side) * (size_t)o->map_side + (size_t)(light % o->cells * o->cell_side);
 }
+
+/* One triangle, its corners in texels of a cell: the larger of what stands and its depth at each texel's centre. */
+static void fiv__draw_depth(uint16_t *cell, int pitch, int side, float x[3], float y[3], const float z[3])
+{
+    float area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]), zx, zy, z0;
+    int row, x0, x1, y0 = sat__max_int(fiv__ceil(fiv__min3(y[0], y[1], y[2])), 0);
+    int y1 = sat__min_int(fiv__floor(fiv__max3(y[0], y[1], y[2])), side - 1);
+    if (y0 > y1 || area == 0) return;
+    zx = ((z[1] - z[0]) * (y[2] - y[0]) - (z[2] - z[0]) * (y[1] - y[0])) / area;
+    zy = ((z[2] - z[0]) * (x[1] - x[0]) - (z[1] - z[0]) * (x[2] - x[0])) / area;
+    z0 = fiv__max3(z[0], z[1], z[2]);
+    for (row = y0; row <= y1; row++) {
+        float low = 1e30f, high = -1e30f, at = (float)row;
+        int i;
+        for (i = 0; i < 3; i++) {
+            int j = i == 2 ? 0 : i + 1, a = y[i] < y[j] ? i : j, b = i + j - a;
+            float cross;
+            if (y[a] > at || y[b] < at) continue;
+            cross = y[b] > y[a] ? x[a] + (at - y[a]) * (x[b] - x[a]) / (y[b] - y[a]) : x[a];
+            low = cross < low ? cross : low;
+            high = cross > high ? cross : high;
+            if (y[a] == y[b]) low = x[b] < low ? x[b] : low, high = x[b] > high ? x[b] : high;
+        }
+        if (!(low <= high)) continue;
+        x0 = sat__max_int(fiv__ceil(low), 0);
+        x1 = sat__min_int(fiv__floor(high), side - 1);
+        for (; x0 <= x1; x0++) {
+            float depth = z[0] + ((float)x0 - x[0]) * zx + (at - y[0]) * zy;
+            uint16_t word;
+            depth = depth > z0 ? z0 : depth < -1 ? -1 : depth; /* beside the triangle's edge: no farther than a corner */
+            word = (uint16_t)(1.5f + (depth + 1) * 32767);
+            if (word > cell[row * pitch + x0]) cell[row * pitch + x0] = word;
+        }
+    }
+}
+
+/* The depth maps of some lights. Of a closed mesh only what faces the light is drawn. */
+static void fiv__draw_maps(int begin, int end, int worker, void *context)
+{
+    fiv_occluder *o = (fiv_occluder *)context;
+    const fiv__mesh *mesh = &o->mesh;
+    float scale = fiv__map_scale(o), shift = scale + FIV__MAP_BORDER - 0.5f;
+    (void)worker;
+    for (; begin < end; begin++) {
+        float (*axes)[3] = o->light_axes[begin];
+        uint16_t *cell = o->map + fiv__map_cell(o, begin);
+        size_t i;
+        int row;
+        for (row = 0; row < o->cell_side; row++) memset(cell + row * o->map_side, 0, (size_t)o->cell_side * sizeof *cell);
+        for (i = 0; i < mesh->cluster_count; i++) {
+            const fiv__cluster *c = &mesh->clusters[i];
+            float p[3][FIV__CLUSTER_VERTICES + 4], facing = -fiv__dot(c->axis, axes[2]);
+            int v, k, t;
+            if (mesh->closed && c->cosine > 0 && facing > 0 && facing * facing >= 1.0001f - c->cosine * c->cosine) continue;
+            for (v = 0; v < c->vertices; v++) {
+                float q[3];
+                for (k = 0; k < 3; k++) q[k] = mesh->x[k][c->vertex + (size_t)v];
+                p[0][v] = fiv__dot(q, axes[0]) * scale + shift;
+                p[1][v] = fiv__dot(q, axes[1]) * scale + shift;
+                p[2][v] = fiv__dot(q, axes[2]);
+            }
+            for (t = 0; t < c->triangles; t++) {
+                const unsigned char *corner = mesh->corner + 3 * (c->triangle + (size_t)t);
+                float x[3], y[3], z[3];
+                for (k = 0; k < 3; k++) x[k] = p[0][corner[k]], y[k] = p[1][corner[k]], z[k] = p[2][corner[k]];
+                if (mesh->closed && !(((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])) * mesh->turn > 0)) continue;
+                fiv__draw_depth(cell, o->map_side, o->cell_side, x, y, z);
+            }
+        }
+    }
+}
+
+static void fiv__find_lights(fiv_occluder *o)
+{
+    int i;
+    for (o->cells = 1; o->cells * o->cells < o->light_count; o->cells++) {}
+    o->cell_side = o->map_side / o->cells;
+    for (i = 0; i < o->light_count; i++) {
+        float d[3];
+        fiv__turn(d, o->environment->rotation, o->environment->lights[i].direction);
+        fiv__turn_back(d, o->rotation, d);
+        fiv__normalise(d, d);
+        fiv__light_frame(o->light_axes[i], d);
+    }
+}
+
+#endif /* FIV_NO_DELTA */
 
 /* ---- lighting */
 
@@ -2538,16 +2690,8 @@ static void fiv__store_vector(fiv_occluder *o, size_t sample, const double sum[F
 static void fiv__light_sample(fiv_occluder *o, size_t sample, const uint16_t *words, size_t count)
 {
     double sum[FIV__TERMS];
-    int i;
     fiv__integrate(sum, o->sums, words, count, o->face);
     fiv__store_vector(o, sample, sum);
-    if (o->light_count) {
-        uint64_t rows[FIV__MAX_ROWS];
-        fiv__decode(rows, words, count, 6 * o->face);
-        for (i = 0; i < o->light_count; i++)
-            o->distance[sample * (size_t)o->max_lights + (size_t)i] =
-                (signed char)fiv__silhouette_distance(&o->lights[i], rows);
-    }
 }
 
 #ifndef FIV_NO_MASKS
@@ -2572,7 +2716,7 @@ static void fiv__light_wanted(int begin, int end, int worker, void *context)
         float offset[3];
         if (o->state[sample] != FIV__WANTED || fiv__first_twin(&o->grid, sample) != sample) continue;
         fiv__sample_offset(offset, &o->grid, sample);
-        fiv__raster_mesh(rows, &o->mesh, offset, o->face);
+        fiv__raster_mesh(rows, &o->mesh, offset, o->face, NULL);
         o->state[sample] = fiv__judge_mask(rows, o->face, o->mesh.closed);
         fiv__light_sample(o, sample, words, fiv__encode(words, rows, 6 * o->face));
     }
@@ -2580,10 +2724,8 @@ static void fiv__light_wanted(int begin, int end, int worker, void *context)
 
 static void fiv__copy_sample(fiv_occluder *o, size_t to, size_t from)
 {
-    size_t lights = (size_t)o->max_lights;
     if (o->half_floats) memcpy(fiv__half_sample(o, to), fiv__half_sample(o, from), FIV__TERMS * sizeof *o->half_table);
     else memcpy(o->table + FIV__TERMS * to, o->table + FIV__TERMS * from, FIV__TERMS * sizeof *o->table);
-    if (lights) memcpy(o->distance + to * lights, o->distance + from * lights, lights);
     o->state[to] = o->state[from];
 }
 
@@ -2594,7 +2736,6 @@ static void fiv__forget_samples(fiv_occluder *o, int state)
     memset(none, 0, sizeof none);
     memset(o->state, state, n);
     for (i = 0; i < n; i++) fiv__store_vector(o, i, none);
-    if (o->max_lights) memset(o->distance, -126, n * (size_t)o->max_lights);
     o->stats.inside = 0;
 }
 
@@ -2616,17 +2757,6 @@ static size_t fiv__make_wanted(fiv_occluder *o)
     return made;
 }
 
-static void fiv__find_lights(fiv_occluder *o)
-{
-    int i;
-    for (i = 0; i < o->light_count; i++) {
-        float d[3];
-        fiv__turn(d, o->environment->rotation, o->environment->lights[i].direction);
-        fiv__turn_back(d, o->rotation, d);
-        fiv__find_near(&o->lights[i], d, o->face);
-    }
-}
-
 /* rho^2 times a vector is at most the flux within one radius, and pi times the largest radiance beyond. A factor of
    four is left for texels that turning makes brighter; small values stay clear of subnormal half floats. */
 static float fiv__half_scale(const fiv_environment *e)
@@ -2640,11 +2770,43 @@ static float fiv__half_scale(const fiv_environment *e)
     return bound > 1e-20 ? (float)(16000 / bound) : 1;
 }
 
+/* FNV-1a over 64-bit words and the bytes that remain. */
+static uint64_t fiv__hash(uint64_t h, const void *from, size_t size)
+{
+    const unsigned char *p = (const unsigned char *)from;
+    uint64_t word;
+    size_t i;
+    for (i = 0; i + 8 <= size; i += 8) {
+        memcpy(&word, p + i, 8);
+        h = (h ^ word) * UINT64_C(0x100000001b3);
+        h ^= h >> 29;
+    }
+    for (; i < size; i++) h = (h ^ p[i]) * UINT64_C(0x100000001b3);
+    return h;
+}
+
+#define FIV__HASH UINT64_C(0xcbf29ce484222325)
+
+/* Another occluder may stand at the same address: every 64th sample is looked at, too. */
+static void fiv__sign(fiv_occluder *o)
+{
+    size_t i;
+    uint64_t h = fiv__hash(FIV__HASH, &o, sizeof(void *));
+    o->lit++;
+    h = fiv__hash(h, &o->lit, sizeof o->lit);
+    h = fiv__hash(h, o->rotation, sizeof o->rotation);
+    h = fiv__hash(h, &o->radius, sizeof o->radius);
+    h = fiv__hash(h, o->centre, sizeof o->centre);
+    for (i = 0; i < o->stats.samples; i += 64)
+        h = o->half_floats ? fiv__hash(h, fiv__half_sample(o, i), FIV__TERMS * sizeof *o->half_table)
+                           : fiv__hash(h, o->table + FIV__TERMS * i, FIV__TERMS * sizeof *o->table);
+    o->signature = h;
+}
+
 FIV_DEF sat_result fiv_occluder_light(fiv_occluder *o, const fiv_environment *e, const float rotation[9])
 {
     fiv__gather g;
     if (!o || !e || e->face != o->face) return SAT_ERR_ARGUMENT;
-    if (e->light_count > o->max_lights) return SAT_ERR_LIMIT;
     if (!fiv__set_rotation(o->rotation, rotation)) return SAT_ERR_ARGUMENT;
     o->table_scale = o->half_floats ? fiv__half_scale(e) : 1;
     o->environment = e;
@@ -2655,16 +2817,19 @@ FIV_DEF sat_result fiv_occluder_light(fiv_occluder *o, const fiv_environment *e,
     g.radiance = NULL;
     fiv__turn_between(g.frame, e->rotation, o->rotation);
     sat__parallel_for(&o->threads, 6 * o->face, fiv__gather_rows, &g);
+#ifndef FIV_NO_DELTA
     fiv__find_lights(o);
-#ifndef FIV_NO_MASKS
-    if (o->keep_masks) {
-        sat__parallel_for(&o->threads, (int)o->stats.samples, fiv__light_stored, o);
-        return SAT_OK;
-    }
+    sat__parallel_for(&o->threads, o->light_count, fiv__draw_maps, o);
 #endif
-    o->stats.rasterised = 0;
-    fiv__forget_samples(o, o->lazy ? FIV__STALE : FIV__WANTED);
-    if (!o->lazy) fiv__make_wanted(o);
+#ifndef FIV_NO_MASKS
+    if (o->keep_masks) sat__parallel_for(&o->threads, (int)o->stats.samples, fiv__light_stored, o);
+#endif
+    if (!o->keep_masks) {
+        o->stats.rasterised = 0;
+        fiv__forget_samples(o, o->lazy ? FIV__STALE : FIV__WANTED);
+        if (!o->lazy) fiv__make_wanted(o);
+    }
+    fiv__sign(o);
     return SAT_OK;
 }
 
@@ -2678,22 +2843,36 @@ FIV_DEF sat_result fiv_occluder_invalidate(fiv_occluder *o, const float *positio
         if (!sat__is_finite(p[0]) || !sat__is_finite(p[1]) || !sat__is_finite(p[2])) return SAT_ERR_ARGUMENT;
     }
     if (positions && o->mesh.vertex_count) result = fiv__take_positions(o, positions);
+#ifndef FIV_NO_DELTA
+    sat__parallel_for(&o->threads, o->light_count, fiv__draw_maps, o);
+#endif
     o->stats.rasterised = 0;
     fiv__forget_samples(o, FIV__STALE);
+    fiv__sign(o);
     return result;
 }
 
 /* ---- lookups */
 
+enum { FIV__TILE = 64, FIV__SHARES = 256 };
+
+static const sat__field fiv__irradiance_fields[] = {
+    SAT__FIELD(fiv_irradiance_options, 'i', accuracy, FIV_SCALED, FIV_NEAREST, FIV_MASK, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', partial, 1, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', overlap, 1, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'f', cutoff, 0.001, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', own_masks, FIV__TILE, 0, FIV__TILE, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', own_triangles, 20000, 0, 2147483647, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'f', own_tolerance, 0.01, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', rays, 1, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'f', penumbra, 1, 0, 100, ' '),
+    SAT__FIELD(fiv_irradiance_options, 't', threads, 0, 0, 0, ' '),
+};
+
 FIV_DEF fiv_irradiance_options fiv_irradiance_defaults(void)
 {
     fiv_irradiance_options o;
-    memset(&o, 0, sizeof o);
-    o.accuracy = FIV_SCALED;
-    o.partial = 1;
-    o.overlap = 1;
-    o.cutoff = 0.001f;
-    o.own_masks = 64;
+    sat__fields_default(&o, sizeof o, fiv__irradiance_fields, SAT__COUNT(fiv__irradiance_fields));
     return o;
 }
 
@@ -2784,7 +2963,7 @@ static void fiv__lookup_published(float out[FIV__TERMS], const fiv_occluder *o, 
 }
 
 /* rho^2 times the vector changes slowly with the distance; samples inside the mesh see everything dark and are left
-   out. Returns the weight of the valid samples; 0 when the receiver is inside, too. */
+   out. Returns the weight of the valid samples; 0 and no light where there are none. */
 static float fiv__lookup_scaled(float out[FIV__TERMS], const fiv_occluder *o, const fiv__cell *cell)
 {
     float total = 0;
@@ -2797,10 +2976,9 @@ static float fiv__lookup_scaled(float out[FIV__TERMS], const fiv_occluder *o, co
     }
     if (!(total > 1e-4f)) {
         memset(out, 0, FIV__TERMS * sizeof *out);
-        for (q = 0; q < 8; q++) fiv__add_sample(out, cell->weight[q], o, cell->index[q]);
-        total = 0;
+        return 0;
     }
-    fiv__unscale(out, o, 1 / ((total > 0 ? total : 1) * cell->radius * cell->radius));
+    fiv__unscale(out, o, 1 / (total * cell->radius * cell->radius));
     return total;
 }
 
@@ -2818,27 +2996,8 @@ static void fiv__take_nearest(fiv__cell *cell)
     for (q = 0; q < 8; q++) cell->weight[q] = q == best ? 1.0f : 0.0f;
 }
 
-/* How much of each light the occluder takes, 0..1: the interpolated distance of its silhouette, one texel of
-   penumbra. */
-static void fiv__lookup_lights(float covered[FIV_MAX_LIGHTS], const fiv_occluder *o, const fiv__cell *cell)
-{
-    int i, q;
-    for (i = 0; i < o->light_count; i++) {
-        float distance = 0, total = 0;
-        for (q = 0; q < 8; q++) {
-            size_t sample = cell->index[q];
-            if (o->state[sample] == FIV__INSIDE || cell->weight[q] == 0) continue;
-            distance += cell->weight[q] * (float)o->distance[sample * (size_t)o->max_lights + (size_t)i];
-            total += cell->weight[q];
-        }
-        distance = total > 1e-4f ? distance / (21 * total) : 6.0f;
-        distance = 0.5f + distance;
-        covered[i] = distance < 0 ? 0 : distance > 1 ? 1 : distance;
-    }
-}
-
 /* ---- near contact: samples inside the mesh are left out, and those that are left see light that the receiver does
-   not. Such a receiver gets a mask of its own; suns, whose edges no interpolated distance keeps, get a ray. */
+   not. Such a receiver gets a mask of its own. */
 
 #define FIV__CONTACT 2.0f /* sr */
 
@@ -2851,13 +3010,12 @@ static int fiv__is_contact(const fiv_occluder *o, const fiv__cell *cell, const f
     return 0;
 }
 
-/* Irradiance that the texels above the horizon give; returns their solid angle. */
-static float fiv__integrate_rows(float rgb[3], const uint64_t *rows, const double *sums, const float normal[3],
-                                 int size)
+/* The integral over the texels of a mask above the horizon. */
+static void fiv__integrate_mask(double sum[FIV__TERMS], const uint64_t *rows, const double *sums, const float normal[3],
+                                int size)
 {
-    double sum[FIV__TERMS];
-    int row, c, k, low, high;
-    memset(sum, 0, sizeof sum);
+    int row, low, high;
+    memset(sum, 0, FIV__TERMS * sizeof *sum);
     for (row = 0; row < 6 * size; row++) {
         uint64_t m = rows[row];
         if (!m) continue;
@@ -2872,24 +3030,22 @@ static float fiv__integrate_rows(float rgb[3], const uint64_t *rows, const doubl
             m = end == 64 ? 0 : m & ~(((uint64_t)1 << end) - 1);
         }
     }
+}
+
+#ifndef FIV_NO_MASKS
+/* Irradiance that the texels above the horizon give. */
+static void fiv__integrate_rows(float rgb[3], const uint64_t *rows, const double *sums, const float normal[3], int size)
+{
+    double sum[FIV__TERMS];
+    int c, k;
+    fiv__integrate_mask(sum, rows, sums, normal, size);
     for (c = 0; c < 3; c++) {
         double v = 0;
         for (k = 0; k < 3; k++) v += sum[3 * c + k] * (double)normal[k];
         rgb[c] = v > 0 ? (float)v : 0;
     }
-    return (float)sum[9];
 }
-
-/* 1 where no sample of the cell has a silhouette within six texels of light i, and all say the same. */
-static int fiv__agree(const fiv_occluder *o, const fiv__cell *cell, int i)
-{
-    int q, first = o->distance[cell->index[0] * (size_t)o->max_lights + (size_t)i];
-    for (q = 0; q < 8; q++)
-        if (o->state[cell->index[q]] != FIV__VALID ||
-            o->distance[cell->index[q] * (size_t)o->max_lights + (size_t)i] != first)
-            return 0;
-    return first == 126 || first == -126;
-}
+#endif
 
 /* ---- one occluder above the horizon of one receiver */
 
@@ -2908,6 +3064,15 @@ static float fiv__clipped_cap(float cosine, float half)
     return ((cosine * acosf(y) - x * sine * q) * square + atanf(sine * q / x)) / (3.14159265f * square);
 }
 
+enum { FIV__ROW = 16, FIV__SLOTS = 64 };
+
+/* The light above a receiver's horizon that an instance hides, and its solid angle: from a mask of its own. */
+typedef struct fiv__own {
+    const fiv_instance *instance;
+    size_t receiver;
+    float v[FIV__TERMS];
+} fiv__own;
+
 typedef struct fiv__receiver {
     const fiv_environment *environment;
     const fiv_instance *instances;
@@ -2918,8 +3083,12 @@ typedef struct fiv__receiver {
     float diffuse[3];                    /* I_tot without the lights */
     float light_cosine[FIV_MAX_LIGHTS];  /* over the horizon */
     float light_direction[FIV_MAX_LIGHTS][3];
+    float sun_tangent[FIV_MAX_LIGHTS];   /* of its radius */
     float total[3];
     int own_left;                        /* receivers of this tile that may still have own masks */
+    const float *points, *normals;       /* of all receivers of the call */
+    size_t count, index;                 /* of which this is one */
+    fiv__own own[FIV__SLOTS];
 } fiv__receiver;
 
 typedef struct fiv__shadow {
@@ -3001,35 +3170,214 @@ static void fiv__shade_masks(float rgb[3], const fiv_occluder *o, const fiv__cel
 }
 #endif
 
-/* A mask of the receiver's own; returns the solid angle above the horizon. */
-static float fiv__shade_own(float rgb[3], const fiv_occluder *o, const float offset[3], const float normal[3])
+/* ---- masks of a receiver's own. Receivers often stand in rows, such as the pixels of a picture: where the masks of
+   two of them take nearly the same, those between get what lies between. Rows are cut every 16 receivers of the call
+   and then in halves, so that the result depends on the receivers alone. */
+
+static const fiv__own *fiv__own_mask(fiv__receiver *r, const fiv_instance *instance, size_t i)
 {
+    const fiv_occluder *o = instance->occluder;
+    fiv__own *own = &r->own[(i % (2 * FIV__ROW) + 2 * FIV__ROW * (size_t)(instance - r->instances)) % FIV__SLOTS];
     uint64_t rows[FIV__MAX_ROWS];
-    fiv__raster_mesh(rows, &o->mesh, offset, o->face);
-    return fiv__integrate_rows(rgb, rows, o->sums, normal, o->face);
+    double sum[FIV__TERMS];
+    float offset[3], world[3], normal[3], distance;
+    int k;
+    if (own->instance == instance && own->receiver == i) return own;
+    own->instance = instance;
+    own->receiver = i;
+    fiv__normalise(normal, r->normals + 3 * i);
+    fiv__turn_back(normal, o->rotation, normal);
+    fiv__place(offset, world, &distance, instance, r->points + 3 * i);
+    fiv__raster_mesh(rows, &o->mesh, offset, o->face, normal);
+    fiv__integrate_mask(sum, rows, o->sums, normal, o->face);
+    for (k = 0; k < FIV__TERMS; k++) own->v[k] = (float)sum[k];
+    r->stats->own_masks++;
+    return own;
 }
 
-/* The lights near whose direction an occluder that keeps its mesh has an edge, or all of them near contact. */
-static void fiv__cast_rays(float covered[FIV_MAX_LIGHTS], const fiv__receiver *r, const fiv_occluder *o,
-                           const fiv__cell *cell, const float offset[3], int contact)
+/* 1 when receiver i, too, is near contact, and its normal is nearly that of the present one. */
+static int fiv__is_alike(const fiv__receiver *r, const fiv_instance *instance, size_t i)
+{
+    const float *p = r->points + 3 * i, *n = r->normals + 3 * i;
+    float offset[3], world[3], distance, normal[3];
+    fiv__cell cell;
+    int k;
+    for (k = 0; k < 3; k++)
+        if (!sat__is_finite(p[k]) || !sat__is_finite(n[k])) return 0;
+    fiv__normalise(normal, n);
+    if (!(fiv__dot(normal, r->normal) > 0.98f) || !fiv__place(offset, world, &distance, instance, p)) return 0;
+    fiv__locate(&cell, &instance->occluder->grid, offset);
+    return fiv__is_contact(instance->occluder, &cell, offset);
+}
+
+/* How far the present receiver stands from a to b, 0..1; < 0: not between them, or they are too far apart. */
+static float fiv__between(const fiv__receiver *r, const fiv_instance *instance, size_t a, size_t b)
+{
+    float d[3], e[3], square, along, limit = instance->occluder->radius * instance->scale * 0.0625f;
+    int k;
+    for (k = 0; k < 3; k++) {
+        d[k] = r->points[3 * b + (size_t)k] - r->points[3 * a + (size_t)k];
+        e[k] = r->point[k] - r->points[3 * a + (size_t)k];
+    }
+    square = fiv__dot(d, d);
+    if (!(square > 0) || !(square <= limit * limit)) return -1;
+    along = fiv__dot(d, e) / square;
+    for (k = 0; k < 3; k++) e[k] -= along * d[k];
+    return along >= 0 && along <= 1 && fiv__dot(e, e) <= square / 64 ? along : -1;
+}
+
+/* The present receiver's own light and solid angle: its mask, or what lies between two that take nearly the same. */
+static void fiv__find_own(float v[FIV__TERMS], fiv__receiver *r, const fiv_instance *instance, const float normal[3])
+{
+    size_t i = r->index, a = i - i % FIV__ROW, b = i % FIV__TILE / FIV__ROW == FIV__TILE / FIV__ROW - 1 ? a + FIV__ROW - 1 : a + FIV__ROW;
+    int c, k, shared = r->options->own_masks == FIV__TILE && r->options->own_tolerance > 0;
+    if (b >= r->count) b = r->count - 1;
+    while (shared && a < i && i < b) {
+        float t = fiv__between(r, instance, a, b), first[FIV__TERMS];
+        size_t middle = (a + b) / 2;
+        if (t >= 0 && fiv__is_alike(r, instance, a) && fiv__is_alike(r, instance, b)) {
+            const fiv__own *last;
+            int same = 1;
+            memcpy(first, fiv__own_mask(r, instance, a)->v, sizeof first);
+            last = fiv__own_mask(r, instance, b);
+            for (c = 0; c < 3; c++) {
+                float off = fiv__dot(last->v + 3 * c, normal) - fiv__dot(first + 3 * c, normal);
+                same &= fabsf(off) <= r->options->own_tolerance * r->diffuse[c];
+            }
+            if (same) {
+                for (k = 0; k < FIV__TERMS; k++) v[k] = first[k] + t * (last->v[k] - first[k]);
+                return;
+            }
+        }
+        if (i <= middle) b = middle;
+        else a = middle;
+    }
+    memcpy(v, fiv__own_mask(r, instance, i)->v, FIV__TERMS * sizeof *v);
+}
+
+static float fiv__sun_tangent(const fiv__light *light, float penumbra)
+{
+    float angle = light->radius * penumbra;
+    return tanf(angle < 1.2f ? angle : 1.2f);
+}
+
+#ifndef FIV_NO_DELTA
+
+/* ---- split-off lights: what their depth maps say */
+
+typedef struct fiv__seen {
+    const uint16_t *cell;
+    int pitch, side;
+    float x, y, z, scale; /* the receiver, in texels; towards the light in radii; texels a radius */
+} fiv__seen;
+
+/* How far the mesh reaches beyond the receiver at a texel; < 0: not that far. */
+static inline float fiv__beyond(const fiv__seen *s, int x, int y)
+{
+    int word = x < 0 || y < 0 || x >= s->side || y >= s->side ? 0 : s->cell[y * s->pitch + x];
+    return word ? (float)(word - 1) * (1.0f / 32767) - 1 - s->z : -1;
+}
+
+/* Bilinear between the comparisons at four texels. */
+static float fiv__compare(const fiv__seen *s, float x, float y)
+{
+    int i = fiv__floor(x), j = fiv__floor(y);
+    float u = x - (float)i, v = y - (float)j, least = 0.25f / s->scale;
+    return ((fiv__beyond(s, i, j) > least ? 1 - u : 0) + (fiv__beyond(s, i + 1, j) > least ? u : 0)) * (1 - v) +
+           ((fiv__beyond(s, i, j + 1) > least ? 1 - u : 0) + (fiv__beyond(s, i + 1, j + 1) > least ? u : 0)) * v;
+}
+
+/* 1 or 0 where the 16 texels around all say so, by three texels; else -1. */
+static int fiv__all_agree(const fiv__seen *s)
+{
+    int x = fiv__floor(s->x) - 1, y = fiv__floor(s->y) - 1, i, over = 0, under = 0;
+    float margin = 3 / s->scale;
+    for (i = 0; i < 16; i++) {
+        float beyond = fiv__beyond(s, x + (i & 3), y + (i >> 2));
+        over += beyond > margin;
+        under += beyond < -margin || beyond == -1;
+    }
+    return over == 16 ? 1 : under == 16 ? 0 : -1;
+}
+
+/* Of points on a disc around the receiver, in texels: the part that is covered; *distance: their mean distance, in
+   radii (Fernando 2005, percentage-closer soft shadows). */
+static float fiv__disc(float *distance, const fiv__seen *s, float radius, int search)
+{
+    int n = sat__clamp_int((int)(search ? 0.5f * radius : radius) + 3, 4, 16), i, j;
+    float covered = 0, count = 0, sum = 0, step = 2 / (float)n;
+    for (j = 0; j < n; j++)
+        for (i = 0; i < n; i++) {
+            float u = ((float)i + 0.5f) * step - 1, v = ((float)j + 0.5f) * step - 1, x, y;
+            if (u * u + v * v > 1) continue;
+            x = s->x + radius * u;
+            y = s->y + radius * v;
+            count++;
+            if (search) {
+                float beyond = fiv__beyond(s, fiv__floor(x + 0.5f), fiv__floor(y + 0.5f));
+                if (!(beyond > 0.25f / s->scale)) continue;
+                sum += beyond;
+                covered++;
+            } else covered += fiv__compare(s, x, y);
+        }
+    *distance = covered > 0 ? sum / covered : 0;
+    return covered / count;
+}
+
+/* How much of a light an occluder takes, 0..1. A light's disc, seen past the silhouette, is the penumbra: its width is
+   the distance to the silhouette times the light's tangent. */
+static float fiv__cover_light(const fiv__receiver *r, const fiv_occluder *o, int light, const float offset[3], int rays)
+{
+    fiv__seen s;
+    const float (*axes)[3] = (const float (*)[3])o->light_axes[light];
+    float shift, reach, distance;
+    int sure;
+    s.z = -fiv__dot(offset, axes[2]);
+    if (s.z >= 1) return 0;
+    s.scale = fiv__map_scale(o);
+    shift = s.scale + FIV__MAP_BORDER - 0.5f;
+    s.cell = o->map + fiv__map_cell(o, light);
+    s.pitch = o->map_side;
+    s.side = o->cell_side;
+    s.x = shift - fiv__dot(offset, axes[0]) * s.scale;
+    s.y = shift - fiv__dot(offset, axes[1]) * s.scale;
+    reach = r->sun_tangent[light] * (1 - s.z) * s.scale;
+    if (!(fabsf(s.x - shift) < s.scale + reach + 2 && fabsf(s.y - shift) < s.scale + reach + 2)) return 0;
+    if (reach > 1) {
+        if (fiv__disc(&distance, &s, reach, 1) == 0) return 0;
+        reach = r->sun_tangent[light] * distance * s.scale;
+        if (reach > 1) return fiv__disc(&distance, &s, reach, 0);
+    }
+    if (!rays) return fiv__compare(&s, s.x, s.y);
+    sure = fiv__all_agree(&s);
+    if (sure >= 0) return (float)sure;
+    r->stats->rays++;
+    return fiv__ray_meets(&o->mesh, offset, axes[2]) ? 1.0f : 0.0f;
+}
+
+#endif /* FIV_NO_DELTA */
+
+/* The same of all lights above the horizon. */
+static void fiv__cover_lights(float covered[FIV_MAX_LIGHTS], const fiv__receiver *r, const fiv_occluder *o,
+                              const float offset[3], int rays)
 {
     int i;
     for (i = 0; i < o->light_count; i++) {
-        float d[3];
-        if (!(r->light_cosine[i] > 0) || (!contact && fiv__agree(o, cell, i))) continue;
-        fiv__turn_back(d, o->rotation, r->light_direction[i]);
-        covered[i] = fiv__ray_meets(&o->mesh, offset, d) ? 1.0f : 0.0f;
-        r->stats->rays++;
+        covered[i] = 0;
+#ifndef FIV_NO_DELTA
+        if (r->light_cosine[i] > 0) covered[i] = fiv__cover_light(r, o, i, offset, rays);
+#else
+        (void)r, (void)offset, (void)rays;
+#endif
     }
 }
 
 /* Fills in a shadow; 0 when the occluder takes nothing. */
-static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], const fiv__receiver *r,
-                     const fiv_instance *instance)
+static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], fiv__receiver *r, const fiv_instance *instance)
 {
     const fiv_occluder *o = instance->occluder;
     float offset[3], world[3], distance, height, normal[3], v[FIV__TERMS], below = 1, above = 1, cut = 0, back[3];
-    int k, published = r->options->accuracy <= FIV_TRILINEAR, masks = 0, contact = 0, own = 0;
+    int k, published = r->options->accuracy <= FIV_TRILINEAR, masks = 0, own = 0, inside = 0;
     fiv__cell cell;
     if (!fiv__place(offset, world, &distance, instance, r->point)) return 0;
     height = fiv__dot(world, r->normal);
@@ -3060,21 +3408,25 @@ static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], const f
         fiv__lookup_published(v, o, &cell);
         for (k = 0; k < 9 && cut > 0 && r->options->partial; k++) v[k] *= 1 - cut; /* (d + R) / 2R */
     } else {
-        contact = o->keep_mesh && fiv__is_contact(o, &cell, offset);
-        own = contact && r->own_left > 0 && r->diffuse[0] + r->diffuse[1] + r->diffuse[2] > 0;
-        if (fiv__lookup_scaled(v, o, &cell) == 0 && o->state[cell.index[0]] == FIV__STALE) r->stats->missing++;
+        own = r->own_left > 0 && o->mesh.triangle_count <= (size_t)r->options->own_triangles &&
+              r->diffuse[0] + r->diffuse[1] + r->diffuse[2] > 0 && fiv__is_contact(o, &cell, offset);
+        if (fiv__lookup_scaled(v, o, &cell) == 0) {
+            inside = o->state[cell.index[0]] != FIV__STALE;
+            r->stats->missing += !inside;
+        }
     }
     if (own) {
-        v[9] = fiv__shade_own(shadow->rgb, o, offset, normal);
-        r->stats->own_masks++;
+        fiv__find_own(v, r, instance, normal);
+        fiv__shade(shadow->rgb, v, normal, 0);
+        r->stats->own_receivers++;
     }
 #ifndef FIV_NO_MASKS
     masks = r->options->accuracy == FIV_MASK && cut > 0 && o->keep_masks && !own;
     if (masks) fiv__shade_masks(shadow->rgb, o, &cell, normal, &r->stats->masks);
 #endif
     if (!masks && !own) fiv__shade(shadow->rgb, v, normal, published || !r->options->partial ? 0 : cut);
-    fiv__lookup_lights(covered, o, &cell);
-    if (o->keep_mesh && !published) fiv__cast_rays(covered, r, o, &cell, offset, contact);
+    if (inside && !own) memcpy(shadow->rgb, r->diffuse, sizeof shadow->rgb); /* dark all around */
+    fiv__cover_lights(covered, r, o, offset, r->options->rays && !published);
     shadow->occluder = o;
     shadow->radius = distance > 1 ? 1 / distance : 1;
     shadow->disc = published ? shadow->radius : sqrtf(v[9] * 0.318309886f);
@@ -3233,14 +3585,14 @@ static void fiv__unite_masks(int64_t taken[3], const fiv__receiver *r, const fiv
 #endif /* FIV_NO_MASKS */
 
 /* What all instances take of the diffuse light (fixed point) and of each split-off light. */
-static void fiv__gather_shadows(int64_t taken[3], float covered[FIV_MAX_LIGHTS], const fiv__receiver *r)
+static void fiv__gather_shadows(int64_t taken[3], float covered[FIV_MAX_LIGHTS], fiv__receiver *r)
 {
     fiv__shadow shadows[FIV_MAX_INSTANCES];
     float one[FIV_MAX_LIGHTS];
     size_t i;
     int k, count = 0;
     taken[0] = taken[1] = taken[2] = 0;
-    for (k = 0; k < FIV_MAX_LIGHTS; k++) covered[k] = 0;
+    for (k = 0; k < r->environment->light_count; k++) covered[k] = 0;
     for (i = 0; i < r->instance_count; i++) {
         if (!fiv__cast(&shadows[count], one, r, &r->instances[i])) continue;
         for (k = 0; k < 3; k++) taken[k] += fiv__fixed(shadows[count].rgb[k], r->diffuse[k]);
@@ -3306,8 +3658,6 @@ static void fiv__receive(float rgb[3], fiv__receiver *r, const float *point, con
 
 /* ---- many receivers, in tiles of fixed size */
 
-enum { FIV__TILE = 64, FIV__SHARES = 256 };
-
 typedef struct fiv__job {
     float *rgb;
     const float *points, *normals;
@@ -3331,15 +3681,23 @@ static void fiv__run_shares(int begin, int end, int worker, void *context)
     const fiv__job *job = (const fiv__job *)context;
     fiv__receiver r;
     size_t i, last = (size_t)end * job->share < job->count ? (size_t)end * job->share : job->count;
+    int k;
     (void)worker;
     r.environment = job->environment;
     r.instances = job->instances;
     r.instance_count = job->instance_count;
     r.options = job->options;
     r.stats = &job->stats[begin];
+    r.points = job->points;
+    r.normals = job->normals;
+    r.count = job->count;
     memset(r.light_cosine, 0, sizeof r.light_cosine);
+    memset(r.own, 0, sizeof r.own);
+    for (k = 0; k < r.environment->light_count; k++)
+        r.sun_tangent[k] = fiv__sun_tangent(&r.environment->lights[k], r.options->penumbra);
     for (i = (size_t)begin * job->share; i < last; i++) {
-        size_t made = r.stats->own_masks;
+        size_t made = r.stats->own_receivers;
+        r.index = i;
         if (i % FIV__TILE == 0) r.own_left = r.options->own_masks;
 #ifndef FIV_NO_SELF
         if (job->self)
@@ -3347,20 +3705,56 @@ static void fiv__run_shares(int begin, int end, int worker, void *context)
         else
 #endif
             fiv__receive(job->rgb + 3 * i, &r, job->points + 3 * i, job->normals + 3 * i);
-        r.own_left -= r.stats->own_masks > made;
+        r.own_left -= r.stats->own_receivers > made;
     }
 }
 
-static int fiv__instance_is_valid(const fiv_instance *instance, const fiv_environment *e,
+/* NULL, or what is wrong with an instance. */
+static const char *fiv__bad_instance(const fiv_instance *instance, const fiv_environment *e,
+                                     const fiv_irradiance_options *o)
+{
+    const fiv_occluder *occluder = instance->occluder;
+    int k;
+    if (!occluder) return "occluder is NULL";
+    if (!occluder->environment) return "not lit yet (fiv_occluder_light)";
+    if (occluder->environment != e) return "lit by another environment";
+    if (occluder->stamp != e->stamp) return "the environment has changed since it was lit (fiv_occluder_light)";
+    if (!sat__is_finite(instance->scale) || !(instance->scale >= 0)) return "scale is negative or not finite";
+    for (k = 0; k < 3; k++)
+        if (!sat__is_finite(instance->position[k])) return "position is not finite";
+    if (o->accuracy == FIV_MASK && !occluder->keep_masks) return "no keep_masks, which FIV_MASK needs";
+    return NULL;
+}
+
+static int fiv__explain_instances(sat__text *t, const fiv_environment *e, const fiv_instance *instances, size_t count,
                                   const fiv_irradiance_options *o)
 {
-    int k;
-    const fiv_occluder *occluder = instance->occluder;
-    if (!occluder || occluder->environment != e || occluder->stamp != e->stamp) return 0;
-    if (!sat__is_finite(instance->scale) || !(instance->scale >= 0)) return 0;
-    for (k = 0; k < 3; k++)
-        if (!sat__is_finite(instance->position[k])) return 0;
-    return o->accuracy != FIV_MASK || occluder->keep_masks;
+    const char *wrong = NULL;
+    size_t i;
+    if (!e) sat__text_add(t, "environment is NULL");
+    else if (count && !instances) sat__text_add(t, "instances are NULL");
+    else if (count > FIV_MAX_INSTANCES) sat__text_range(t, "instance_count", (double)count, 0, FIV_MAX_INSTANCES, ' ');
+    else {
+        for (i = 0; i < count && (wrong = fiv__bad_instance(&instances[i], e, o)) == NULL; i++) {}
+        if (!wrong) return 1;
+        sat__text_add(t, "instance ");
+        sat__text_number(t, (double)i);
+        sat__text_add(t, ": ");
+        sat__text_add(t, wrong);
+    }
+    return 0;
+}
+
+FIV_DEF const char *fiv_explain_irradiance(char *text, size_t size, const fiv_environment *environment,
+                                           const fiv_instance *instances, size_t instance_count,
+                                           const fiv_irradiance_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    fiv_irradiance_options o = options ? *options : fiv_irradiance_defaults();
+    const sat__field *wrong = sat__fields_check(&o, fiv__irradiance_fields, SAT__COUNT(fiv__irradiance_fields));
+    if (wrong) sat__text_field(&t, wrong, &o);
+    else fiv__explain_instances(&t, environment, instances, instance_count, &o);
+    return t.size ? text : "";
 }
 
 static void fiv__add_stats(fiv_irradiance_stats *sum, const fiv_irradiance_stats *s)
@@ -3371,6 +3765,7 @@ static void fiv__add_stats(fiv_irradiance_stats *sum, const fiv_irradiance_stats
     sum->clipped += s->clipped;
     sum->overlaps += s->overlaps;
     sum->masks += s->masks;
+    sum->own_receivers += s->own_receivers;
     sum->own_masks += s->own_masks;
     sum->rays += s->rays;
     sum->non_finite += s->non_finite;
@@ -3381,15 +3776,14 @@ static sat_result fiv__run(fiv__job *job, const fiv_irradiance_options *options,
 {
     fiv_irradiance_options o = options ? *options : fiv_irradiance_defaults();
     fiv_irradiance_stats shares[FIV__SHARES], sum;
+    sat__text ignored = sat__text_begin(NULL, 0);
     size_t i, tiles, used;
     if (job->count && (!job->rgb || !job->points || !job->normals)) return SAT_ERR_ARGUMENT;
-    if (!job->environment || (job->instance_count && !job->instances)) return SAT_ERR_ARGUMENT;
-    if ((unsigned)o.accuracy > (unsigned)FIV_MASK || !(o.cutoff >= 0 && o.cutoff <= 1)) return SAT_ERR_ARGUMENT;
-    if (o.own_masks < 0 || o.own_masks > FIV__TILE || !sat__threads_are_valid(&o.threads)) return SAT_ERR_ARGUMENT;
-    if (job->instance_count > FIV_MAX_INSTANCES) return SAT_ERR_LIMIT;
-    for (i = 0; i < job->instance_count; i++)
-        if (!fiv__instance_is_valid(&job->instances[i], job->environment, &o)) return SAT_ERR_ARGUMENT;
-    if (job->self && !fiv__instance_is_valid(job->self, job->environment, &o)) return SAT_ERR_ARGUMENT;
+    if (sat__fields_check(&o, fiv__irradiance_fields, SAT__COUNT(fiv__irradiance_fields))) return SAT_ERR_ARGUMENT;
+    if (job->environment && job->instance_count > FIV_MAX_INSTANCES) return SAT_ERR_LIMIT;
+    if (!fiv__explain_instances(&ignored, job->environment, job->instances, job->instance_count, &o))
+        return SAT_ERR_ARGUMENT;
+    if (job->self && fiv__bad_instance(job->self, job->environment, &o)) return SAT_ERR_ARGUMENT;
     tiles = job->count / FIV__TILE + (job->count % FIV__TILE != 0);
     if (tiles > 0x7fffffff) return SAT_ERR_SIZE;
     job->share = FIV__TILE * (tiles / FIV__SHARES + (tiles % FIV__SHARES != 0));
@@ -3488,6 +3882,17 @@ static void fiv__locate_outside(fiv__cell *cell, const fiv_occluder *o, const fl
     }
 }
 
+/* A receiver on the mesh looks at its depth maps from two texels above it. */
+static float fiv__self_lift(const fiv_occluder *o)
+{
+#ifndef FIV_NO_DELTA
+    return o->light_count ? 2 / fiv__map_scale(o) : 0;
+#else
+    (void)o;
+    return 0;
+#endif
+}
+
 /* What the others take is taken of what the mesh itself leaves. */
 static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance *self, const float *point,
                               const float *normal)
@@ -3498,14 +3903,14 @@ static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance
     fiv__cell cell;
     int k;
     rgb[0] = rgb[1] = rgb[2] = 0;
-    memset(own, 0, sizeof own);
     if (!fiv__start_receiver(r, point, normal)) return;
     fiv__gather_shadows(taken, covered, r);
     if (fiv__place(offset, world, &distance, self, point)) {
         fiv__turn_back(own_normal, o->rotation, r->normal);
         fiv__locate_outside(&cell, o, offset, own_normal);
         if (r->options->accuracy == FIV_NEAREST) fiv__take_nearest(&cell);
-        fiv__lookup_lights(own, o, &cell);
+        for (k = 0; k < 3; k++) offset[k] -= own_normal[k] * fiv__self_lift(o);
+        fiv__cover_lights(own, r, o, offset, 0);
 #ifndef FIV_NO_MASKS
         if (r->options->accuracy == FIV_MASK) fiv__self_masks(open, r, o, &cell, own_normal);
         else
@@ -3563,50 +3968,64 @@ FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *o, size_t *computed, const
                 if (cell.weight[q] > 0 && o->state[cell.index[q]] == FIV__STALE) o->state[cell.index[q]] = FIV__WANTED;
         }
     }
-    fiv__find_lights(o);
     made = fiv__make_wanted(o);
+    if (made) fiv__sign(o);
     if (computed) *computed = made;
     return SAT_OK;
 }
 
 /* ---- saves: a header of fixed-width little-endian fields, the states, the support function, the counts of words, the
-   words */
+   words; then the mesh: of each cluster the counts of vertices and triangles, the vertices, the corners */
 
 #ifndef FIV_NO_MASKS
 
 typedef struct fiv__save {
     uint64_t magic, hash;    /* of all bytes after this field */
     uint64_t words;
-    int32_t octahedral, theta, phi, rho, face, closed;
+    int32_t octahedral, theta, phi, rho, face, closed, turn, clusters;
     float first, last, centre[3], radius;
-    uint64_t triangles, skipped, rasterised, inside;
+    uint64_t vertices, triangles, skipped, rasterised, inside;
 } fiv__save;
 
-#define FIV__MAGIC UINT64_C(0x3130307669667473) /* reads "stfiv001" in memory where bytes are in this order */
+#define FIV__MAGIC UINT64_C(0x3230307669667473) /* reads "stfiv002" in memory where bytes are in this order */
 
-/* FNV-1a over 64-bit words and the bytes that remain. */
-static uint64_t fiv__hash(const unsigned char *p, size_t size)
+static size_t fiv__save_size(const fiv_occluder *o, size_t words)
 {
-    uint64_t h = UINT64_C(0xcbf29ce484222325), word;
-    size_t i;
-    for (i = 0; i + 8 <= size; i += 8) {
-        memcpy(&word, p + i, 8);
-        h = (h ^ word) * UINT64_C(0x100000001b3);
-        h ^= h >> 29;
-    }
-    for (; i < size; i++) h = (h ^ p[i]) * UINT64_C(0x100000001b3);
-    return h;
-}
-
-static size_t fiv__save_size(size_t samples, size_t words)
-{
+    const fiv__mesh *m = &o->mesh;
+    size_t samples = fiv__grid_samples(&o->grid);
     return sizeof(fiv__save) + samples + FIV__SUPPORT * FIV__SUPPORT * sizeof(float) +
-           (samples + 1) * sizeof(uint32_t) + words * sizeof(uint16_t);
+           (samples + 1) * sizeof(uint32_t) + words * sizeof(uint16_t) + m->cluster_count * 2 * sizeof(uint32_t) +
+           m->vertex_count * 3 * sizeof(float) + 3 * m->triangle_count;
 }
 
 FIV_DEF size_t fiv_occluder_save_size(const fiv_occluder *o)
 {
-    return o && o->keep_masks ? fiv__save_size(o->stats.samples, o->first[o->stats.samples]) : 0;
+    return o && o->keep_masks ? fiv__save_size(o, o->first[o->stats.samples]) : 0;
+}
+
+static unsigned char *fiv__put(unsigned char *p, const void *from, size_t size)
+{
+    if (size) memcpy(p, from, size);
+    return p + size;
+}
+
+static const unsigned char *fiv__take(void *to, const unsigned char *p, size_t size)
+{
+    if (size) memcpy(to, p, size);
+    return p + size;
+}
+
+static void fiv__save_mesh(unsigned char *p, const fiv__mesh *m)
+{
+    size_t i;
+    for (i = 0; i < m->cluster_count; i++) {
+        uint32_t counts[2];
+        counts[0] = (uint32_t)m->clusters[i].vertices;
+        counts[1] = (uint32_t)m->clusters[i].triangles;
+        p = fiv__put(p, counts, sizeof counts);
+    }
+    for (i = 0; i < 3; i++) p = fiv__put(p, m->x[i], m->vertex_count * sizeof(float));
+    fiv__put(p, m->corner, 3 * m->triangle_count);
 }
 
 FIV_DEF sat_result fiv_occluder_save(void *memory, size_t size, const fiv_occluder *o)
@@ -3625,6 +4044,9 @@ FIV_DEF sat_result fiv_occluder_save(void *memory, size_t size, const fiv_occlud
     s.rho = o->grid.rho;
     s.face = o->face;
     s.closed = o->stats.closed;
+    s.turn = o->mesh.turn < 0 ? -1 : 1;
+    s.clusters = (int32_t)o->mesh.cluster_count;
+    s.vertices = o->mesh.vertex_count;
     s.first = o->grid.first;
     s.last = o->grid.last;
     memcpy(s.centre, o->centre, sizeof s.centre);
@@ -3633,14 +4055,14 @@ FIV_DEF sat_result fiv_occluder_save(void *memory, size_t size, const fiv_occlud
     s.skipped = o->stats.skipped_triangles;
     s.rasterised = o->stats.rasterised;
     s.inside = o->stats.inside;
-    memcpy(p, &s, sizeof s);
-    p += sizeof s;
-    memcpy(p, o->state, n);
-    memcpy(p += n, o->support, FIV__SUPPORT * FIV__SUPPORT * sizeof(float));
-    memcpy(p += FIV__SUPPORT * FIV__SUPPORT * sizeof(float), o->first, (n + 1) * sizeof(uint32_t));
-    memcpy(p + (n + 1) * sizeof(uint32_t), o->words, s.words * sizeof(uint16_t));
+    p = fiv__put(p, &s, sizeof s);
+    p = fiv__put(p, o->state, n);
+    p = fiv__put(p, o->support, FIV__SUPPORT * FIV__SUPPORT * sizeof(float));
+    p = fiv__put(p, o->first, (n + 1) * sizeof(uint32_t));
+    p = fiv__put(p, o->words, (size_t)s.words * sizeof(uint16_t));
+    fiv__save_mesh(p, &o->mesh);
     p = (unsigned char *)memory;
-    s.hash = fiv__hash(p + 16, needed - 16);
+    s.hash = fiv__hash(FIV__HASH, p + 16, needed - 16);
     memcpy(p, &s, sizeof s);
     return SAT_OK;
 }
@@ -3669,7 +4091,7 @@ static int fiv__read_header(fiv_occluder *from, fiv__save *s, const unsigned cha
     size_t samples;
     if (size < sizeof *s) return 0;
     memcpy(s, p, sizeof *s);
-    if (s->magic != FIV__MAGIC || s->hash != fiv__hash(p + 16, size - 16)) return 0;
+    if (s->magic != FIV__MAGIC || s->hash != fiv__hash(FIV__HASH, p + 16, size - 16)) return 0;
     o.storage = s->octahedral ? FIV_STORAGE_HALF_OCTAHEDRAL : FIV_STORAGE_FLOAT;
     o.theta = s->octahedral ? (s->theta > 0 && s->theta <= 2049 ? 2 * (s->theta - 1) : 0) : s->theta;
     o.phi = s->octahedral ? 3 : s->phi;
@@ -3679,11 +4101,72 @@ static int fiv__read_header(fiv_occluder *from, fiv__save *s, const unsigned cha
     o.last_shell = s->last;
     if (!fiv__occluder_options_are_valid(&o) || !sat__is_finite(s->radius) || s->radius < 0) return 0;
     if (!sat__is_finite(s->centre[0]) || !sat__is_finite(s->centre[1]) || !sat__is_finite(s->centre[2])) return 0;
-    o.max_lights = from->max_lights;
+    o.sun_map = from->map_side;
     fiv__set_grid(from, &o);
     samples = fiv__grid_samples(&from->grid);
+    if (s->triangles > 0x7fffffff / 3 || s->clusters < 0 || s->vertices > 3 * s->triangles + 4 * (uint64_t)s->clusters) return 0;
+    if ((uint64_t)s->clusters != (s->triangles + FIV__CLUSTER - 1) / FIV__CLUSTER) return 0;
+    if ((s->turn != 1 && s->turn != -1) || (s->closed != 0 && s->closed != 1)) return 0;
+    from->mesh.triangle_count = (size_t)s->triangles;
+    from->mesh.cluster_count = (size_t)s->clusters;
+    from->mesh.vertex_count = (size_t)s->vertices;
+    from->mesh.closed = s->closed;
+    from->mesh.turn = (float)s->turn;
     return s->phi == from->grid.phi && samples <= 0x7fffffff && s->words <= 0x7fffffff &&
-           size == fiv__save_size(samples, (size_t)s->words);
+           size == fiv__save_size(from, (size_t)s->words);
+}
+
+/* Clusters follow each other and hold what the header says; vertices lie in the ball, corners among the vertices. */
+static int fiv__load_mesh(fiv__mesh *m, const unsigned char *p)
+{
+    size_t i, j, vertices = 0, triangles = 0;
+    for (i = 0; i < m->cluster_count; i++) {
+        fiv__cluster *c = &m->clusters[i];
+        uint32_t counts[2];
+        p = fiv__take(counts, p, sizeof counts);
+        if (counts[0] > FIV__CLUSTER_VERTICES || counts[0] & 3 || counts[1] < 1 || counts[1] > FIV__CLUSTER) return 0;
+        c->vertex = vertices;
+        c->triangle = triangles;
+        c->vertices = (int)counts[0];
+        c->triangles = (int)counts[1];
+        vertices += counts[0];
+        triangles += counts[1];
+    }
+    if (vertices != m->vertex_count || triangles != m->triangle_count) return 0;
+    for (i = 0; i < 3; i++) p = fiv__take(m->x[i], p, vertices * sizeof(float));
+    for (i = 0; i < vertices; i++) {
+        float x = m->x[0][i], y = m->x[1][i], z = m->x[2][i];
+        if (!(x * x + y * y + z * z < 1.001f)) return 0;
+    }
+    fiv__take(m->corner, p, 3 * triangles);
+    for (i = 0; i < m->cluster_count; i++) {
+        fiv__cluster *c = &m->clusters[i];
+        for (j = 0; j < 3 * (size_t)c->triangles; j++)
+            if (m->corner[3 * c->triangle + j] >= c->vertices) return 0;
+        fiv__bound_cluster(c, m);
+    }
+    return 1;
+}
+
+/* Memory for the words and the mesh of a save whose header is read. */
+static sat_result fiv__allocate_loaded(fiv_occluder *o, size_t words)
+{
+    sat__arena arena;
+    o->words_size = words ? words * sizeof(uint16_t) : 1;
+    o->words_block = sat__alloc(&o->allocator, o->words_size);
+    o->words = (uint16_t *)o->words_block;
+    memset(&arena, 0, sizeof arena);
+    fiv__mesh_layout(&o->mesh, &arena);
+    if (!o->words_block) return SAT_ERR_MEMORY;
+    if (arena.overflow) return SAT_ERR_SIZE;
+    o->mesh_size = arena.used + 63;
+    o->mesh_block = sat__alloc(&o->allocator, o->mesh_size);
+    if (!o->mesh_block) return SAT_ERR_MEMORY;
+    memset(o->mesh_block, 0, o->mesh_size);
+    memset(&arena, 0, sizeof arena);
+    arena.base = sat__align64(o->mesh_block);
+    fiv__mesh_layout(&o->mesh, &arena);
+    return SAT_OK;
 }
 
 FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, size_t size,
@@ -3702,18 +4185,16 @@ FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, siz
     if (!p || !fiv__occluder_options_are_valid(&options_used)) return SAT_ERR_ARGUMENT;
     if (!sat__resolve_allocator(&from.allocator, &options_used.allocator)) return SAT_ERR_ARGUMENT;
     from.threads = options_used.threads;
-    from.max_lights = options_used.max_lights;
+    from.map_side = options_used.sun_map;
     if (!fiv__read_header(&from, &s, p, size)) return SAT_ERR_DATA;
     result = fiv__allocate_occluder(&o, &from);
     if (result) return result;
     n = o->stats.samples;
-    o->words_size = s.words ? (size_t)s.words * sizeof(uint16_t) : 1;
-    o->words_block = sat__alloc(&o->allocator, o->words_size);
-    if (!o->words_block) {
+    result = fiv__allocate_loaded(o, (size_t)s.words);
+    if (result) {
         fiv_occluder_destroy(o);
-        return SAT_ERR_MEMORY;
+        return result;
     }
-    o->words = (uint16_t *)o->words_block;
     memcpy(o->centre, s.centre, sizeof s.centre);
     memcpy(o->stats.centre, s.centre, sizeof s.centre);
     o->radius = o->stats.radius = s.radius;
@@ -3723,12 +4204,11 @@ FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, siz
     o->stats.rasterised = (size_t)s.rasterised;
     o->stats.inside = (size_t)s.inside;
     o->stats.spans = (size_t)s.words;
-    p += sizeof s;
-    memcpy(o->state, p, n);
-    memcpy(o->support, p += n, FIV__SUPPORT * FIV__SUPPORT * sizeof(float));
-    memcpy(o->first, p += FIV__SUPPORT * FIV__SUPPORT * sizeof(float), (n + 1) * sizeof(uint32_t));
-    memcpy(o->words, p + (n + 1) * sizeof(uint32_t), (size_t)s.words * sizeof(uint16_t));
-    if (o->first[0] != 0 || o->first[n] != s.words || !fiv__words_are_valid(o)) {
+    p = fiv__take(o->state, p + sizeof s, n);
+    p = fiv__take(o->support, p, FIV__SUPPORT * FIV__SUPPORT * sizeof(float));
+    p = fiv__take(o->first, p, (n + 1) * sizeof(uint32_t));
+    p = fiv__take(o->words, p, (size_t)s.words * sizeof(uint16_t));
+    if (o->first[0] != 0 || o->first[n] != s.words || !fiv__words_are_valid(o) || !fiv__load_mesh(&o->mesh, p)) {
         fiv_occluder_destroy(o);
         return SAT_ERR_DATA;
     }
@@ -3762,20 +4242,20 @@ SAT__IEEE_BEGIN
 extern "C" {
 #endif
 
-/* Texels of fiv_tables: of each sample the vector and the solid angle in ten components, then the distances of the
-   lights, two in the third texel and four in each further one; then the support function, one a texel. fiv_scene: a row
-   an instance, see fiv__gl_row and fiv__gl_light; two texels a light in the row behind them. fiv_diffuse: I_tot at the
-   corners of the cube. */
+/* fiv_shells: half floats that the hardware filters; a layer a shell, samples inside the mesh 0. Three fields of it above
+   each other: vector 0..3; 4..7; 8, solid angle, 1 where valid, 1 where inside. Columns are azimuths, the first once more
+   at the end. fiv_support: the support function, a field an occluder. fiv_maps: depth maps of the lights, four occluders
+   side by side. fiv_scene: a row an instance, see fiv__gl_row and fiv__gl_light; two texels a light in the row behind
+   them. fiv_diffuse: I_tot at the corners of the cube. */
 static const char fiv__glsl_cube[] =
     "#ifndef FIV_GLSL\n"
     "#define FIV_GLSL\n"
-    "uniform highp sampler2D fiv_tables, fiv_scene, fiv_diffuse;\n"
-    "uniform ivec4 fiv_counts;\n" /* instances, lights, texels a sample, face */
+    "uniform highp sampler2DArray fiv_shells;\n"
+    "uniform highp sampler2D fiv_support, fiv_scene, fiv_diffuse;\n"
+    "uniform highp usampler2D fiv_maps;\n"
+    "uniform ivec4 fiv_counts;\n" /* instances, lights, columns of a depth map's field, face */
     "uniform vec3 fiv_x, fiv_y, fiv_z;\n" /* columns of the environment's rotation */
-    "vec4 fiv_at(int base, int texel) {\n"
-    "    int i = base + texel;\n"
-    "    return texelFetch(fiv_tables, ivec2(i & 2047, i >> 11), 0);\n"
-    "}\n"
+    "vec4 fiv_row(int instance, int texel) { return texelFetch(fiv_scene, ivec2(texel, instance), 0); }\n"
     "vec3 fiv_corner(int face, int x, int y) {\n"
     "    return texelFetch(fiv_diffuse, ivec2(x, face * (fiv_counts.w + 1) + y), 0).rgb;\n"
     "}\n"
@@ -3796,25 +4276,19 @@ static const char fiv__glsl_cube[] =
     "    vec2 folded = (1.0 - abs(p.yx)) * vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);\n"
     "    return d.y < 0.0 ? folded : p;\n"
     "}\n"
-    "float fiv_reach(int base, vec3 d) {\n"
-    "    vec2 p = (fiv_square(d) + 1.0) * 16.0;\n"
-    "    ivec2 i = clamp(ivec2(p), 0, 31);\n"
-    "    int at = i.y * 33 + i.x;\n"
-    "    p -= vec2(i);\n"
-    "    return mix(mix(fiv_at(base, at).x, fiv_at(base, at + 1).x, p.x), mix(fiv_at(base, at + 33).x, fiv_at(base, at + 34).x, p.x), p.y);\n"
+    "float fiv_reach(float slot, vec3 d) {\n"
+    "    vec2 p = (fiv_square(d) + 1.0) * 16.0 + 0.5;\n"
+    "    return textureLod(fiv_support, (p + vec2(0.0, 33.0 * slot)) / vec2(textureSize(fiv_support, 0)), 0.0).r;\n"
     "}\n";
 
-/* The eight samples around an offset, as fiv__locate has them, and the sums over them: of the valid ones and of all. */
+/* The cell around an offset, as fiv__locate has it, and the sums over its eight samples. */
 static const char fiv__glsl_cell[] =
     "struct fiv_cell {\n"
-    "    int base, theta, phi;\n"
-    "    ivec3 at;\n"
-    "    vec3 part;\n"
-    "    float r;\n"
+    "    vec3 at;\n" /* column, row, layer of the inner four samples */
+    "    float rows, r, part;\n"
     "    vec2 shell;\n"
     "};\n"
-    "struct fiv_sum { mat3 v, whole; float angle, all, total; };\n"
-    "vec4 fiv_row(int instance, int texel) { return texelFetch(fiv_scene, ivec2(texel, instance), 0); }\n"
+    "struct fiv_sum { mat3 v; float angle, total, inside; };\n"
     "vec3 fiv_own(int instance, vec3 v) {\n"
     "    return fiv_row(instance, 1).xyz * v.x + fiv_row(instance, 2).xyz * v.y + fiv_row(instance, 3).xyz * v.z;\n"
     "}\n"
@@ -3822,54 +4296,33 @@ static const char fiv__glsl_cell[] =
     "    vec4 grid = fiv_row(instance, 4), shells = fiv_row(instance, 5);\n"
     "    bool octahedral = fiv_row(instance, 2).w > 0.5;\n"
     "    fiv_cell c;\n"
-    "    c.base = int(fiv_row(instance, 1).w); c.theta = int(grid.x); c.phi = int(grid.y);\n"
+    "    c.rows = grid.y;\n"
     "    c.r = max(length(d), shells.x);\n"
-    "    float f = clamp((log2(c.r) - grid.w) * shells.y, 0.0, grid.z - 1.0);\n"
+    "    float f = clamp((log2(c.r) - grid.w) * shells.y, 0.0, grid.z - 1.0), k = min(floor(f), grid.z - 2.0);\n"
     "    vec2 p = octahedral ? (fiv_square(d) + 1.0) * 0.5 * (grid.xy - 1.0)\n"
     "        : vec2(atan(d.z, d.x == 0.0 && d.z == 0.0 ? 1.0 : d.x) * 0.159154943 * grid.x,\n"
     "               atan(length(d.xz), d == vec3(0.0) ? 1.0 : d.y) * 0.318309886 * (grid.y - 1.0));\n"
     "    if (p.x < 0.0) p.x += grid.x;\n"
-    "    c.at = ivec3(clamp(int(p.x), 0, octahedral ? c.theta - 2 : c.theta - 1), clamp(int(p.y), 0, c.phi - 2), min(int(f), int(grid.z) - 2));\n"
-    "    c.part = clamp(vec3(p, f) - vec3(c.at), 0.0, 1.0);\n"
-    "    c.shell = exp2(grid.w + (float(c.at.z) + vec2(0.0, 1.0)) / shells.y);\n"
+    "    c.at = vec3(p, fiv_row(instance, 1).w + k);\n"
+    "    c.part = f - k;\n"
+    "    c.shell = exp2(grid.w + (k + vec2(0.0, 1.0)) / shells.y);\n"
     "    return c;\n"
     "}\n"
-    "int fiv_sample(fiv_cell c, int q, out float weight) {\n"
-    "    ivec3 e = ivec3(q & 1, (q >> 1) & 1, q >> 2);\n"
-    "    vec3 share = mix(1.0 - c.part, c.part, vec3(e));\n"
-    "    int x = c.at.x + e.x;\n"
-    "    weight = share.x * share.y * share.z;\n"
-    "    return (((c.at.z + e.z) * c.phi + c.at.y + e.y) * c.theta + (x == c.theta ? 0 : x)) * fiv_counts.z;\n"
+    "vec4 fiv_shell(fiv_cell c, float field, float shell) {\n"
+    "    vec2 p = (c.at.xy + vec2(0.5, 0.5 + field * c.rows)) / vec2(textureSize(fiv_shells, 0).xy);\n"
+    "    return textureLod(fiv_shells, vec3(p, c.at.z + shell), 0.0);\n"
     "}\n"
-    "fiv_sum fiv_gather(fiv_cell c, vec2 scale, inout float light[8]) {\n"
-    "    fiv_sum s = fiv_sum(mat3(0.0), mat3(0.0), 0.0, 0.0, 0.0);\n"
-    "    float away[8], weight;\n"
-    "    for (int k = 0; k < 8; k++) away[k] = 0.0;\n"
-    "    for (int q = 0; q < 8; q++) {\n"
-    "        int at = fiv_sample(c, q, weight);\n"
-    "        float scaled = weight * (q < 4 ? scale.x : scale.y);\n"
-    "        vec4 a = fiv_at(c.base, at), b = fiv_at(c.base, at + 1), e = fiv_at(c.base, at + 2);\n"
-    "        mat3 v = scaled * mat3(a.xyz, vec3(a.w, b.xy), vec3(b.zw, e.x));\n"
-    "        s.whole += v;\n"
-    "        s.all += scaled * abs(e.y);\n"
-    "        if (e.y < 0.0) continue;\n"
-    "        s.v += v;\n"
-    "        s.angle += scaled * e.y;\n"
-    "        s.total += weight;\n"
-    "        away[0] += weight * e.z; away[1] += weight * e.w;\n"
-    "        for (int k = 2; k < fiv_counts.y; k += 4) {\n"
-    "            vec4 more = fiv_at(c.base, at + 3 + (k - 2) / 4);\n"
-    "            away[k] += weight * more.x; if (k + 1 < 8) away[k + 1] += weight * more.y;\n"
-    "            if (k + 2 < 8) { away[k + 2] += weight * more.z; away[k + 3] += weight * more.w; }\n"
-    "        }\n"
-    "    }\n"
-    "    for (int k = 0; k < fiv_counts.y; k++)\n"
-    "        light[k] = max(light[k], s.total > 1e-4 ? clamp(0.5 + away[k] / s.total, 0.0, 1.0) : 1.0);\n"
-    "    return s;\n"
+    "fiv_sum fiv_gather(int instance, fiv_cell c, vec2 scale) {\n"
+    "    vec4 e = fiv_shell(c, 2.0, 0.0), f = fiv_shell(c, 2.0, 1.0);\n"
+    "    float unit = fiv_row(instance, 5).z;\n"
+    "    scale *= vec2(1.0 - c.part, c.part);\n"
+    "    vec4 a = scale.x * fiv_shell(c, 0.0, 0.0) + scale.y * fiv_shell(c, 0.0, 1.0);\n"
+    "    vec4 b = scale.x * fiv_shell(c, 1.0, 0.0) + scale.y * fiv_shell(c, 1.0, 1.0);\n"
+    "    vec2 g = scale.x * e.xy + scale.y * f.xy, h = mix(e.zw, f.zw, c.part);\n"
+    "    return fiv_sum(unit * mat3(a.xyz, vec3(a.w, b.xy), vec3(b.zw, g.x)), g.y, h.x, h.y);\n"
     "}\n";
 
-/* What one occluder takes, and its solid angle in w; what is left of the light on its own surface (eq 13). Both note in
-   `light` how much of each light is covered. */
+/* What one occluder takes, and its solid angle in w; what is left of the light on its own surface (eq 13). */
 static const char fiv__glsl_occluder[] =
     "float fiv_cap(float c, float h) {\n"
     "    float s = 1.0 - h * h;\n"
@@ -3886,34 +4339,82 @@ static const char fiv__glsl_occluder[] =
     "    }\n"
     "    return max(along, 0.0);\n"
     "}\n"
-    "vec4 fiv_occluder(int instance, vec3 d, vec3 n, float cut, inout float light[8]) {\n"
+    "vec4 fiv_occluder(int instance, vec3 d, vec3 n, float cut) {\n"
     "    fiv_cell c = fiv_locate(instance, d);\n"
-    "    fiv_sum s = fiv_gather(c, vec2(1.0), light);\n"
-    "    bool inside = !(s.total > 1e-4);\n"
-    "    float scale = 1.0 / ((inside ? 1.0 : s.total) * c.r * c.r), angle = (inside ? s.all : s.angle) * scale;\n"
-    "    mat3 v = s.v;\n"
-    "    if (inside) v = s.whole;\n"
-    "    return vec4(fiv_shade(v * scale, angle, n, cut), angle);\n"
+    "    fiv_sum s = fiv_gather(instance, c, vec2(1.0));\n"
+    "    if (!(s.total > 1e-3)) return s.inside > 0.5 ? vec4(1e30, 1e30, 1e30, 0.0) : vec4(0.0);\n"
+    "    float scale = 1.0 / (s.total * c.r * c.r);\n"
+    "    return vec4(fiv_shade(s.v * scale, s.angle * scale, n, cut), s.angle * scale);\n"
     "}\n"
 #ifndef FIV_NO_SELF
-    "vec3 fiv_self(int self, vec3 d, vec3 n, inout float light[8]) {\n"
+    "vec3 fiv_self(int self, vec3 d, vec3 n) {\n"
     "    fiv_cell c;\n"
     "    float out_by = 0.0;\n"
     "    for (int k = 0; k < 6; k++) {\n"
-    "        float valid = 0.0, weight;\n"
     "        c = fiv_locate(self, d - out_by * n);\n"
-    "        for (int q = 0; q < 8; q++)\n"
-    "            if (fiv_at(c.base, fiv_sample(c, q, weight) + 2).y >= 0.0) valid += weight;\n"
-    "        if (valid > 0.25) break;\n"
+    "        if (mix(fiv_shell(c, 2.0, 0.0).z, fiv_shell(c, 2.0, 1.0).z, c.part) > 0.25) break;\n"
     "        out_by = max(2.0 * out_by, 0.05);\n"
     "    }\n"
-    "    fiv_sum s = fiv_gather(c, 1.0 / (c.shell * c.shell), light);\n"
-    "    if (!(s.total > 1e-4)) return vec3(0.0);\n"
+    "    fiv_sum s = fiv_gather(self, c, 1.0 / (c.shell * c.shell));\n"
+    "    if (!(s.total > 1e-3)) return vec3(0.0);\n"
     "    mat3 open = mat3(fiv_row(self, 6).xyz, fiv_row(self, 7).xyz, fiv_row(self, 8).xyz) - s.v / s.total;\n"
     "    return fiv_shade(open, 12.5663706 - s.angle / s.total, n, 1.0);\n"
     "}\n"
 #endif
     ;
+
+#ifndef FIV_NO_DELTA
+/* Split-off lights, as fiv__cover_light has them without rays. */
+static const char fiv__glsl_lights[] =
+    "struct fiv_seen { ivec2 cell; int side; vec2 at; float z, scale; };\n"
+    "float fiv_beyond(fiv_seen s, ivec2 p) {\n"
+    "    if (p.x < 0 || p.y < 0 || p.x >= s.side || p.y >= s.side) return -1.0;\n"
+    "    int word = int(texelFetch(fiv_maps, s.cell + p, 0).r);\n"
+    "    return word > 0 ? float(word - 1) / 32767.0 - 1.0 - s.z : -1.0;\n"
+    "}\n"
+    "float fiv_compare(fiv_seen s, vec2 at) {\n"
+    "    ivec2 i = ivec2(floor(at));\n"
+    "    vec2 f = at - vec2(i);\n"
+    "    float least = 0.25 / s.scale;\n"
+    "    vec2 low = vec2(fiv_beyond(s, i) > least, fiv_beyond(s, i + ivec2(1, 0)) > least);\n"
+    "    vec2 high = vec2(fiv_beyond(s, i + ivec2(0, 1)) > least, fiv_beyond(s, i + ivec2(1, 1)) > least);\n"
+    "    low = mix(low, high, f.y);\n"
+    "    return mix(low.x, low.y, f.x);\n"
+    "}\n"
+    "vec2 fiv_disc(fiv_seen s, float radius, bool search) {\n"
+    "    int n = clamp(int(search ? 0.5 * radius : radius) + 3, 4, 16);\n"
+    "    float covered = 0.0, count = 0.0, sum = 0.0;\n"
+    "    for (int j = 0; j < n; j++) for (int i = 0; i < n; i++) {\n"
+    "        vec2 u = (vec2(i, j) + 0.5) * (2.0 / float(n)) - 1.0, at = s.at + radius * u;\n"
+    "        if (dot(u, u) > 1.0) continue;\n"
+    "        count++;\n"
+    "        if (search) {\n"
+    "            float beyond = fiv_beyond(s, ivec2(floor(at + 0.5)));\n"
+    "            if (beyond > 0.25 / s.scale) { sum += beyond; covered++; }\n"
+    "        } else covered += fiv_compare(s, at);\n"
+    "    }\n"
+    "    return vec2(covered / count, covered > 0.0 ? sum / covered : 0.0);\n"
+    "}\n"
+    "float fiv_cover(int instance, int light, vec3 d, float tangent) {\n"
+    "    fiv_seen s;\n"
+    "    int slot = int(fiv_row(instance, 3).w), cells = int(fiv_row(instance, 7).w), side = fiv_counts.z;\n"
+    "    s.side = int(fiv_row(instance, 6).w);\n"
+    "    s.z = -dot(d, fiv_row(instance, 16 + 3 * light + 2).xyz);\n"
+    "    if (s.z >= 1.0) return 0.0;\n"
+    "    s.scale = fiv_row(instance, 5).w;\n"
+    "    s.cell = ivec2(slot & 3, slot >> 2) * side + ivec2(light % cells, light / cells) * s.side;\n"
+    "    float shift = 0.5 * float(s.side) - 0.5, reach = tangent * (1.0 - s.z) * s.scale;\n"
+    "    s.at = shift - s.scale * vec2(dot(d, fiv_row(instance, 16 + 3 * light).xyz), dot(d, fiv_row(instance, 17 + 3 * light).xyz));\n"
+    "    if (any(greaterThanEqual(abs(s.at - shift), vec2(s.scale + reach + 2.0)))) return 0.0;\n"
+    "    if (reach > 1.0) {\n"
+    "        vec2 found = fiv_disc(s, reach, true);\n"
+    "        if (found.x == 0.0) return 0.0;\n"
+    "        reach = tangent * found.y * s.scale;\n"
+    "        if (reach > 1.0) return fiv_disc(s, reach, false).x;\n"
+    "    }\n"
+    "    return fiv_compare(s, s.at);\n"
+    "}\n";
+#endif
 
 static const char fiv__glsl_receiver[] =
     "float fiv_lens(float r, float s, float d) {\n"
@@ -3934,9 +4435,7 @@ static const char fiv__glsl_receiver[] =
     "    vec3 open = fiv_total(normal), sum = vec3(0.0), shared_sum = vec3(0.0), largest = vec3(0.0), world;\n"
     "    vec4 discs[FIV_INSTANCES];\n"
     "    vec3 takes[FIV_INSTANCES];\n"
-    "    float light[8];\n"
     "    int count = 0;\n"
-    "    for (int k = 0; k < 8; k++) light[k] = 0.0;\n"
     "    for (int i = 0; i < FIV_INSTANCES; i++) {\n"
     "        if (i >= fiv_counts.x) break;\n"
     "        if (i == self || !fiv_place(i, point, world)) continue;\n"
@@ -3944,12 +4443,11 @@ static const char fiv__glsl_receiver[] =
     "        float height = dot(world, normal), cut = 0.0;\n"
     "        if (height <= -1.0) continue;\n"
     "        if (height < 1.0) {\n"
-    "            int reach = int(fiv_row(i, 3).w);\n"
-    "            float below = fiv_reach(reach, -n), above = fiv_reach(reach, n);\n"
+    "            float slot = fiv_row(i, 3).w, below = fiv_reach(slot, -n), above = fiv_reach(slot, n);\n"
     "            if (height <= -above) continue;\n"
     "            if (height < below - 1e-4) cut = (below - height) / (below + above);\n"
     "        }\n"
-    "        vec4 taken = fiv_occluder(i, fiv_own(i, world), n, cut, light);\n"
+    "        vec4 taken = fiv_occluder(i, fiv_own(i, world), n, cut);\n"
     "        vec3 own = min(taken.rgb, open);\n"
     "        discs[count] = vec4(world / max(length(world), 1e-30), sqrt(taken.w * 0.318309886));\n"
     "        takes[count] = own;\n"
@@ -3964,12 +4462,21 @@ static const char fiv__glsl_receiver[] =
     "    vec3 result = clamp(open - max(sum - shared_sum, largest), vec3(0.0), open);\n"
 #ifndef FIV_NO_SELF
     "    if (self >= 0 && self < fiv_counts.x && fiv_place(self, point, world))\n"
-    "        result *= min(fiv_self(self, fiv_own(self, world), fiv_own(self, normal), light) / max(open, 1e-30), 1.0);\n"
+    "        result *= min(fiv_self(self, fiv_own(self, world), fiv_own(self, normal)) / max(open, 1e-30), 1.0);\n"
 #endif
+#ifndef FIV_NO_DELTA
     "    for (int k = 0; k < fiv_counts.y; k++) {\n"
-    "        vec3 direction = fiv_row(FIV_INSTANCES, 2 * k).xyz, power = fiv_row(FIV_INSTANCES, 2 * k + 1).rgb;\n"
-    "        result += power * max(dot(normal, direction), 0.0) * (1.0 - light[k]);\n"
+    "        vec4 direction = fiv_row(FIV_INSTANCES, 2 * k);\n"
+    "        float cosine = dot(normal, direction.xyz), cover = 0.0;\n"
+    "        for (int i = 0; i < FIV_INSTANCES && cosine > 0.0; i++) {\n"
+    "            if (i >= fiv_counts.x) break;\n"
+    "            if (!fiv_place(i, point, world) || (i != self && dot(world, normal) <= -1.0)) continue;\n"
+    "            if (i == self) world -= normal * (2.0 / fiv_row(i, 5).w);\n"
+    "            cover = max(cover, fiv_cover(i, k, fiv_own(i, world), direction.w));\n"
+    "        }\n"
+    "        result += fiv_row(FIV_INSTANCES, 2 * k + 1).rgb * max(cosine, 0.0) * (1.0 - cover);\n"
     "    }\n"
+#endif
     "    return result;\n"
     "}\n"
     "vec3 fiv_irradiance(vec3 point, vec3 normal) { return fiv_receive(-1, point, normal); }\n"
@@ -3978,7 +4485,11 @@ static const char fiv__glsl_receiver[] =
 #endif
     "#endif\n";
 
-static const char *const fiv__glsl[] = {fiv__glsl_cube, fiv__glsl_cell, fiv__glsl_occluder, fiv__glsl_receiver, NULL};
+static const char *const fiv__glsl[] = {fiv__glsl_cube, fiv__glsl_cell, fiv__glsl_occluder,
+#ifndef FIV_NO_DELTA
+                                        fiv__glsl_lights,
+#endif
+                                        fiv__glsl_receiver, NULL};
 
 FIV_DEF const char *const *fiv_gl_glsl(void) { return fiv__glsl; }
 
@@ -3993,57 +4504,95 @@ static const char fiv__glsl_main[] =
     "}\n";
 
 enum {
-    FIV__GL_WIDTH = 2048,
-    FIV__GL_UNITS = 5,
-    FIV__SCENE_WIDTH = 16,
-    FIV__SUPPORT_TEXELS = FIV__SUPPORT * FIV__SUPPORT
+    FIV__GL_UNITS = 7,
+    FIV__GL_INSTANCES = 64,
+    FIV__GL_STAGED = 16384, /* texels on their way at a time: wider than any row of samples */
+    FIV__SCENE_WIDTH = 16 + 3 * FIV_MAX_LIGHTS
 };
+
+/* What textures have room for. */
+typedef struct fiv__gl_room {
+    int columns, rows, layers; /* of fiv_shells */
+    int map_side, face;
+} fiv__gl_room;
 
 struct fiv_gl {
     sat__gl gl;
     sat_allocator allocator;
     int width, height, max_instances, self;
-    int count, lights, texels, face, table_rows; /* what the textures hold */
-    int base[64];                                /* texel where the tables of each instance begin */
+    float penumbra;
+    int count, lights, kinds; /* what the scene holds: instances, split-off lights, different occluders */
+    int kind[FIV__GL_INSTANCES];                              /* of each instance */
+    const fiv_occluder *occluders[FIV__GL_INSTANCES];         /* of each kind */
+    int layer[FIV__GL_INSTANCES];                             /* where its shells begin */
+    uint64_t signature[FIV__GL_INSTANCES], light_signature;   /* of what the textures hold; 0: nothing */
+    size_t uploads;                                           /* occluders sent so far */
+    fiv__gl_room room;
     float rotation[9];
-    unsigned program, target, out, tables, scene, diffuse;
-    const fiv_occluder *occluders[64];
-    float rows[65][FIV__SCENE_WIDTH][4];         /* fiv_scene */
+    unsigned program, target, out, shells, support, maps, scene, diffuse;
+    float rows[FIV__GL_INSTANCES + 1][FIV__SCENE_WIDTH][4];   /* fiv_scene */
+    float staged[FIV__GL_STAGED][4];
+};
+
+static const sat__field fiv__gl_fields[] = {
+    SAT__FIELD(fiv_gl_options, 'i', max_instances, 8, 1, 64, ' '),
+#ifdef FIV_NO_SELF
+    SAT__FIELD(fiv_gl_options, 'i', self, 0, 0, 0, ' '),
+#else
+    SAT__FIELD(fiv_gl_options, 'i', self, 0, 0, 1, ' '),
+#endif
+    SAT__FIELD(fiv_gl_options, 'f', penumbra, 1, 0, 100, ' '),
+    SAT__FIELD(fiv_gl_options, 'a', allocator, 0, 0, 0, ' '),
 };
 
 FIV_DEF fiv_gl_options fiv_gl_defaults(void)
 {
     fiv_gl_options o;
-    memset(&o, 0, sizeof o);
-    o.max_instances = 8;
+    sat__fields_default(&o, sizeof o, fiv__gl_fields, SAT__COUNT(fiv__gl_fields));
     return o;
+}
+
+FIV_DEF const char *fiv_explain_gl(char *text, size_t size, int width, int height, const fiv_gl_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    const sat__field *wrong = options ? sat__fields_check(options, fiv__gl_fields, SAT__COUNT(fiv__gl_fields)) : NULL;
+    if (width < 1 || width > 16384) sat__text_range(&t, "width", width, 1, 16384, ' ');
+    else if (height < 1 || height > 16384) sat__text_range(&t, "height", height, 1, 16384, ' ');
+    else if (wrong) sat__text_field(&t, wrong, options);
+    return t.size ? text : "";
 }
 
 FIV_DEF const char *fiv_gl_message(const fiv_gl *g) { return g ? g->gl.message : "no object"; }
 FIV_DEF unsigned fiv_gl_texture(const fiv_gl *g) { return g ? g->out : 0; }
-
-static void fiv__gl_delete_textures(fiv_gl *g)
-{
-    unsigned textures[4];
-    textures[0] = g->out;
-    textures[1] = g->tables;
-    textures[2] = g->scene;
-    textures[3] = g->diffuse;
-    g->gl.DeleteTextures(4, textures);
-}
 
 FIV_DEF void fiv_gl_destroy(fiv_gl *g)
 {
     sat_allocator allocator;
     if (!g) return;
     if (g->out || g->program) {
+        unsigned textures[6];
+        textures[0] = g->out;
+        textures[1] = g->shells;
+        textures[2] = g->support;
+        textures[3] = g->maps;
+        textures[4] = g->scene;
+        textures[5] = g->diffuse;
         if (g->target) g->gl.DeleteFramebuffers(1, &g->target);
         if (g->program) g->gl.DeleteProgram(g->program);
-        fiv__gl_delete_textures(g);
+        g->gl.DeleteTextures(6, textures);
     }
     sat__gl_close(&g->gl);
     allocator = g->allocator;
     sat__release(&allocator, g, sizeof *g);
+}
+
+static void fiv__gl_filter(sat__gl *gl, unsigned kind)
+{
+    gl->TexParameteri(kind, SAT__GL_TEXTURE_MIN_FILTER, SAT__GL_LINEAR);
+    gl->TexParameteri(kind, SAT__GL_TEXTURE_MAG_FILTER, SAT__GL_LINEAR);
+    gl->TexParameteri(kind, SAT__GL_TEXTURE_WRAP_S, SAT__GL_CLAMP_TO_EDGE);
+    gl->TexParameteri(kind, SAT__GL_TEXTURE_WRAP_T, SAT__GL_CLAMP_TO_EDGE);
+    gl->TexParameteri(kind, SAT__GL_TEXTURE_MAX_LEVEL, 0);
 }
 
 static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
@@ -4068,6 +4617,8 @@ static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
     r = sat__gl_texture(gl, &g->out, SAT__GL_RGBA32F, g->width, g->height, NULL);
     if (!r) r = sat__gl_framebuffer(gl, &g->target, &g->out, 1, 0);
     if (!r) r = sat__gl_texture(gl, &g->scene, SAT__GL_RGBA32F, FIV__SCENE_WIDTH, g->max_instances + 1, NULL);
+    if (!r) r = sat__gl_texture(gl, &g->support, SAT__GL_R16F, FIV__SUPPORT, FIV__SUPPORT * g->max_instances, NULL);
+    if (!r) fiv__gl_filter(gl, SAT__GL_TEXTURE_2D);
     sat__gl_end(gl, &state);
     return r;
 }
@@ -4081,106 +4632,96 @@ FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int wi
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (!get_proc || width < 1 || height < 1 || width > 16384 || height > 16384) return SAT_ERR_ARGUMENT;
-    if (o.max_instances < 1 || o.max_instances > 64 || !sat__resolve_allocator(&allocator, &o.allocator))
-        return SAT_ERR_ARGUMENT;
-#ifdef FIV_NO_SELF
-    if (o.self) return SAT_ERR_ARGUMENT;
-#endif
+    if (!sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     g = (fiv_gl *)sat__alloc(&allocator, sizeof *g);
     if (!g) return SAT_ERR_MEMORY;
     memset(g, 0, sizeof *g);
     g->allocator = allocator;
+    *out = g;
+    if (*fiv_explain_gl(g->gl.message, sizeof g->gl.message, width, height, &o)) return SAT_ERR_ARGUMENT;
+    if (!get_proc) return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "get_proc is NULL", NULL);
     g->width = width;
     g->height = height;
     g->max_instances = o.max_instances;
     g->self = o.self != 0;
-    *out = g;
+    g->penumbra = o.penumbra;
     return fiv__gl_start(g, get_proc);
 }
 
-/* The texels of one occluder's samples and support function. */
-static void fiv__gl_fill(float *out, const fiv_occluder *o, int texels)
+/* The four components of a field of fiv_shells; all samples that are not valid are 0. */
+static void fiv__gl_sample(float out[4], const fiv_occluder *o, size_t sample, int field, float scale)
 {
-    size_t s, i;
-    for (s = 0; s < o->stats.samples; s++, out += 4 * texels) {
-        float v[FIV__TERMS];
-        int k;
-        memset(v, 0, sizeof v);
-        memset(out, 0, (size_t)(4 * texels) * sizeof *out);
-        fiv__add_sample_plain(v, 1, o, s);
-        fiv__unscale(v, o, 1);
-        if (fiv__sample_angle(o, s) < 0) v[9] = -v[9];
-        memcpy(out, v, sizeof v);
-        for (k = 0; k < o->light_count; k++)
-            out[10 + k] = (float)o->distance[s * (size_t)o->max_lights + (size_t)k] / 21;
+    float v[FIV__TERMS + 2], angle = fiv__sample_angle(o, sample);
+    int k;
+    memset(v, 0, sizeof v);
+    if (angle >= 0) {
+        fiv__add_sample_plain(v, 1, o, sample);
+        for (k = 0; k < 9; k++) v[k] *= scale;
+        v[10] = 1;
     }
-    for (i = 0; i < FIV__SUPPORT_TEXELS; i++) out[4 * i] = o->support[i];
+    v[11] = o->state[sample] == FIV__INSIDE;
+    memcpy(out, v + 4 * field, 4 * sizeof *out);
 }
 
-/* Where each instance's tables begin; instances of one occluder share them. Returns the number of texels. */
-static size_t fiv__gl_bases(int base[64], int texels, const fiv_instance *instances, size_t count)
+/* What the shader multiplies vectors by, whose stored halves fit. */
+static float fiv__gl_unit(const fiv_occluder *o)
 {
-    size_t i, j, used = 0;
-    for (i = 0; i < count; i++) {
-        const fiv_occluder *o = instances[i].occluder;
-        for (j = 0; j < i && instances[j].occluder != o; j++) {}
-        base[i] = j < i ? base[j] : (int)used;
-        if (j == i) used += o->stats.samples * (size_t)texels + FIV__SUPPORT_TEXELS;
-        if (used > ((size_t)1 << 24)) return used;
-    }
-    return used;
+    return o->half_floats ? 1 / o->table_scale : 1 / fiv__half_scale(o->environment);
 }
 
-static sat_result fiv__gl_upload_tables(fiv_gl *g, size_t used)
+static void fiv__gl_send_shells(fiv_gl *g, const fiv_occluder *o, int layer)
 {
-    size_t bytes, i, j;
-    int rows = (int)((used + FIV__GL_WIDTH - 1) / FIV__GL_WIDTH);
-    float *texels;
-    sat_result r = SAT_OK;
-    if (rows < 1) rows = 1;
-    bytes = (size_t)rows * FIV__GL_WIDTH * 4 * sizeof *texels;
-    texels = (float *)sat__alloc(&g->allocator, bytes);
-    if (!texels) return SAT_ERR_MEMORY;
-    memset(texels, 0, bytes);
-    for (i = 0; i < (size_t)g->count; i++) {
-        for (j = 0; j < i && g->occluders[j] != g->occluders[i]; j++) {}
-        if (j == i) fiv__gl_fill(texels + 4 * (size_t)g->base[i], g->occluders[i], g->texels);
-    }
-    if (g->tables && rows != g->table_rows) {
-        g->gl.DeleteTextures(1, &g->tables);
-        g->tables = 0;
-    }
-    g->table_rows = rows;
-    if (g->tables) sat__gl_upload(&g->gl, g->tables, SAT__GL_RGBA32F, FIV__GL_WIDTH, rows, texels);
-    else r = sat__gl_texture(&g->gl, &g->tables, SAT__GL_RGBA32F, FIV__GL_WIDTH, rows, texels);
-    sat__release(&g->allocator, texels, bytes);
-    return r;
+    const fiv__grid *grid = &o->grid;
+    int columns = grid->theta + 1, at_once = FIV__GL_STAGED / columns, rows = 3 * grid->phi, shell, row, i, x;
+    float scale = 1 / (o->table_scale * fiv__gl_unit(o));
+    g->gl.ActiveTexture(SAT__GL_TEXTURE0);
+    g->gl.BindTexture(SAT__GL_TEXTURE_2D_ARRAY, g->shells);
+    for (shell = 0; shell < grid->rho; shell++)
+        for (row = 0; row < rows; row += at_once) {
+            int n = sat__min_int(at_once, rows - row);
+            for (i = 0; i < n; i++) {
+                int field = (row + i) / grid->phi, y = (row + i) % grid->phi;
+                size_t first = ((size_t)shell * (size_t)grid->phi + (size_t)y) * (size_t)grid->theta;
+                for (x = 0; x < columns; x++)
+                    fiv__gl_sample(g->staged[i * columns + x], o, first + (size_t)(x % grid->theta), field, scale);
+            }
+            g->gl.TexSubImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, 0, row, layer + shell, columns, n, 1, SAT__GL_RGBA,
+                                SAT__GL_FLOAT, g->staged);
+        }
 }
 
-static sat_result fiv__gl_upload_diffuse(fiv_gl *g, const fiv_environment *e)
+static void fiv__gl_send(fiv_gl *g, const fiv_occluder *o, int kind, int layer)
 {
-    size_t side = (size_t)e->face + 1, i, bytes = 24 * side * side * sizeof(float);
-    float *texels = (float *)sat__alloc(&g->allocator, bytes);
-    sat_result r = SAT_OK;
-    if (!texels) return SAT_ERR_MEMORY;
-    for (i = 0; i < 6 * side * side; i++) {
-        memcpy(texels + 4 * i, e->irradiance + 3 * i, 3 * sizeof *texels);
-        texels[4 * i + 3] = 1;
+    fiv__gl_send_shells(g, o, layer);
+    g->gl.BindTexture(SAT__GL_TEXTURE_2D, g->support);
+    g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, 0, FIV__SUPPORT * kind, FIV__SUPPORT, FIV__SUPPORT, SAT__GL_RED,
+                        SAT__GL_FLOAT, o->support);
+#ifndef FIV_NO_DELTA
+    if (o->light_count) {
+        g->gl.BindTexture(SAT__GL_TEXTURE_2D, g->maps);
+        g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, kind % 4 * g->room.map_side, kind / 4 * g->room.map_side, o->map_side,
+                            o->map_side, SAT__GL_RED_INTEGER, SAT__GL_UNSIGNED_SHORT, o->map);
     }
-    if (g->diffuse && g->face != e->face) {
-        g->gl.DeleteTextures(1, &g->diffuse);
-        g->diffuse = 0;
-    }
-    g->face = e->face;
-    if (g->diffuse) sat__gl_upload(&g->gl, g->diffuse, SAT__GL_RGBA32F, (int)side, (int)(6 * side), texels);
-    else r = sat__gl_texture(&g->gl, &g->diffuse, SAT__GL_RGBA32F, (int)side, (int)(6 * side), texels);
-    sat__release(&g->allocator, texels, bytes);
-    return r;
+#endif
+    g->uploads++;
 }
 
-/* Texels 0 to 5 of an instance: where it is, and its tables. */
-static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *instance, int base, int texels)
+/* I_tot of the environment, a row of texels at a time. */
+static void fiv__gl_send_diffuse(fiv_gl *g, const fiv_environment *e)
+{
+    int side = e->face + 1, row, x;
+    g->gl.BindTexture(SAT__GL_TEXTURE_2D, g->diffuse);
+    for (row = 0; row < 6 * side; row++) {
+        for (x = 0; x < side; x++) {
+            memcpy(g->staged[x], e->irradiance + 3 * (row * side + x), 3 * sizeof(float));
+            g->staged[x][3] = 1;
+        }
+        g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, 0, row, side, 1, SAT__GL_RGBA, SAT__GL_FLOAT, g->staged);
+    }
+}
+
+/* Texels 0 to 7 of an instance: where it is, and its tables. */
+static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *instance, int layer, int kind)
 {
     const fiv_occluder *o = instance->occluder;
     float centre[3];
@@ -4189,15 +4730,21 @@ static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *inst
     for (k = 0; k < 3; k++) row[0][k] = instance->position[k] + instance->scale * centre[k];
     row[0][3] = o->radius > 0 && instance->scale > 0 ? 1 / (o->radius * instance->scale) : 0;
     for (k = 0; k < 9; k++) row[1 + k / 3][k % 3] = o->rotation[k];
-    row[1][3] = (float)base;
+    row[1][3] = (float)layer;
     row[2][3] = (float)o->grid.octahedral;
-    row[3][3] = (float)base + (float)texels * (float)o->stats.samples;
+    row[3][3] = (float)kind;
     row[4][0] = (float)o->grid.theta;
     row[4][1] = (float)o->grid.phi;
     row[4][2] = (float)o->grid.rho;
     row[4][3] = o->grid.log_first;
     row[5][0] = o->grid.first;
     row[5][1] = o->grid.per_log;
+    row[5][2] = fiv__gl_unit(o);
+#ifndef FIV_NO_DELTA
+    row[5][3] = fiv__map_scale(o);
+    row[6][3] = (float)o->cell_side;
+    row[7][3] = (float)o->cells;
+#endif
 }
 
 /* What stays while instances move: texels 6 to 8, the environment's vector in the occluder's frame, and the lights. */
@@ -4205,14 +4752,20 @@ static void fiv__gl_light(fiv_gl *g, const fiv_environment *e)
 {
     int i, k, c;
     memset(g->rows, 0, sizeof g->rows);
-    for (i = 0; i < g->count; i++)
+    for (i = 0; i < g->count; i++) {
+        const fiv_occluder *o = g->occluders[g->kind[i]];
         for (c = 0; c < 3; c++) {
             float world[3];
             for (k = 0; k < 3; k++) world[k] = (float)e->vector[3 * c + k];
-            fiv__turn_back(g->rows[i][6 + c], g->occluders[i]->rotation, world);
+            fiv__turn_back(g->rows[i][6 + c], o->rotation, world);
         }
+        for (k = 0; k < 3 * o->light_count; k++)
+            memcpy(g->rows[i][16 + k], o->light_axes[k / 3][k % 3], sizeof o->light_axes[0][0]);
+    }
     for (k = 0; k < e->light_count; k++) {
-        fiv__turn(g->rows[g->max_instances][2 * k], e->rotation, e->lights[k].direction);
+        float *direction = g->rows[g->max_instances][2 * k];
+        fiv__turn(direction, e->rotation, e->lights[k].direction);
+        direction[3] = fiv__sun_tangent(&e->lights[k], g->penumbra);
         memcpy(g->rows[g->max_instances][2 * k + 1], e->lights[k].power, sizeof e->lights[k].power);
     }
 }
@@ -4222,50 +4775,126 @@ FIV_DEF sat_result fiv_gl_move(fiv_gl *g, const fiv_instance *instances, size_t 
     sat__gl_state state;
     size_t i;
     int k;
-    if (!g || !g->tables || count != (size_t)g->count || (count && !instances)) return SAT_ERR_ARGUMENT;
+    if (!g || !g->shells || count != (size_t)g->count || (count && !instances)) return SAT_ERR_ARGUMENT;
     for (i = 0; i < count; i++) {
-        if (instances[i].occluder != g->occluders[i] || !sat__is_finite(instances[i].scale) ||
+        if (instances[i].occluder != g->occluders[g->kind[i]] || !sat__is_finite(instances[i].scale) ||
             !(instances[i].scale >= 0))
             return SAT_ERR_ARGUMENT;
         for (k = 0; k < 3; k++)
             if (!sat__is_finite(instances[i].position[k])) return SAT_ERR_ARGUMENT;
     }
-    for (i = 0; i < count; i++) fiv__gl_row(g->rows[i], &instances[i], g->base[i], g->texels);
+    for (i = 0; i < count; i++) fiv__gl_row(g->rows[i], &instances[i], g->layer[g->kind[i]], g->kind[i]);
     sat__gl_begin(&g->gl, &state, 1);
     sat__gl_upload(&g->gl, g->scene, SAT__GL_RGBA32F, FIV__SCENE_WIDTH, g->max_instances + 1, g->rows);
     sat__gl_end(&g->gl, &state);
     return SAT_OK;
 }
 
+/* Textures of this room in place of smaller ones. All are made before one is given up. */
+static sat_result fiv__gl_grow(fiv_gl *g, const fiv__gl_room *room)
+{
+    sat__gl *gl = &g->gl;
+    unsigned made[3] = {0, 0, 0}, old[3];
+    int shells = !g->shells || room->columns > g->room.columns || room->rows > g->room.rows || room->layers > g->room.layers;
+    int maps = !g->maps || room->map_side > g->room.map_side, diffuse = !g->diffuse || room->face != g->room.face;
+    int columns = sat__max_int(room->columns, g->room.columns), rows = sat__max_int(room->rows, g->room.rows);
+    int layers = sat__max_int(room->layers, g->room.layers), side = sat__max_int(room->map_side, g->room.map_side);
+    sat_result r = SAT_OK;
+    if (shells) {
+        gl->GenTextures(1, &made[0]);
+        gl->ActiveTexture(SAT__GL_TEXTURE0);
+        gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, made[0]);
+        gl->TexImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, SAT__GL_RGBA16F, columns, rows, layers, 0, SAT__GL_RGBA, SAT__GL_FLOAT, NULL);
+        fiv__gl_filter(gl, SAT__GL_TEXTURE_2D_ARRAY);
+        r = sat__gl_check(gl, "fiv: OpenGL refused the texture of the samples");
+    }
+    if (!r && maps)
+        r = sat__gl_texture(gl, &made[1], SAT__GL_R16UI, 4 * side, (g->max_instances + 3) / 4 * side, NULL);
+    if (!r && diffuse) r = sat__gl_texture(gl, &made[2], SAT__GL_RGBA32F, room->face + 1, 6 * (room->face + 1), NULL);
+    if (r) {
+        gl->DeleteTextures(3, made);
+        return r;
+    }
+    old[0] = shells ? g->shells : 0;
+    old[1] = maps ? g->maps : 0;
+    old[2] = diffuse ? g->diffuse : 0;
+    gl->DeleteTextures(3, old);
+    if (shells) g->shells = made[0];
+    if (maps) g->maps = made[1];
+    if (diffuse) g->diffuse = made[2];
+    if (shells || maps) memset(g->signature, 0, sizeof g->signature);
+    if (diffuse) g->light_signature = 0;
+    g->room.columns = columns;
+    g->room.rows = rows;
+    g->room.layers = layers;
+    g->room.map_side = side;
+    g->room.face = room->face;
+    return r;
+}
+
+/* The scene's different occluders, where their shells begin, and the room that they take. */
+static int fiv__gl_kinds(const fiv_occluder *occluders[FIV__GL_INSTANCES], int kind[FIV__GL_INSTANCES],
+                         int layer[FIV__GL_INSTANCES], fiv__gl_room *room, const fiv_instance *instances, size_t count)
+{
+    size_t i;
+    int j, kinds = 0;
+    room->columns = room->rows = room->layers = room->map_side = 1;
+    for (i = 0; i < count; i++) {
+        const fiv_occluder *o = instances[i].occluder;
+        for (j = 0; j < kinds && occluders[j] != o; j++) {}
+        kind[i] = j;
+        if (j < kinds) continue;
+        layer[kinds] = kinds ? room->layers : 0;
+        occluders[kinds++] = o;
+        room->columns = sat__max_int(room->columns, o->grid.theta + 1);
+        room->rows = sat__max_int(room->rows, 3 * o->grid.phi);
+        room->layers = layer[j] + o->grid.rho;
+        if (o->light_count) room->map_side = sat__max_int(room->map_side, o->map_side);
+    }
+    return kinds;
+}
+
+/* All that can fail comes before all that changes the scene. */
 FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *g, const fiv_environment *e, const fiv_instance *instances, size_t count)
 {
     sat__gl_state state;
+    sat__text t;
     fiv_irradiance_options o = fiv_irradiance_defaults();
-    size_t i, used;
-    int base[64], texels;
+    const fiv_occluder *occluders[FIV__GL_INSTANCES];
+    int kind[FIV__GL_INSTANCES], layer[FIV__GL_INSTANCES], kinds, i;
+    fiv__gl_room room;
+    uint64_t light;
     sat_result r;
-    if (!g || !g->program || !e || (count && !instances)) return SAT_ERR_ARGUMENT;
-    if (count > (size_t)g->max_instances) return SAT_ERR_LIMIT;
-    for (i = 0; i < count; i++)
-        if (!fiv__instance_is_valid(&instances[i], e, &o)) return SAT_ERR_ARGUMENT;
-    texels = 3 + (e->light_count > 2 ? (e->light_count + 1) / 4 : 0);
-    used = fiv__gl_bases(base, texels, instances, count);
-    if (used > ((size_t)1 << 24)) return SAT_ERR_LIMIT; /* up to here the last scene stays whole */
-    g->count = (int)count;
-    g->lights = e->light_count;
-    g->texels = texels;
-    memcpy(g->rotation, e->rotation, sizeof g->rotation);
-    for (i = 0; i < count; i++) {
-        g->base[i] = base[i];
-        g->occluders[i] = instances[i].occluder;
+    if (!g || !g->scene) return SAT_ERR_ARGUMENT;
+    t = sat__text_begin(g->gl.message, sizeof g->gl.message);
+    if (count > (size_t)g->max_instances) {
+        sat__text_range(&t, "count", (double)count, 0, g->max_instances, ' ');
+        return SAT_ERR_LIMIT;
     }
-    fiv__gl_light(g, e);
-    sat__gl_clear_errors(&g->gl);
+    if (!fiv__explain_instances(&t, e, instances, count, &o)) return SAT_ERR_ARGUMENT;
+    kinds = fiv__gl_kinds(occluders, kind, layer, &room, instances, count);
+    room.face = e->face;
     sat__gl_begin(&g->gl, &state, 1);
-    r = fiv__gl_upload_tables(g, used);
-    if (!r) r = fiv__gl_upload_diffuse(g, e);
+    r = fiv__gl_grow(g, &room);
+    if (!r) {
+        g->count = (int)count;
+        g->kinds = kinds;
+        g->lights = e->light_count;
+        memcpy(g->rotation, e->rotation, sizeof g->rotation);
+        for (i = 0; i < (int)count; i++) g->kind[i] = kind[i];
+        for (i = 0; i < kinds; i++) {
+            if (g->signature[i] != occluders[i]->signature || g->layer[i] != layer[i])
+                fiv__gl_send(g, occluders[i], i, layer[i]);
+            g->signature[i] = occluders[i]->signature;
+            g->occluders[i] = occluders[i];
+            g->layer[i] = layer[i];
+        }
+        light = fiv__hash(FIV__HASH, e->irradiance, 18 * (size_t)(e->face + 1) * (size_t)(e->face + 1) * sizeof(float));
+        if (light != g->light_signature) fiv__gl_send_diffuse(g, e);
+        g->light_signature = light;
+        fiv__gl_light(g, e);
+    }
     sat__gl_end(&g->gl, &state);
-    if (!r) r = sat__gl_check(&g->gl, "fiv: textures");
     return r ? r : fiv_gl_move(g, instances, count);
 }
 
@@ -4275,21 +4904,26 @@ static void fiv__gl_uniforms(fiv_gl *g, unsigned program, int unit)
     float column[3];
     int counts = gl->GetUniformLocation(program, "fiv_counts"), k;
     static const char *const names[3] = {"fiv_x", "fiv_y", "fiv_z"};
-    sat__gl_set_texture(gl, program, "fiv_tables", unit, g->tables);
+    sat__gl_set_texture(gl, program, "fiv_support", unit, g->support);
     sat__gl_set_texture(gl, program, "fiv_scene", unit + 1, g->scene);
     sat__gl_set_texture(gl, program, "fiv_diffuse", unit + 2, g->diffuse);
+    sat__gl_set_texture(gl, program, "fiv_maps", unit + 3, g->maps);
+    sat__gl_set_int(gl, program, "fiv_shells", unit + 4);
+    gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)(unit + 4));
+    gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, g->shells);
+    gl->BindSampler((unsigned)(unit + 4), 0);
     for (k = 0; k < 3; k++) {
         column[0] = g->rotation[k];
         column[1] = g->rotation[3 + k];
         column[2] = g->rotation[6 + k];
         sat__gl_set_float3(gl, program, names[k], column);
     }
-    if (counts >= 0) gl->Uniform4i(counts, g->count, g->lights, g->texels, g->face);
+    if (counts >= 0) gl->Uniform4i(counts, g->count, g->lights, g->room.map_side, g->room.face);
 }
 
 FIV_DEF sat_result fiv_gl_bind(fiv_gl *g, unsigned program, int first_unit)
 {
-    if (!g || !g->tables || first_unit < 0) return SAT_ERR_ARGUMENT;
+    if (!g || !g->shells || first_unit < 0) return SAT_ERR_ARGUMENT;
     g->gl.UseProgram(program);
     fiv__gl_uniforms(g, program, first_unit);
     return SAT_OK;
@@ -4298,12 +4932,12 @@ FIV_DEF sat_result fiv_gl_bind(fiv_gl *g, unsigned program, int first_unit)
 FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *g, unsigned points, unsigned normals)
 {
     sat__gl_state state;
-    if (!g || !g->tables || !points || !normals) return SAT_ERR_ARGUMENT;
+    if (!g || !g->shells || !points || !normals) return SAT_ERR_ARGUMENT;
     sat__gl_begin(&g->gl, &state, FIV__GL_UNITS);
     sat__gl_pass(&g->gl, g->program, g->target, g->width, g->height);
     fiv__gl_uniforms(g, g->program, 0);
-    sat__gl_set_texture(&g->gl, g->program, "fiv_points", 3, points);
-    sat__gl_set_texture(&g->gl, g->program, "fiv_normals", 4, normals);
+    sat__gl_set_texture(&g->gl, g->program, "fiv_points", 5, points);
+    sat__gl_set_texture(&g->gl, g->program, "fiv_normals", 6, normals);
     sat__gl_draw(&g->gl);
     sat__gl_end(&g->gl, &state);
     return SAT_OK;

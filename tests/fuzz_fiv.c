@@ -37,7 +37,7 @@ static void fuzz_load(input *in)
     uint8_t *copy = (uint8_t *)malloc(in->left + 1);
     memcpy(copy, in->bytes, in->left);
     if (in->left >= 16) { /* let some pass the hash */
-        uint64_t magic = FIV__MAGIC, hash = fiv__hash(copy + 16, in->left - 16);
+        uint64_t magic = FIV__MAGIC, hash = fiv__hash(FIV__HASH, copy + 16, in->left - 16);
         memcpy(copy, &magic, 8);
         memcpy(copy + 8, &hash, 8);
     }

@@ -133,6 +133,7 @@ static void test_cpu(float rgb[3], int i, size_t count)
     fiv_instance others[3];
     size_t j, n = 0;
     o.cutoff = 0;
+    o.own_masks = o.rays = 0; /* what the shader does */
     for (j = 0; j < count; j++)
         if (!(point[3] >= (float)j + 2 && point[3] < (float)j + 3)) others[n++] = scene.instances[j];
 #ifndef FIV_NO_SELF

@@ -216,7 +216,7 @@ static fiv_instance instance_of(const bench *b, const fiv_occluder *o)
     return i;
 }
 
-static fiv_occluder *make(const bench *b, int theta, int phi, int rho, fiv_storage storage, int lights, double *seconds,
+static fiv_occluder *make(const bench *b, int theta, int phi, int rho, fiv_storage storage, double *seconds,
                           fiv_occluder_stats *stats)
 {
     fiv_occluder_options o = fiv_occluder_defaults();
@@ -224,7 +224,6 @@ static fiv_occluder *make(const bench *b, int theta, int phi, int rho, fiv_stora
     double start = seconds_used();
     o.theta = theta, o.phi = phi, o.rho = rho;
     o.storage = storage;
-    o.max_lights = lights;
     check(fiv_occluder_create(&out, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o, stats),
           "occluder");
     *seconds = seconds_used() - start;
@@ -253,6 +252,8 @@ static double error_of(run *r, int step, double *seconds)
     r->options.accuracy = steps[step].accuracy;
     r->options.partial = steps[step].partial;
     r->options.overlap = steps[step].overlap;
+    r->options.own_masks = r->options.rays = 0; /* what interpolation can do */
+    r->options.penumbra = 0;
     if (seconds) *seconds = median_time(run_once, r, bench_rounds(7));
     else run_once(r);
     return reference_nrmse(r->b->truth, r->b->rgb, (size_t)(r->b->side * r->b->side));
@@ -267,7 +268,7 @@ static void ladder(bench *b)
     double precompute[4];
     double pixels = b->side * b->side;
     for (s = 0; s < count; s++)
-        o[s] = make(b, sets[s][0], sets[s][1], sets[s][2], FIV_STORAGE_FLOAT, 8, &precompute[s], &stats[s]);
+        o[s] = make(b, sets[s][0], sets[s][1], sets[s][2], FIV_STORAGE_FLOAT, &precompute[s], &stats[s]);
     bench_table("A plane below the mesh: accuracy, samples and environments (figures 18 and 19; published 0.023, 0.008, 0.007; point 0.1)",
                 "mesh\tenvironment\tsamples\taccuracy\tnrmse\tpoint_us\tbrute_ratio\tprecompute_s\tvectors_mb\tmasks_mb\tdefault");
     bench_plot("Forest: error against time; x=point_us; y=nrmse; by=accuracy; where=environment:forest; log=xy; picture=plot_fiv");
@@ -314,7 +315,7 @@ static void table_2(bench *b)
         fiv_occluder_stats stats;
         double seconds, start, relight[5];
         const int *s = rows[i].set;
-        fiv_occluder *o = make(b, s[0], s[1], s[2], FIV_STORAGE_FLOAT, 8, &seconds, &stats);
+        fiv_occluder *o = make(b, s[0], s[1], s[2], FIV_STORAGE_FLOAT, &seconds, &stats);
         float turn[9] = {0.6f, 0, 0.8f, 0, 1, 0, -0.8f, 0, 0.6f};
         int k, side = s[0] / 2 + 1;
         for (k = 0; k < 5; k++) {
@@ -369,7 +370,7 @@ static void masks(void)
             const float *d = b.directions + 3 * (b.lights - 6144);
             fiv__sample_offset(offset, &lazy->grid, s);
             t0 = seconds_used();
-            fiv__raster_mesh(rows, &lazy->mesh, offset, 32);
+            fiv__raster_mesh(rows, &lazy->mesh, offset, 32, NULL);
             t1 = seconds_used();
             limit = (double)fiv__dot(offset, offset);
             limit = limit > 1 ? sqrt(limit - 1) / sqrt(limit) : -2;
@@ -443,7 +444,7 @@ static void two_occluders(bench *b)
         }
         for (s = 0; s < (bench_quick() ? 1 : 2); s++) {
             double seconds, published = 0;
-            fiv_occluder *o = make(b, sets[s][0], sets[s][1], sets[s][2], FIV_STORAGE_FLOAT, 8, &seconds, NULL);
+            fiv_occluder *o = make(b, sets[s][0], sets[s][1], sets[s][2], FIV_STORAGE_FLOAT, &seconds, NULL);
             fiv_instance instances[2];
             run r;
             check(fiv_occluder_light(o, two.environment, NULL), "light");
@@ -485,7 +486,7 @@ static void partial_occluders(bench *b)
     open_environment(b, 0);
     for (s = 0; s < (bench_quick() ? 1 : 2); s++) {
         double seconds;
-        fiv_occluder *o = make(b, sets[s][0], sets[s][1], sets[s][2], FIV_STORAGE_FLOAT, 8, &seconds, NULL);
+        fiv_occluder *o = make(b, sets[s][0], sets[s][1], sets[s][2], FIV_STORAGE_FLOAT, &seconds, NULL);
         fiv_instance instance = instance_of(b, o);
         check(fiv_occluder_light(o, b->environment, NULL), "light");
         for (h = 0; h < 4; h++) {
@@ -507,6 +508,7 @@ static void partial_occluders(bench *b)
                     io.accuracy = a == 0 ? FIV_TRILINEAR : (fiv_accuracy)a;
                     io.partial = a > 0;
                     io.cutoff = 0;
+                    io.own_masks = 0;
                     check(fiv_irradiance(rgb, p, n, 1, b->environment, &instance, 1, &io, NULL), "irradiance");
                     for (k = 0; k < 3; k++) square[a] += pow(((double)rgb[k] - truth[k]) / (double)open[k], 2) / 600;
                 }
@@ -532,11 +534,10 @@ static void storage(bench *b)
         for (kind = 0; kind < 2; kind++) {
             double seconds, error;
             fiv_occluder_stats stats;
-            fiv_occluder *o = make(b, sets[s][0], sets[s][1], sets[s][2], (fiv_storage)kind,
-                                   fiv_environment_get_stats(b->environment).lights, &seconds, &stats);
+            fiv_occluder *o = make(b, sets[s][0], sets[s][1], sets[s][2], (fiv_storage)kind, &seconds, &stats);
             fiv_instance instance = instance_of(b, o);
             double published = 36.0 * sets[s][0] * sets[s][1] * sets[s][2];
-            size_t bytes = stats.table_bytes - stats.samples * (size_t)fiv_environment_get_stats(b->environment).lights;
+            size_t bytes = stats.table_bytes;
             run r;
             r.b = b, r.instances = &instance, r.count = 1;
             check(fiv_occluder_light(o, b->environment, NULL), "light");
@@ -548,7 +549,6 @@ static void storage(bench *b)
             fiv_occluder_destroy(o);
         }
     }
-    bench_note("vectors alone; a split-off light adds one byte a sample.");
 }
 
 /* ---- tables 17 and 18: what tone mapping leaves of the error. The share of pixels more than 2 of 255 apart stands in
@@ -600,7 +600,7 @@ static void tables_17_18(bench *b)
     plane_truth(b, 0);
     for (i = 0; i <= last; i++) {
         double seconds;
-        fiv_occluder *o = make(b, rows[i].set[0], rows[i].set[1], rows[i].set[2], FIV_STORAGE_FLOAT, 8, &seconds, NULL);
+        fiv_occluder *o = make(b, rows[i].set[0], rows[i].set[1], rows[i].set[2], FIV_STORAGE_FLOAT, &seconds, NULL);
         fiv_instance instance = instance_of(b, o);
         run r;
         r.b = b, r.instances = &instance, r.count = 1;
@@ -630,7 +630,7 @@ static void many_occluders(bench *b)
     int i, k;
     run r;
     open_environment(b, 0);
-    o = make(b, 32, 17, 15, FIV_STORAGE_FLOAT, 8, &seconds, NULL);
+    o = make(b, 32, 17, 15, FIV_STORAGE_FLOAT, &seconds, NULL);
     check(fiv_occluder_light(o, b->environment, NULL), "light");
     bench_table("Many occluders (table 3, on one core)", "occluders\tpublished_fps\tpoint_us\tpoint_us_all_kept\tleft_out_percent");
     bench_plot("Cost of occluders; x=occluders; y=point_us; style=linespoints");
@@ -658,6 +658,14 @@ static void many_occluders(bench *b)
 
 /* ---- what rests on a floor ---- */
 
+static void light_points(run *r, fiv_irradiance_stats *stats)
+{
+    bench *b = r->b;
+    check(fiv_irradiance(b->rgb, b->points, b->normals, (size_t)(b->side * b->side), b->environment, r->instances, r->count,
+                         &r->options, stats),
+          "irradiance");
+}
+
 static void resting_row(bench *b, const char *light, int big, double gap)
 {
     fiv_occluder_options o = fiv_occluder_defaults();
@@ -666,25 +674,22 @@ static void resting_row(bench *b, const char *light, int big, double gap)
     fiv_instance instance;
     double error[2], seconds[2], points = b->side * b->side;
     run r;
-    int own;
     if (big) o.theta = 64, o.phi = 33, o.rho = 30;
-    for (own = 0; own < 2; own++) {
-        o.keep_mesh = own;
-        check(fiv_occluder_create(&occluder, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles,
-                                  &o, NULL),
-              "occluder");
-        check(fiv_occluder_light(occluder, b->environment, NULL), "light");
-        instance = instance_of(b, occluder);
-        r.b = b, r.instances = &instance, r.count = 1;
-        error[own] = error_of(&r, 3, &seconds[own]);
-        check(fiv_irradiance(b->rgb, b->points, b->normals, (size_t)points, b->environment, &instance, 1, &r.options,
-                             &stats),
-              "irradiance");
-        fiv_occluder_destroy(occluder);
-    }
+    check(fiv_occluder_create(&occluder, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o, NULL),
+          "occluder");
+    check(fiv_occluder_light(occluder, b->environment, NULL), "light");
+    instance = instance_of(b, occluder);
+    r.b = b, r.instances = &instance, r.count = 1;
+    error[0] = error_of(&r, 3, &seconds[0]);
+    r.options = fiv_irradiance_defaults();
+    r.options.penumbra = 0;
+    seconds[1] = median_time(run_once, &r, bench_rounds(3));
+    light_points(&r, &stats);
+    error[1] = reference_nrmse(b->truth, b->rgb, (size_t)points);
+    fiv_occluder_destroy(occluder);
     bench_row("%s\t%s\t%.3f\t%dx%dx%d\t%.4f\t%.4f\t%.3f\t%.2f\t%.1f\t%.1f", b->mesh_name, light, gap, o.theta, o.phi,
               o.rho, error[0], error[1], 1e6 * seconds[0] / points, 1e6 * seconds[1] / points,
-              100 * (double)stats.own_masks / points, 100 * (double)stats.rays / points);
+              100 * (double)stats.own_receivers / points, 100 * (double)stats.rays / points);
 }
 
 static void resting(int side)
@@ -694,7 +699,7 @@ static void resting(int side)
     static const double gaps[2] = {0, 0.002};
     static const int lights[2] = {0, 4};
     int i, g, l, big, last = bench_smoke() ? 1 : 5;
-    bench_table("What rests on a floor 3 R wide: own masks near contact, rays for suns (keep_mesh)",
+    bench_table("What rests on a floor 3 R wide: own masks near contact, rays where the depth map of a sun is not sure",
                 "mesh\tenvironment\tgap_R\tsamples\tnrmse_interpolated\tnrmse\tpoint_us_interpolated\tpoint_us\town_masks_percent\trays_percent");
     bench_note("nrmse: eq 17 against rays to every texel of the light and to each split-off light.");
     for (i = 0; i < last; i++) {
@@ -721,6 +726,210 @@ static void resting(int side)
         fiv_environment_destroy(b.environment);
         free(b.points), free(b.covered), free(b.directions), free(b.powers);
     }
+}
+
+/* ---- suns: depth maps, rays and own masks beside as many rays as take about as long. The truth is that of a cube of 64
+   texels that keeps up to 32 lights. ---- */
+
+static void make_sun(image *out)
+{
+    int k;
+    if (!image_create(out, 1024, 512, 3)) exit(1);
+    memset(out->pixels, 0, 3 * 1024 * 512 * sizeof(float));
+    for (k = 0; k < 3; k++) out->pixels[3 * (140 * 1024 + 400) + k] = 1e5f;
+}
+
+static int open_sun(bench *b, fiv_environment **truth, const char *name)
+{
+    fiv_environment_options o = fiv_environment_defaults();
+    char file[64];
+    const char *path;
+    image picture;
+    sat_image view;
+    snprintf(file, sizeof file, "env/%s.exr", name);
+    path = support_data(file);
+    if (strcmp(name, "bare sun") == 0) make_sun(&picture);
+    else if (!path || !image_load(&picture, path)) return 0;
+    view = image_view(&picture);
+    fiv_environment_destroy(b->environment);
+    check(fiv_environment_create(&b->environment, &view, NULL, NULL), "environment");
+    o.face = 64;
+    o.delta_ratio = 25;
+    check(fiv_environment_create(truth, &view, &o, NULL), "environment");
+    image_free(&picture);
+    b->lights = fiv_environment_lights(*truth, NULL, NULL, 0);
+    free(b->directions);
+    free(b->powers);
+    b->directions = (float *)need(malloc(3 * b->lights * sizeof(float)));
+    b->powers = (float *)need(malloc(3 * b->lights * sizeof(float)));
+    fiv_environment_lights(*truth, b->directions, b->powers, b->lights);
+    return 1;
+}
+
+/* Rays to lights drawn by power times cosine, one from each of `count` strata; 0: to all lights. */
+typedef struct sampled { bench *b; int count; double *sums; } sampled;
+
+static void sample_rays(void *user)
+{
+    enum { MOST = 6 * 64 * 64 + FIV_MAX_LIGHTS };
+    static unsigned char wanted[MOST], covered[MOST];
+    static float directions[3 * MOST];
+    static size_t chosen[MOST];
+    sampled *s = (sampled *)user;
+    bench *b = s->b;
+    uint64_t seed = 1;
+    size_t p, i, n = s->count ? (size_t)s->count : b->lights;
+    double total = s->sums[b->lights];
+    int k;
+    memset(wanted, 1, n);
+    for (p = 0; p < (size_t)(b->side * b->side); p++) {
+        double sum[3] = {0, 0, 0};
+        for (i = 0; i < n; i++) {
+            size_t low = 0, high = b->lights;
+            double at = total * ((double)i + support_uniform(&seed)) / (double)n;
+            while (s->count && high - low > 1) {
+                size_t middle = (low + high) / 2;
+                if (s->sums[middle] <= at) low = middle;
+                else high = middle;
+            }
+            chosen[i] = s->count ? low : i;
+            memcpy(directions + 3 * i, b->directions + 3 * chosen[i], 3 * sizeof(float));
+            if (!s->count) wanted[i] = directions[3 * i + 1] > 0;
+        }
+        trace_rays(b, covered, directions, n, b->points + 3 * p, wanted);
+        for (i = 0; i < n; i++) {
+            size_t j = chosen[i];
+            double part = s->count ? total / ((s->sums[j + 1] - s->sums[j]) * (double)n) : 1;
+            if (wanted[i] && !covered[i])
+                for (k = 0; k < 3; k++) sum[k] += part * (double)b->powers[3 * j + (size_t)k] * (double)b->directions[3 * j + 1];
+        }
+        for (k = 0; k < 3; k++) b->rgb[3 * p + (size_t)k] = (float)sum[k];
+    }
+}
+
+static void suns_row(bench *b, const fiv_occluder *o, const char *light, double gap)
+{
+    sampled s;
+    run r;
+    fiv_instance instance = instance_of(b, o);
+    fiv_irradiance_stats stats;
+    double points = b->side * b->side, error[4], seconds[3];
+    size_t i;
+    s.b = b;
+    s.sums = (double *)need(malloc((b->lights + 1) * sizeof(double)));
+    for (i = 0, s.sums[0] = 0; i < b->lights; i++) {
+        const float *p = b->powers + 3 * i;
+        double up = (double)b->directions[3 * i + 1];
+        s.sums[i + 1] = s.sums[i] + (up > 0 ? ((double)p[0] + (double)p[1] + (double)p[2]) * up : 0);
+    }
+    s.count = 0;
+    sample_rays(&s);
+    memcpy(b->truth, b->rgb, (size_t)points * 3 * sizeof(float));
+    s.count = 128;
+    seconds[0] = median_time(sample_rays, &s, bench_rounds(3));
+    error[0] = reference_nrmse(b->truth, b->rgb, (size_t)points);
+    r.b = b, r.instances = &instance, r.count = 1;
+    r.options = fiv_irradiance_defaults();
+    r.options.own_masks = r.options.rays = 0;
+    seconds[1] = median_time(run_once, &r, bench_rounds(5));
+    error[1] = reference_nrmse(b->truth, b->rgb, (size_t)points);
+    r.options = fiv_irradiance_defaults();
+    seconds[2] = median_time(run_once, &r, bench_rounds(3));
+    light_points(&r, &stats);
+    error[2] = reference_nrmse(b->truth, b->rgb, (size_t)points);
+    r.options.penumbra = 0;
+    light_points(&r, &stats);
+    error[3] = reference_nrmse(b->truth, b->rgb, (size_t)points);
+    free(s.sums);
+    bench_row("%s\t%.3f\t%d\t%.4f\t%.4f\t%.4f\t%.4f\t%.2f\t%.4f\t%.4f\t%.1f\t%.1f", light, gap,
+              fiv_environment_get_stats(b->environment).lights, error[0], error[1], error[2], error[3], 1e6 * seconds[0] / points,
+              seconds[1] / seconds[0], seconds[2] / seconds[0], 100 * (double)stats.own_receivers / points,
+              100 * (double)stats.rays / points);
+}
+
+static void suns(int side)
+{
+    static const char *const names[4] = {"bare sun", "forest", "city", "night"};
+    static const double gaps[2] = {0.002, 0.5};
+    fiv_environment *truth;
+    fiv_occluder *o;
+    double seconds;
+    bench b;
+    int e, g;
+    size_t n;
+    memset(&b, 0, sizeof b);
+    bench_table("Suns: a floor 4 R wide below the bunny, beside 128 rays a receiver to lights drawn by what they give",
+                "environment\tgap_R\tlights\tnrmse_128_rays\tnrmse_maps\tnrmse\tnrmse_points\trays_us\tmaps_over_rays\ttime_over_rays\town_percent\tray_percent");
+    bench_note("maps: depth maps alone, neither own masks nor rays; points: penumbra 0, as the truth has it.");
+#ifndef HAVE_EMBREE
+    bench_missing("Embree", "libembree-dev");
+#endif
+    b.mesh = load("mesh/bunny_small.ply", &b.mesh_name);
+    open_plane(&b, side);
+    o = make(&b, 32, 17, 15, FIV_STORAGE_FLOAT, &seconds, NULL);
+    for (e = 0; e < 4; e++) {
+        if (!open_sun(&b, &truth, names[e])) continue;
+        check(fiv_occluder_light(o, b.environment, NULL), "light");
+        for (g = 0; g < 2; g++) {
+            for (n = 0; n < (size_t)(side * side); n++) {
+                b.points[3 * n] = 4 * (((float)(n % (size_t)side) + 0.5f) / (float)side - 0.5f);
+                b.points[3 * n + 1] = b.low - (float)gaps[g];
+                b.points[3 * n + 2] = 4 * (((float)(n / (size_t)side) + 0.5f) / (float)side - 0.5f);
+            }
+            suns_row(&b, o, names[e], gaps[g]);
+        }
+        fiv_environment_destroy(truth);
+    }
+    fiv_occluder_destroy(o);
+    reference_free(&b.scene);
+    reference_mesh_free(&b.mesh);
+    fiv_environment_destroy(b.environment);
+    free(b.points), free(b.covered), free(b.directions), free(b.powers);
+}
+
+/* ---- pixels: receivers R / 300 apart at the bunny's foot ---- */
+
+static void pixels(bench *b, int side)
+{
+    static const float tolerances[6] = {0, 0.003f, 0.01f, 0.02f, 0.03f, 0.1f};
+    fiv_occluder *o;
+    fiv_instance instance;
+    fiv_irradiance_stats stats;
+    run r;
+    double seconds, first = 0;
+    float *each = (float *)need(malloc((size_t)(side * side) * 3 * sizeof(float)));
+    int i, t, last = side;
+    bench_table("Pixels R / 300 apart at the bunny's foot: masks shared along a row", "own_tolerance\tmasks_a_receiver\tpoint_us\ttime_over_own\trms_difference\tdefault");
+    bench_plot("Shared masks; x=time_over_own; y=rms_difference; style=linespoints");
+    open_environment(b, 0);
+    o = make(b, 32, 17, 15, FIV_STORAGE_FLOAT, &seconds, NULL);
+    check(fiv_occluder_light(o, b->environment, NULL), "light");
+    instance = instance_of(b, o);
+    b->side = side;
+    for (i = 0; i < side * side; i++) {
+        b->points[3 * i] = (float)(i % side - side / 2) / 300;
+        b->points[3 * i + 1] = b->low - 0.002f;
+        b->points[3 * i + 2] = 0.45f + (float)(i / side - side / 2) / 300;
+    }
+    r.b = b, r.instances = &instance, r.count = 1;
+    for (t = 0; t < 6; t++) {
+        double square = 0, largest = 0;
+        r.options = fiv_irradiance_defaults();
+        r.options.own_tolerance = tolerances[t];
+        seconds = median_time(run_once, &r, bench_rounds(3));
+        light_points(&r, &stats);
+        if (!t) memcpy(each, b->rgb, (size_t)(side * side) * 3 * sizeof(float)), first = seconds;
+        for (i = 0; i < 3 * side * side; i++) {
+            square += pow((double)b->rgb[i] - (double)each[i], 2);
+            largest = (double)each[i] > largest ? (double)each[i] : largest;
+        }
+        bench_row("%.3f\t%.3f\t%.1f\t%.3f\t%.5f\t%d", (double)tolerances[t], (double)stats.own_masks / ((double)stats.own_receivers + 1e-9),
+                  1e6 * seconds / (side * side), seconds / first, sqrt(square / (3 * side * side)) / largest,
+                  t == 2);
+    }
+    b->side = last;
+    free(each);
+    fiv_occluder_destroy(o);
 }
 
 /* ---- table 4, our column ---- */
@@ -751,6 +960,8 @@ int main(void)
     many_occluders(&b);
     table_4();
     resting(bench_smoke() ? 12 : bench_quick() ? 40 : 96);
+    suns(bench_smoke() ? 12 : bench_quick() ? 32 : 80);
+    pixels(&b, bench_smoke() ? 12 : bench_quick() ? 40 : MAX_SIDE);
     b.side = bench_smoke() ? 8 : bench_quick() ? 20 : 40; /* the first rows of the plane would be a strip: start anew */
     reference_free(&b.scene);
     open_plane(&b, b.side);
