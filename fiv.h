@@ -3304,7 +3304,7 @@ static int fiv__all_agree(const fiv__seen *s)
    radii (Fernando 2005, percentage-closer soft shadows). */
 static float fiv__disc(float *distance, const fiv__seen *s, float radius, int search)
 {
-    int n = sat__clamp_int((int)(search ? 0.5f * radius : radius) + 3, 4, 16), i, j;
+    int n = sat__clamp_int((int)((search ? 0.35f : 0.75f) * radius) + 3, 4, 12), i, j;
     float covered = 0, count = 0, sum = 0, step = 2 / (float)n;
     for (j = 0; j < n; j++)
         for (i = 0; i < n; i++) {
@@ -3344,7 +3344,8 @@ static float fiv__cover_light(const fiv__receiver *r, const fiv_occluder *o, int
     reach = r->sun_tangent[light] * (1 - s.z) * s.scale;
     if (!(fabsf(s.x - shift) < s.scale + reach + 2 && fabsf(s.y - shift) < s.scale + reach + 2)) return 0;
     if (reach > 1) {
-        if (fiv__disc(&distance, &s, reach, 1) == 0) return 0;
+        float part = fiv__disc(&distance, &s, reach, 1);
+        if (part == 0 || part == 1) return part;
         reach = r->sun_tangent[light] * distance * s.scale;
         if (reach > 1) return fiv__disc(&distance, &s, reach, 0);
     }
@@ -4382,7 +4383,7 @@ static const char fiv__glsl_lights[] =
     "    return mix(low.x, low.y, f.x);\n"
     "}\n"
     "vec2 fiv_disc(fiv_seen s, float radius, bool search) {\n"
-    "    int n = clamp(int(search ? 0.5 * radius : radius) + 3, 4, 16);\n"
+    "    int n = clamp(int((search ? 0.35 : 0.75) * radius) + 3, 4, 12);\n"
     "    float covered = 0.0, count = 0.0, sum = 0.0;\n"
     "    for (int j = 0; j < n; j++) for (int i = 0; i < n; i++) {\n"
     "        vec2 u = (vec2(i, j) + 0.5) * (2.0 / float(n)) - 1.0, at = s.at + radius * u;\n"
@@ -4408,7 +4409,7 @@ static const char fiv__glsl_lights[] =
     "    if (any(greaterThanEqual(abs(s.at - shift), vec2(s.scale + reach + 2.0)))) return 0.0;\n"
     "    if (reach > 1.0) {\n"
     "        vec2 found = fiv_disc(s, reach, true);\n"
-    "        if (found.x == 0.0) return 0.0;\n"
+    "        if (found.x == 0.0 || found.x == 1.0) return found.x;\n"
     "        reach = tangent * found.y * s.scale;\n"
     "        if (reach > 1.0) return fiv_disc(s, reach, false).x;\n"
     "    }\n"
