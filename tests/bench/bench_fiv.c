@@ -753,16 +753,16 @@ static int open_sun(bench *b, fiv_environment **truth, const char *name)
     view = image_view(&picture);
     fiv_environment_destroy(b->environment);
     check(fiv_environment_create(&b->environment, &view, NULL, NULL), "environment");
-    o.face = 64;
+    o.resolution = 64;
     o.delta_ratio = 25;
     check(fiv_environment_create(truth, &view, &o, NULL), "environment");
     image_free(&picture);
-    b->lights = fiv_environment_lights(*truth, NULL, NULL, 0);
+    b->lights = fiv_environment_lights(NULL, NULL, 0, *truth);
     free(b->directions);
     free(b->powers);
     b->directions = (float *)need(malloc(3 * b->lights * sizeof(float)));
     b->powers = (float *)need(malloc(3 * b->lights * sizeof(float)));
-    fiv_environment_lights(*truth, b->directions, b->powers, b->lights);
+    fiv_environment_lights(b->directions, b->powers, b->lights, *truth);
     return 1;
 }
 
