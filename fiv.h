@@ -138,8 +138,8 @@ enum {
 typedef struct fiv_environment_options {
     int resolution;        /* 32; 8..64; texels along an edge of the light's cube and of every mask */
     float delta_ratio;     /* 100; 0..1e38; a patch this many times brighter than the mean, and half a texel wide (so:
-                              with 0.4 % of all light), becomes a directional light; those around it join at a quarter of
-                              that; 0: none does */
+                              with 0.4 % of all light), becomes a directional light; those around it join at a quarter
+                              of that; 0: none does */
     int max_lights;        /* 32; 0..FIV_MAX_LIGHTS; strongest patches first; those beyond stay in the cube, each
                               spread over its texel */
     float max_radiance;    /* 1e10; 1e-30..1e38; larger values, infinity included, count as this much */
@@ -203,8 +203,8 @@ typedef struct fiv_occluder_options {
     fiv_storage storage;     /* FIV_STORAGE_FLOAT */
     int keep_masks;          /* 1; 0..1; 0: each fiv_occluder_light rasterises all masks anew; no FIV_MASK, no save */
     int lazy;                /* 0; 0..1; 1 (without keep_masks): only what fiv_occluder_prepare asks for is computed */
-    int sun_map;             /* 512; 64..4096; side of the square in which all split-off lights have their depth maps: one
-                                light the whole of it, two to four a quarter each, five to nine a ninth ... */
+    int sun_map;             /* 512; 64..4096; side of the square in which all split-off lights have their depth maps:
+                                one light the whole of it, two to four a quarter each, five to nine a ninth ... */
     fiv_progress_fn *progress;     /* NULL */
     void *progress_user;
     sat_allocator allocator; /* malloc; not used after create */
@@ -820,7 +820,8 @@ static int fiv__is_beside_light(const fiv_environment *e, double sums[FIV_MAX_LI
     float d[3];
     int i, size = e->patch;
     double cosine = cos(2.0 / e->face);
-    fiv__cube_direction(d, (int)(patch / (size_t)(size * size)), fiv__texel_coordinate((int)(patch % (size_t)size), size),
+    fiv__cube_direction(d, (int)(patch / (size_t)(size * size)),
+                        fiv__texel_coordinate((int)(patch % (size_t)size), size),
                         fiv__texel_coordinate((int)(patch / (size_t)size % (size_t)size), size));
     fiv__normalise(d, d);
     for (i = 0; i < e->light_count; i++) {
@@ -2153,11 +2154,7 @@ static const sat__field fiv__occluder_fields[] = {
     SAT__FIELD(fiv_occluder_options, 'f', last_shell, 6, 1e-6, 1000, ' '),
     SAT__FIELD(fiv_occluder_options, 'i', resolution, 32, 8, 64, ' '),
     SAT__FIELD(fiv_occluder_options, 'i', storage, FIV_STORAGE_FLOAT, FIV_STORAGE_FLOAT, FIV_STORAGE_HALF_OCTAHEDRAL, ' '),
-#ifdef FIV_NO_MASKS
-    SAT__FIELD(fiv_occluder_options, 'i', keep_masks, 1, 0, 0, ' '),
-#else
     SAT__FIELD(fiv_occluder_options, 'i', keep_masks, 1, 0, 1, ' '),
-#endif
     SAT__FIELD(fiv_occluder_options, 'i', lazy, 0, 0, 1, ' '),
     SAT__FIELD(fiv_occluder_options, 'i', sun_map, 512, 64, 4096, ' '),
     SAT__FIELD(fiv_occluder_options, 'a', allocator, 0, 0, 0, ' '),
@@ -2177,7 +2174,10 @@ static int fiv__explain_occluder_options(sat__text *t, const fiv_occluder_option
     if (wrong) sat__text_field(t, wrong, o);
     else if (o->theta & 1) sat__text_add(t, "theta is odd");
     else if (!(o->first_shell < o->last_shell)) sat__text_add(t, "last_shell is not beyond first_shell");
-    else if (o->keep_masks && o->lazy) sat__text_add(t, "lazy is 1 with keep_masks; an occluder that deforms keeps none");
+    else if (o->keep_masks && o->lazy) sat__text_add(t, "lazy is 1 with keep_masks; what deforms keeps none");
+#ifdef FIV_NO_MASKS
+    else if (o->keep_masks) sat__text_add(t, "keep_masks is 1; 0 with FIV_NO_MASKS");
+#endif
     else return 1;
     return 0;
 }
@@ -2584,10 +2584,16 @@ static inline size_t fiv__map_cell(const fiv_occluder *o, int light)
     return (size_t)(light / o->cells * o->cell_side) * (size_t)o->map_side + (size_t)(light % o->cells * o->cell_side);
 }
 
-/* One triangle, its corners in texels of a cell: the larger of what stands and its depth at each texel's centre. */
-static void fiv__draw_depth(uint16_t *cell, int pitch, int side, float x[3], float y[3], const float z[3])
+static inline float fiv__area(const float x[3], const float y[3])
 {
-    float area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]), zx, zy, z0;
+    return (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
+}
+
+/* One triangle, its corners in texels of a cell: the larger of what stands and its depth at each texel's centre. */
+static void fiv__draw_depth(uint16_t *cell, int pitch, int side, const float x[3], const float y[3],
+                            const float z[3])
+{
+    float area = fiv__area(x, y), zx, zy, z0;
     int row, x0, x1, y0 = sat__max_int(fiv__ceil(fiv__min3(y[0], y[1], y[2])), 0);
     int y1 = sat__min_int(fiv__floor(fiv__max3(y[0], y[1], y[2])), side - 1);
     if (y0 > y1 || area == 0) return;
@@ -2604,7 +2610,9 @@ static void fiv__draw_depth(uint16_t *cell, int pitch, int side, float x[3], flo
             cross = y[b] > y[a] ? x[a] + (at - y[a]) * (x[b] - x[a]) / (y[b] - y[a]) : x[a];
             low = cross < low ? cross : low;
             high = cross > high ? cross : high;
-            if (y[a] == y[b]) low = x[b] < low ? x[b] : low, high = x[b] > high ? x[b] : high;
+            if (y[a] != y[b]) continue;
+            low = x[b] < low ? x[b] : low;
+            high = x[b] > high ? x[b] : high;
         }
         if (!(low <= high)) continue;
         x0 = sat__max_int(fiv__ceil(low), 0);
@@ -2612,7 +2620,7 @@ static void fiv__draw_depth(uint16_t *cell, int pitch, int side, float x[3], flo
         for (; x0 <= x1; x0++) {
             float depth = z[0] + ((float)x0 - x[0]) * zx + (at - y[0]) * zy;
             uint16_t word;
-            depth = depth > z0 ? z0 : depth < -1 ? -1 : depth; /* beside the triangle's edge: no farther than a corner */
+            depth = depth > z0 ? z0 : depth < -1 ? -1 : depth; /* on an edge: no farther than a corner */
             word = (uint16_t)(1.5f + (depth + 1) * 32767);
             if (word > cell[row * pitch + x0]) cell[row * pitch + x0] = word;
         }
@@ -2624,19 +2632,21 @@ static void fiv__draw_maps(int begin, int end, int worker, void *context)
 {
     fiv_occluder *o = (fiv_occluder *)context;
     const fiv__mesh *mesh = &o->mesh;
-    float scale = fiv__map_scale(o), shift = scale + FIV__MAP_BORDER - 0.5f;
+    float scale = fiv__map_scale(o), shift = scale + (float)FIV__MAP_BORDER - 0.5f;
     (void)worker;
     for (; begin < end; begin++) {
         float (*axes)[3] = o->light_axes[begin];
         uint16_t *cell = o->map + fiv__map_cell(o, begin);
         size_t i;
         int row;
-        for (row = 0; row < o->cell_side; row++) memset(cell + row * o->map_side, 0, (size_t)o->cell_side * sizeof *cell);
+        for (row = 0; row < o->cell_side; row++)
+            memset(cell + row * o->map_side, 0, (size_t)o->cell_side * sizeof *cell);
         for (i = 0; i < mesh->cluster_count; i++) {
             const fiv__cluster *c = &mesh->clusters[i];
             float p[3][FIV__CLUSTER_VERTICES + 4], facing = -fiv__dot(c->axis, axes[2]);
             int v, k, t;
-            if (mesh->closed && c->cosine > 0 && facing > 0 && facing * facing >= 1.0001f - c->cosine * c->cosine) continue;
+            if (mesh->closed && c->cosine > 0 && facing > 0 && facing * facing >= 1.0001f - c->cosine * c->cosine)
+                continue;
             for (v = 0; v < c->vertices; v++) {
                 float q[3];
                 for (k = 0; k < 3; k++) q[k] = mesh->x[k][c->vertex + (size_t)v];
@@ -2647,8 +2657,12 @@ static void fiv__draw_maps(int begin, int end, int worker, void *context)
             for (t = 0; t < c->triangles; t++) {
                 const unsigned char *corner = mesh->corner + 3 * (c->triangle + (size_t)t);
                 float x[3], y[3], z[3];
-                for (k = 0; k < 3; k++) x[k] = p[0][corner[k]], y[k] = p[1][corner[k]], z[k] = p[2][corner[k]];
-                if (mesh->closed && !(((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])) * mesh->turn > 0)) continue;
+                for (k = 0; k < 3; k++) {
+                    x[k] = p[0][corner[k]];
+                    y[k] = p[1][corner[k]];
+                    z[k] = p[2][corner[k]];
+                }
+                if (mesh->closed && !(fiv__area(x, y) * mesh->turn > 0)) continue;
                 fiv__draw_depth(cell, o->map_side, o->cell_side, x, y, z);
             }
         }
@@ -3229,7 +3243,7 @@ static float fiv__between(const fiv__receiver *r, const fiv_instance *instance, 
 /* The present receiver's own light and solid angle: its mask, or what lies between two that take nearly the same. */
 static void fiv__find_own(float v[FIV__TERMS], fiv__receiver *r, const fiv_instance *instance, const float normal[3])
 {
-    size_t i = r->index, a = i - i % FIV__ROW, b = i % FIV__TILE / FIV__ROW == FIV__TILE / FIV__ROW - 1 ? a + FIV__ROW - 1 : a + FIV__ROW;
+    size_t i = r->index, a = i - i % FIV__ROW, b = a + FIV__ROW - ((a + FIV__ROW) % FIV__TILE == 0);
     int c, k, shared = r->options->own_masks == FIV__TILE && r->options->own_tolerance > 0;
     if (b >= r->count) b = r->count - 1;
     while (shared && a < i && i < b) {
@@ -3335,7 +3349,7 @@ static float fiv__cover_light(const fiv__receiver *r, const fiv_occluder *o, int
     s.z = -fiv__dot(offset, axes[2]);
     if (s.z >= 1) return 0;
     s.scale = fiv__map_scale(o);
-    shift = s.scale + FIV__MAP_BORDER - 0.5f;
+    shift = s.scale + (float)FIV__MAP_BORDER - 0.5f;
     s.cell = o->map + fiv__map_cell(o, light);
     s.pitch = o->map_side;
     s.side = o->cell_side;
@@ -4105,7 +4119,8 @@ static int fiv__read_header(fiv_occluder *from, fiv__save *s, const unsigned cha
     o.sun_map = from->map_side;
     fiv__set_grid(from, &o);
     samples = fiv__grid_samples(&from->grid);
-    if (s->triangles > 0x7fffffff / 3 || s->clusters < 0 || s->vertices > 3 * s->triangles + 4 * (uint64_t)s->clusters) return 0;
+    if (s->triangles > 0x7fffffff / 3 || s->clusters < 0) return 0;
+    if (s->vertices > 3 * s->triangles + 4 * (uint64_t)s->clusters) return 0;
     if ((uint64_t)s->clusters != (s->triangles + FIV__CLUSTER - 1) / FIV__CLUSTER) return 0;
     if ((s->turn != 1 && s->turn != -1) || (s->closed != 0 && s->closed != 1)) return 0;
     from->mesh.triangle_count = (size_t)s->triangles;
@@ -4243,11 +4258,11 @@ SAT__IEEE_BEGIN
 extern "C" {
 #endif
 
-/* fiv_shells: half floats that the hardware filters; a layer a shell, samples inside the mesh 0. Three fields of it above
-   each other: vector 0..3; 4..7; 8, solid angle, 1 where valid, 1 where inside. Columns are azimuths, the first once more
-   at the end. fiv_support: the support function, a field an occluder. fiv_maps: depth maps of the lights, four occluders
-   side by side. fiv_scene: a row an instance, see fiv__gl_row and fiv__gl_light; two texels a light in the row behind
-   them. fiv_diffuse: I_tot at the corners of the cube. */
+/* fiv_shells: half floats that the hardware filters; a layer a shell, samples inside the mesh 0. Three fields of it
+   above each other: vector 0..3; 4..7; 8, solid angle, 1 where valid, 1 where inside. Columns are azimuths, the first
+   once more at the end. fiv_support: the support function, a field an occluder. fiv_maps: depth maps of the lights, four
+   occluders side by side. fiv_scene: a row an instance, see fiv__gl_row and fiv__gl_light; two texels a light in the row
+   behind them. fiv_diffuse: I_tot at the corners of the cube. */
 static const char fiv__glsl_cube[] =
     "#ifndef FIV_GLSL\n"
     "#define FIV_GLSL\n"
@@ -4537,11 +4552,7 @@ struct fiv_gl {
 
 static const sat__field fiv__gl_fields[] = {
     SAT__FIELD(fiv_gl_options, 'i', max_instances, 8, 1, 64, ' '),
-#ifdef FIV_NO_SELF
-    SAT__FIELD(fiv_gl_options, 'i', self, 0, 0, 0, ' '),
-#else
     SAT__FIELD(fiv_gl_options, 'i', self, 0, 0, 1, ' '),
-#endif
     SAT__FIELD(fiv_gl_options, 'f', penumbra, 1, 0, 100, ' '),
     SAT__FIELD(fiv_gl_options, 'a', allocator, 0, 0, 0, ' '),
 };
@@ -4560,6 +4571,9 @@ FIV_DEF const char *fiv_explain_gl(char *text, size_t size, int width, int heigh
     if (width < 1 || width > 16384) sat__text_range(&t, "width", width, 1, 16384, ' ');
     else if (height < 1 || height > 16384) sat__text_range(&t, "height", height, 1, 16384, ' ');
     else if (wrong) sat__text_field(&t, wrong, options);
+#ifdef FIV_NO_SELF
+    else if (options && options->self) sat__text_add(&t, "self is 1; 0 with FIV_NO_SELF");
+#endif
     return t.size ? text : "";
 }
 
@@ -4699,9 +4713,10 @@ static void fiv__gl_send(fiv_gl *g, const fiv_occluder *o, int kind, int layer)
                         SAT__GL_FLOAT, o->support);
 #ifndef FIV_NO_DELTA
     if (o->light_count) {
+        int side = g->room.map_side;
         g->gl.BindTexture(SAT__GL_TEXTURE_2D, g->maps);
-        g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, kind % 4 * g->room.map_side, kind / 4 * g->room.map_side, o->map_side,
-                            o->map_side, SAT__GL_RED_INTEGER, SAT__GL_UNSIGNED_SHORT, o->map);
+        g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, kind % 4 * side, kind / 4 * side, o->map_side, o->map_side,
+                            SAT__GL_RED_INTEGER, SAT__GL_UNSIGNED_SHORT, o->map);
     }
 #endif
     g->uploads++;
@@ -4796,7 +4811,8 @@ static sat_result fiv__gl_grow(fiv_gl *g, const fiv__gl_room *room)
 {
     sat__gl *gl = &g->gl;
     unsigned made[3] = {0, 0, 0}, old[3];
-    int shells = !g->shells || room->columns > g->room.columns || room->rows > g->room.rows || room->layers > g->room.layers;
+    int shells = !g->shells || room->columns > g->room.columns || room->rows > g->room.rows ||
+                 room->layers > g->room.layers;
     int maps = !g->maps || room->map_side > g->room.map_side, diffuse = !g->diffuse || room->face != g->room.face;
     int columns = sat__max_int(room->columns, g->room.columns), rows = sat__max_int(room->rows, g->room.rows);
     int layers = sat__max_int(room->layers, g->room.layers), side = sat__max_int(room->map_side, g->room.map_side);
@@ -4805,7 +4821,8 @@ static sat_result fiv__gl_grow(fiv_gl *g, const fiv__gl_room *room)
         gl->GenTextures(1, &made[0]);
         gl->ActiveTexture(SAT__GL_TEXTURE0);
         gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, made[0]);
-        gl->TexImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, SAT__GL_RGBA16F, columns, rows, layers, 0, SAT__GL_RGBA, SAT__GL_FLOAT, NULL);
+        gl->TexImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, SAT__GL_RGBA16F, columns, rows, layers, 0, SAT__GL_RGBA,
+                       SAT__GL_FLOAT, NULL);
         fiv__gl_filter(gl, SAT__GL_TEXTURE_2D_ARRAY);
         r = sat__gl_check(gl, "fiv: OpenGL refused the texture of the samples");
     }

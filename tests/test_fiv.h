@@ -663,7 +663,8 @@ TEST(penumbra_of_a_disc)
     fiv__light_frame(axes, e->lights[0].direction);
     for (j = 0; j < ACROSS; j++)
         for (i = 0; i < ACROSS; i++) {
-            float u = (2 * (float)i + 1) / ACROSS - 1, v = (2 * (float)j + 1) / ACROSS - 1, t = tanf(e->lights[0].radius);
+            float u = (2 * (float)i + 1) / ACROSS - 1, v = (2 * (float)j + 1) / ACROSS - 1;
+            float t = tanf(e->lights[0].radius);
             if (u * u + v * v > 1) continue;
             for (k = 0; k < 3; k++) directions[3 * n + k] = axes[2][k] + t * (u * axes[0][k] + v * axes[1][k]);
             fiv__normalise(directions + 3 * n, directions + 3 * n);
@@ -719,7 +720,10 @@ TEST(twenty_lamps)
     for (lamps = 20; lamps <= 40; lamps += 20) {
         fiv_environment *all = NULL;
         memset(pixels, 0, sizeof pixels);
-        for (i = 0; i < 3 * lamps; i++) pixels[3 * ((8 + 5 * (i / 3 % 4)) * SKY_WIDTH + 6 * (i / 3 / 4) + i / 3 * 37 % 64) + i % 3] = 1000;
+        for (i = 0; i < 3 * lamps; i++) {
+            int lamp = i / 3, x = 6 * (lamp / 4) + lamp * 37 % 64, y = 8 + 5 * (lamp % 4);
+            pixels[3 * (y * SKY_WIDTH + x) + i % 3] = 1000;
+        }
         EXPECT_EQ(fiv_environment_create(&all, &image, NULL, NULL), SAT_OK);
         EXPECT_EQ(fiv_environment_get_stats(all).lights, lamps < FIV_MAX_LIGHTS ? lamps : FIV_MAX_LIGHTS);
         for (pass = 0; pass < 2; pass++) {
@@ -1847,8 +1851,8 @@ TEST(bad_arguments)
     reference_mesh_free(&m);
 }
 
-/* Each row of a table: its default and both ends are taken, what lies beyond is refused, with a sentence that starts with
-   the name. */
+/* Each row of a table: its default and both ends are taken, what lies beyond is refused, with a sentence that starts
+   with the name. */
 typedef const char *test_explain(char *text, size_t size, const void *options);
 typedef sat_result test_use(const void *options);
 
@@ -1884,7 +1888,12 @@ static void test_fields(const sat__field *fields, int count, const void *default
     }
 }
 
-static struct { sat_image sky; reference_mesh mesh; fiv_environment *environment; fiv_instance instance; } test_used;
+static struct {
+    sat_image sky;
+    reference_mesh mesh;
+    fiv_environment *environment;
+    fiv_instance instance;
+} test_used;
 
 static const char *test_explain_environment(char *text, size_t size, const void *options)
 {
@@ -1947,7 +1956,8 @@ TEST(options_are_checked_and_named)
     test_fields(fiv__environment_fields, SAT__COUNT(fiv__environment_fields), &eo, sizeof eo, test_explain_environment,
                 test_use_environment);
     oo.theta = 8, oo.phi = 3, oo.rho = 2, oo.resolution = 8, oo.sun_map = 64;
-    test_fields(fiv__occluder_fields, SAT__COUNT(fiv__occluder_fields), &oo, sizeof oo, test_explain_occluder, test_use_occluder);
+    test_fields(fiv__occluder_fields, SAT__COUNT(fiv__occluder_fields), &oo, sizeof oo, test_explain_occluder,
+                test_use_occluder);
     oo.resolution = 32;
     test_used.environment = test_environment(2000, 400);
     o = test_occluder(&test_used.mesh, &oo, NULL);

@@ -22,6 +22,7 @@ typedef struct test_scene {
 } test_scene;
 
 static test_scene scene;
+static float test_penumbra = 1;
 
 #ifdef FIV_NO_SELF
 enum { TEST_SELF = 0 };
@@ -134,6 +135,7 @@ static void test_cpu(float rgb[3], int i, size_t count)
     size_t j, n = 0;
     o.cutoff = 0;
     o.own_masks = o.rays = 0; /* what the shader does */
+    o.penumbra = test_penumbra;
     for (j = 0; j < count; j++)
         if (!(point[3] >= (float)j + 2 && point[3] < (float)j + 3)) others[n++] = scene.instances[j];
 #ifndef FIV_NO_SELF
@@ -301,6 +303,144 @@ TEST(moving_needs_no_tables)
     test_close();
 }
 
+/* OpenGL that refuses textures: every allocation of memory and of textures in turn. The scene before stays whole. */
+static int test_refuse, test_images;
+static void (SAT__GL_CALL *test_image_2d)(unsigned, int, int, int, int, int, unsigned, unsigned, const void *);
+static void (SAT__GL_CALL *test_image_3d)(unsigned, int, int, int, int, int, int, unsigned, unsigned, const void *);
+
+static void SAT__GL_CALL test_tex_image_2d(unsigned a, int b, int c, int w, int h, int d, unsigned e, unsigned f,
+                                           const void *p)
+{
+    test_image_2d(a, b, c, ++test_images == test_refuse ? -1 : w, h, d, e, f, p);
+}
+
+static void SAT__GL_CALL test_tex_image_3d(unsigned a, int b, int c, int w, int h, int z, int d, unsigned e, unsigned f,
+                                           const void *p)
+{
+    test_image_3d(a, b, c, ++test_images == test_refuse ? -1 : w, h, z, d, e, f, p);
+}
+
+/* Only the occluder that turned is sent again; nothing is allocated; what fails changes nothing. */
+TEST(scenes_cost_what_changed)
+{
+    static float before[4 * COUNT], after[4 * COUNT];
+    fiv_occluder_options o = fiv_occluder_defaults();
+    fiv_occluder *large = NULL;
+    fiv_environment *other = NULL, *kept;
+    fiv_environment_options eo = fiv_environment_defaults();
+    fiv_instance two[2];
+    float grey[2] = {1, 1}, turn[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0};
+    sat_image image = sat_image_f32(grey, 2, 1, 1);
+    sat__gl_state state;
+    double worst, rms;
+    size_t sent;
+    long calls;
+    int k;
+    if (!test_open(FIV_STORAGE_FLOAT, 0)) SKIP(scene.context.message);
+    calls = scene.memory.calls;
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
+    EXPECT_EQ(scene.gl->uploads, 2);
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
+    EXPECT_EQ(scene.gl->uploads, 2);
+    EXPECT_EQ(fiv_occluder_light(scene.turned, scene.environment, turn), SAT_OK);
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
+    EXPECT_EQ(scene.gl->uploads, 3);
+    test_difference(&worst, &rms, 3);
+    EXPECT(worst < 2e-3 && rms < 1e-4);
+    EXPECT_EQ(scene.memory.calls, calls);
+    /* a larger scene under another light: each of its textures is refused once */
+    eo.resolution = o.resolution = 16;
+    o.theta = 32, o.phi = 17, o.rho = 12, o.sun_map = 1024;
+    EXPECT_EQ(fiv_environment_create(&other, &image, &eo, NULL), SAT_OK);
+    EXPECT_EQ(fiv_occluder_create(&large, scene.mesh.positions, scene.mesh.vertices, scene.mesh.indices,
+                                  scene.mesh.triangles, &o, NULL),
+              SAT_OK);
+    EXPECT_EQ(fiv_occluder_light(large, other, NULL), SAT_OK);
+    two[0] = two[1] = scene.instances[0];
+    two[0].occluder = two[1].occluder = large;
+    test_image_2d = scene.gl->gl.TexImage2D;
+    test_image_3d = scene.gl->gl.TexImage3D;
+    scene.gl->gl.TexImage2D = test_tex_image_2d;
+    scene.gl->gl.TexImage3D = test_tex_image_3d;
+    EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
+    sat__gl_begin(&scene.gl->gl, &state, 1);
+    EXPECT_EQ(sat__gl_read(&scene.gl->gl, before, fiv_gl_texture(scene.gl), SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
+    sat__gl_end(&scene.gl->gl, &state);
+    sent = scene.gl->uploads;
+    for (k = 1; k < 9; k++) {
+        sat_result r;
+        test_images = 0;
+        test_refuse = k;
+        r = fiv_gl_set_scene(scene.gl, other, two, 2);
+        if (r == SAT_OK) break;
+        EXPECT(strlen(fiv_gl_message(scene.gl)) > 3);
+        EXPECT_EQ(scene.gl->uploads, sent);
+        EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
+        sat__gl_begin(&scene.gl->gl, &state, 1);
+        EXPECT_EQ(sat__gl_read(&scene.gl->gl, after, fiv_gl_texture(scene.gl), SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
+        sat__gl_end(&scene.gl->gl, &state);
+        EXPECT(memcmp(before, after, sizeof before) == 0);
+    }
+    EXPECT_EQ(k, 3); /* the samples and the new cube's I_tot; no light is split off, no map grows */
+    EXPECT_EQ(scene.gl->uploads, sent + 1);
+    kept = scene.environment;
+    scene.environment = other;
+    scene.instances[0] = two[0];
+    scene.instances[1] = two[1];
+    test_difference(&worst, &rms, 2);
+    EXPECT(worst < 2e-3 && rms < 1e-4);
+    scene.environment = kept;
+    EXPECT_EQ(scene.memory.calls, calls);
+    fiv_occluder_destroy(large);
+    fiv_environment_destroy(other);
+    test_close();
+}
+
+/* Pairs of options of both sides: the corners of storage, sizes of samples and of maps, suns, penumbra. */
+TEST(corners_in_pairs_equal_the_cpu)
+{
+    static const int grids[3][3] = {{4, 3, 2}, {64, 5, 3}, {6, 33, 4}};
+    static const float shells[2][2] = {{0.05f, 1}, {0.9f, 20}}, penumbrae[3] = {0, 1, 6};
+    int i, n = 0;
+    double worst_of_all = 0;
+    for (i = 0; i < 18; i++) {
+        fiv_occluder_options o = fiv_occluder_defaults();
+        fiv_gl_options options = fiv_gl_defaults();
+        fiv_occluder *made = NULL;
+        double worst, rms;
+        if (!test_open((fiv_storage)(i & 1), 0)) SKIP(scene.context.message);
+        o.storage = (fiv_storage)(i & 1);
+        o.theta = grids[i % 3][0], o.phi = grids[i % 3][1], o.rho = grids[i % 3][2];
+        o.first_shell = shells[i / 3 % 2][0], o.last_shell = shells[i / 3 % 2][1];
+        o.sun_map = i % 5 ? 64 << i % 4 : 1000;
+        o.keep_masks = i % 7 != 0 && !o.lazy;
+        EXPECT_EQ(fiv_occluder_create(&made, scene.mesh.positions, scene.mesh.vertices, scene.mesh.indices,
+                                      scene.mesh.triangles, &o, NULL),
+                  SAT_OK);
+        test_sky(i % 4 * 2);
+        test_light();
+        EXPECT_EQ(fiv_occluder_light(made, scene.environment, NULL), SAT_OK);
+        scene.instances[0].occluder = scene.instances[2].occluder = made;
+        options.allocator = scene.gl->allocator;
+        options.max_instances = i % 2 ? 3 : 64;
+        options.penumbra = test_penumbra = penumbrae[i / 6];
+        if (n++ == 0) EXPECT(strcmp(fiv_gl_message(NULL), "no object") == 0);
+        {
+            fiv_gl *first = scene.gl;
+            EXPECT_EQ(fiv_gl_create(&scene.gl, scene.context.get_proc, WIDTH, HEIGHT, &options), SAT_OK);
+            EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
+            test_difference(&worst, &rms, 3);
+            EXPECT(worst < 1e-2 && rms < 3e-4); /* wide penumbrae: one point of a disc on the other side of an edge */
+            if (worst > worst_of_all) worst_of_all = worst;
+            fiv_gl_destroy(first);
+        }
+        test_penumbra = 1;
+        fiv_occluder_destroy(made);
+        test_close();
+    }
+    REPORT("GPU against CPU, corners in pairs: worst", worst_of_all, "of the largest");
+}
+
 TEST(state_is_put_back)
 {
     enum {
@@ -400,14 +540,29 @@ TEST(bad_arguments)
     fiv_gl_destroy(NULL);
     EXPECT_EQ(fiv_gl_create(NULL, test_nothing, 4, 4, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(fiv_gl_create(&gl, NULL, 4, 4, NULL), SAT_ERR_ARGUMENT);
+    fiv_gl_destroy(gl);
     EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 0, 4, NULL), SAT_ERR_ARGUMENT);
+    EXPECT(strcmp(fiv_gl_message(gl), "width is 0; 1..16384") == 0);
+    fiv_gl_destroy(gl);
     EXPECT_EQ(o.self, 0);
 #ifdef FIV_NO_SELF
     o.self = 1;
     EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 4, 4, &o), SAT_ERR_ARGUMENT);
+    fiv_gl_destroy(gl);
+    o.self = 0;
 #endif
-    o.max_instances = 65;
-    EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 4, 4, &o), SAT_ERR_ARGUMENT);
+    for (i = 0; i < SAT__COUNT(fiv__gl_fields); i++) {
+        const sat__field *f = &fiv__gl_fields[i];
+        char text[160];
+        if (f->type != 'i' && f->type != 'f') continue;
+        o = fiv_gl_defaults();
+        EXPECT(strcmp(fiv_explain_gl(text, sizeof text, 4, 4, &o), "") == 0);
+        sat__field_set(f, &o, f->high + 1);
+        EXPECT(strstr(fiv_explain_gl(text, sizeof text, 4, 4, &o), f->name) == text);
+        EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 4, 4, &o), SAT_ERR_ARGUMENT);
+        EXPECT(strcmp(fiv_gl_message(gl), text) == 0);
+        fiv_gl_destroy(gl);
+    }
     if (!test_open(FIV_STORAGE_FLOAT, 0)) SKIP(scene.context.message);
     EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_ERR_ARGUMENT); /* no scene */
     for (i = 0; i < 9; i++) many[i] = scene.instances[0];

@@ -661,8 +661,8 @@ static void many_occluders(bench *b)
 static void light_points(run *r, fiv_irradiance_stats *stats)
 {
     bench *b = r->b;
-    check(fiv_irradiance(b->rgb, b->points, b->normals, (size_t)(b->side * b->side), b->environment, r->instances, r->count,
-                         &r->options, stats),
+    check(fiv_irradiance(b->rgb, b->points, b->normals, (size_t)(b->side * b->side), b->environment, r->instances,
+                         r->count, &r->options, stats),
           "irradiance");
 }
 
@@ -675,7 +675,8 @@ static void resting_row(bench *b, const char *light, int big, double gap)
     double error[2], seconds[2], points = b->side * b->side;
     run r;
     if (big) o.theta = 64, o.phi = 33, o.rho = 30;
-    check(fiv_occluder_create(&occluder, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o, NULL),
+    check(fiv_occluder_create(&occluder, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o,
+                              NULL),
           "occluder");
     check(fiv_occluder_light(occluder, b->environment, NULL), "light");
     instance = instance_of(b, occluder);
@@ -728,8 +729,8 @@ static void resting(int side)
     }
 }
 
-/* ---- suns: depth maps, rays and own masks beside as many rays as take about as long. The truth is that of a cube of 64
-   texels that keeps up to 32 lights. ---- */
+/* ---- suns: depth maps, rays and own masks beside as many rays as take about as long. The truth is that of a cube of
+   64 texels that keeps up to 32 lights. ---- */
 
 static void make_sun(image *out)
 {
@@ -801,7 +802,8 @@ static void sample_rays(void *user)
             size_t j = chosen[i];
             double part = s->count ? total / ((s->sums[j + 1] - s->sums[j]) * (double)n) : 1;
             if (wanted[i] && !covered[i])
-                for (k = 0; k < 3; k++) sum[k] += part * (double)b->powers[3 * j + (size_t)k] * (double)b->directions[3 * j + 1];
+                for (k = 0; k < 3; k++)
+                    sum[k] += part * (double)b->powers[3 * j + (size_t)k] * (double)b->directions[3 * j + 1];
         }
         for (k = 0; k < 3; k++) b->rgb[3 * p + (size_t)k] = (float)sum[k];
     }
@@ -842,9 +844,9 @@ static void suns_row(bench *b, const fiv_occluder *o, const char *light, double 
     error[3] = reference_nrmse(b->truth, b->rgb, (size_t)points);
     free(s.sums);
     bench_row("%s\t%.3f\t%d\t%.4f\t%.4f\t%.4f\t%.4f\t%.2f\t%.4f\t%.4f\t%.1f\t%.1f", light, gap,
-              fiv_environment_get_stats(b->environment).lights, error[0], error[1], error[2], error[3], 1e6 * seconds[0] / points,
-              seconds[1] / seconds[0], seconds[2] / seconds[0], 100 * (double)stats.own_receivers / points,
-              100 * (double)stats.rays / points);
+              fiv_environment_get_stats(b->environment).lights, error[0], error[1], error[2], error[3],
+              1e6 * seconds[0] / points, seconds[1] / seconds[0], seconds[2] / seconds[0],
+              100 * (double)stats.own_receivers / points, 100 * (double)stats.rays / points);
 }
 
 static void suns(int side)
@@ -923,7 +925,8 @@ static void pixels(bench *b, int side)
             square += pow((double)b->rgb[i] - (double)each[i], 2);
             largest = (double)each[i] > largest ? (double)each[i] : largest;
         }
-        bench_row("%.3f\t%.3f\t%.1f\t%.3f\t%.5f\t%d", (double)tolerances[t], (double)stats.own_masks / ((double)stats.own_receivers + 1e-9),
+        bench_row("%.3f\t%.3f\t%.1f\t%.3f\t%.5f\t%d", (double)tolerances[t],
+                  (double)stats.own_masks / ((double)stats.own_receivers + 1e-9),
                   1e6 * seconds / (side * side), seconds / first, sqrt(square / (3 * side * side)) / largest,
                   t == 2);
     }
