@@ -4260,9 +4260,9 @@ extern "C" {
 
 /* fiv_shells: half floats that the hardware filters; a layer a shell, samples inside the mesh 0. Three fields of it
    above each other: vector 0..3; 4..7; 8, solid angle, 1 where valid, 1 where inside. Columns are azimuths, the first
-   once more at the end. fiv_support: the support function, a field an occluder. fiv_maps: depth maps of the lights, four
-   occluders side by side. fiv_scene: a row an instance, see fiv__gl_row and fiv__gl_light; two texels a light in the row
-   behind them. fiv_diffuse: I_tot at the corners of the cube. */
+   once more at the end. fiv_support: the support function, a field an occluder. fiv_maps: depth maps of the lights,
+   four occluders side by side. fiv_scene: a row an instance, see fiv__gl_row and fiv__gl_light; two texels a light in
+   the row behind them. fiv_diffuse: I_tot at the corners of the cube. */
 static const char fiv__glsl_cube[] =
     "#ifndef FIV_GLSL\n"
     "#define FIV_GLSL\n"
