@@ -196,6 +196,13 @@ static inline uint64_t support_random(uint64_t *state)
     return z ^ (z >> 31);
 }
 
+/* 1 where the program asked for subnormal floats to count as 0 (-ffast-math and -Ofast of gcc do), at run time. */
+static inline int support_subnormals_flushed(void)
+{
+    volatile float tiny = 1.17549435e-38f, half = 0.5f;
+    return tiny * half == 0;
+}
+
 /* The larger one, and NaN when either is: the largest error of a test must not hide one that is no number. */
 static inline double support_larger(double a, double b) { return a >= b || a != a ? a : b; }
 

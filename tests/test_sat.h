@@ -960,7 +960,7 @@ TEST(extreme_floats_keep_finite_sums)
                 random_box(&state, W, H, 80, b);
                 sum = sat_sum(t, 0, b[0], b[1], b[2], b[3]);
                 EXPECT(sat__is_finite_double(sum));
-                if (pattern == 2 && !sat__is_fixed(o.kind))
+                if (pattern == 2 && !sat__is_fixed(o.kind) && !support_subnormals_flushed())
                     EXPECT_NEAR(sum, exact_sum(&view, 0, b[0], b[1], b[2], b[3]), 1e-44);
             }
             sat_destroy(t);
