@@ -58,6 +58,13 @@
    be used at once, and any number of threads may call fiv_irradiance on the same ones. All arguments are checked in
    every build. No function takes more than 32 KB of stack; at most 256 workers take part in one fiv_irradiance.
 
+   ROWS, LIGHT, FAILURES
+   Light is linear radiance (decode sRGB first), and so are the results. The stride of the picture is in bytes: 0
+   packed, negative the bottom row first with `pixels` at the top one; receivers are packed, 3 floats each. A create
+   that fails sets *out to NULL and holds nothing (OpenGL: an object for its message, to be destroyed). On OpenGL
+   receivers come in by two float textures (glTexSubImage2D, or drawn); fiv_gl_texture is sampled, or attached to a
+   framebuffer for glReadPixels.
+
    NUMERICS
    - Same bits for any number of workers and any order of instances (sums of parts of I_tot in 2^-40 fixed point); where
      the compiler contracts products and sums (-mfma without -ffp-contract=off), orders differ in the last digits, 1e-6.
@@ -1988,28 +1995,10 @@ typedef struct fiv__grid {
 
 static size_t fiv__grid_samples(const fiv__grid *g) { return (size_t)g->theta * (size_t)g->phi * (size_t)g->rho; }
 
-/* Octahedral square (Cigolle et al. 2014): u, v in -1..1; the y axis in the middle, -y at the four corners. */
-static inline void fiv__octahedron_direction(float d[3], float u, float v)
+static inline void fiv__octahedron_direction(float d[3], float a, float b)
 {
-    float x = u, z = v, y = 1 - fabsf(u) - fabsf(v);
-    if (y < 0) {
-        x = u < 0 ? fabsf(v) - 1 : 1 - fabsf(v);
-        z = v < 0 ? fabsf(u) - 1 : 1 - fabsf(u);
-    }
-    d[0] = x;
-    d[1] = y;
-    d[2] = z;
+    sat__octahedral_unfold(d, a, b);
     fiv__normalise(d, d);
-}
-
-static inline void fiv__octahedron_square(float *u, float *v, const float d[3])
-{
-    float sum = fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]), x, z;
-    sum = sum > 0 ? 1 / sum : 0;
-    x = d[0] * sum;
-    z = d[2] * sum;
-    *u = d[1] < 0 ? (x < 0 ? fabsf(z) - 1 : 1 - fabsf(z)) : x;
-    *v = d[1] < 0 ? (z < 0 ? fabsf(x) - 1 : 1 - fabsf(x)) : z;
 }
 
 static void fiv__sample_offset(float offset[3], const fiv__grid *g, size_t sample)
@@ -2041,15 +2030,7 @@ static size_t fiv__first_twin(const fiv__grid *g, size_t sample)
     return shell + (size_t)(j * n + i);
 }
 
-/* log2 to 3e-6, arc tangent to 1e-5 (Abramowitz and Stegun 4.4.49): enough to place a point in a cell. */
-static inline float fiv__log2(float v)
-{
-    uint32_t bits = sat__float_bits(v);
-    float exponent = (float)((int)(bits >> 23) - 127), m = sat__float_from_bits((bits & 0x7fffffu) | 0x3f800000u);
-    float t = (m - 1.41421356f) / (m + 1.41421356f), s = t * t;
-    return exponent + 0.5f + t * (2.88539008f + s * (0.96179669f + s * (0.57707802f + s * 0.4121f)));
-}
-
+/* Arc tangent to 1e-5 (Abramowitz and Stegun 4.4.49): enough to place a point in a cell. */
 static inline float fiv__atan2(float y, float x)
 {
     float ax = fabsf(x), ay = fabsf(y), big = ax > ay ? ax : ay, less = ax > ay ? ay : ax;
@@ -2075,10 +2056,10 @@ static void fiv__locate(fiv__cell *cell, const fiv__grid *g, const float c[3])
     size_t base;
     if (!(r > g->first)) r = g->first;
     cell->radius = r;
-    f = (fiv__log2(r) - g->log_first) * g->per_log;
+    f = (sat__log2(r) - g->log_first) * g->per_log;
     f = f < 0 ? 0 : f > (float)(g->rho - 1) ? (float)(g->rho - 1) : f;
     if (g->octahedral) {
-        fiv__octahedron_square(&a, &b, c);
+        sat__octahedral_fold(&a, &b, c);
         a = (a + 1) * 0.5f * (float)(n - 1);
         b = (b + 1) * 0.5f * (float)(n - 1);
     } else {
@@ -2336,7 +2317,7 @@ static float fiv__reach(const fiv_occluder *o, const float d[3])
     float u, v;
     int x, y;
     const float *p;
-    fiv__octahedron_square(&u, &v, d);
+    sat__octahedral_fold(&u, &v, d);
     u = (u + 1) * 0.5f * (FIV__SUPPORT - 1);
     v = (v + 1) * 0.5f * (FIV__SUPPORT - 1);
     x = sat__clamp_int((int)u, 0, FIV__SUPPORT - 2);

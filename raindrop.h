@@ -58,6 +58,14 @@
    parallel_for, which create, advance and render then use. What can fail returns a sat_result and leaves outputs alone
    unless it is SAT_OK; arguments are checked in every build.
 
+   ROWS, LIGHT, FAILURES
+
+   Light is linear radiance, in the environment (decode_srgb for codes) and in the picture. Strides are bytes: 0 packed,
+   negative the bottom row first with the pointer at the top one; scene depths are packed. A create that fails sets *out
+   to NULL and holds nothing (OpenGL: an object for its message, to be destroyed). On OpenGL the environment is copied
+   from the CPU's, and the drops are drawn over your framebuffer: a float texture that you sample or read by
+   glReadPixels.
+
    NUMERICS
 
    - raindrop_trace: 3e-7 from a ray traced in long double, eye distance 1.01 to 1025 radii, index 1 and 1.33; 3e-6 for
@@ -1203,28 +1211,11 @@ static inline float *raindrop__texel(const raindrop__sphere *sphere, int level, 
 /* Direction to the unit square; returns the direction's |x|+|y|+|z| over its length, 1 .. sqrt(3). */
 static inline float raindrop__fold(float uv[2], const float d[3])
 {
-    float sum = fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]), scale = sum > 0 ? 1 / sum : 0, a = d[0] * scale,
-          b = d[2] * scale;
-    if (d[1] < 0) {
-        float c = a;
-        a = copysignf(1 - fabsf(b), a);
-        b = copysignf(1 - fabsf(c), b);
-    }
+    float sum = fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]), a, b;
+    sat__octahedral_fold(&a, &b, d);
     uv[0] = raindrop__clamp(a * 0.5f + 0.5f, 0, 1);
     uv[1] = raindrop__clamp(b * 0.5f + 0.5f, 0, 1);
     return sum / sqrtf(raindrop__dot(d, d));
-}
-
-/* Square to a point of the octahedron (not normalised). */
-static inline void raindrop__unfold(float d[3], float u, float v)
-{
-    float a = 2 * u - 1, b = 2 * v - 1, y = 1 - fabsf(a) - fabsf(b);
-    if (y < 0) {
-        float c = a;
-        a = copysignf(1 - fabsf(b), a);
-        b = copysignf(1 - fabsf(c), b);
-    }
-    raindrop__set(d, a, y, b);
 }
 
 static inline void raindrop__fill_border(const raindrop__sphere *sphere, int level)
@@ -1247,7 +1238,7 @@ static inline void raindrop__fill_border(const raindrop__sphere *sphere, int lev
 static inline float raindrop__texel_weight(int x, int y, int r)
 {
     float d[3], p2;
-    raindrop__unfold(d, ((float)x + 0.5f) / (float)r, ((float)y + 0.5f) / (float)r);
+    sat__octahedral_unfold(d, (2 * (float)x + 1) / (float)r - 1, (2 * (float)y + 1) / (float)r - 1);
     p2 = raindrop__dot(d, d);
     return 1 / (p2 * sqrtf(p2));
 }
@@ -1515,13 +1506,13 @@ static void raindrop__resample_rows(int begin, int end, int worker, void *contex
         for (x = 0; x < sphere->resolution; x++) {
             float *out = raindrop__texel(sphere, 0, x, y), d[3], rgb[3], sum[3] = {0, 0, 0};
             for (k = 0; k < 4; k++) {
-                raindrop__unfold(d, ((float)x + ((k & 1) ? 0.75f : 0.25f)) * step,
-                                 ((float)y + ((k & 2) ? 0.75f : 0.25f)) * step);
+                sat__octahedral_unfold(d, ((float)x + ((k & 1) ? 0.75f : 0.25f)) * 2 * step - 1,
+                                       ((float)y + ((k & 2) ? 0.75f : 0.25f)) * 2 * step - 1);
                 raindrop__picture_sample(rgb, job->picture, d);
                 for (c = 0; c < 3; c++) sum[c] += 0.25f * rgb[c];
             }
             if (job->bow) {
-                raindrop__unfold(d, ((float)x + 0.5f) * step, ((float)y + 0.5f) * step);
+                sat__octahedral_unfold(d, ((float)x + 0.5f) * 2 * step - 1, ((float)y + 0.5f) * 2 * step - 1);
                 raindrop__add_bow(sum, job, d);
             }
             raindrop__set(out, sum[0], sum[1], sum[2]);
@@ -1571,8 +1562,8 @@ static void raindrop__prefilter_rows(int begin, int end, int worker, void *conte
         for (x = 0; x < sphere->resolution; x++) {
             float *out = raindrop__texel(sphere, 0, x, y), d[3], u[3], v[3], p[3], rgb[3];
             double sum[3] = {0, 0, 0};
-            raindrop__unfold(d, ((float)x + 0.5f) / (float)sphere->resolution,
-                             ((float)y + 0.5f) / (float)sphere->resolution);
+            sat__octahedral_unfold(d, (2 * (float)x + 1) / (float)sphere->resolution - 1,
+                                   (2 * (float)y + 1) / (float)sphere->resolution - 1);
             raindrop__normalise(d);
             raindrop__perpendicular(u, v, d);
             for (i = 0; i < samples; i++) {

@@ -58,6 +58,13 @@
    Everything that can fail returns a sat_result and leaves outputs alone when it is not SAT_OK, but where a comment
    says so; lookups of channels or boxes that are not there return 0.
 
+   ROWS, LIGHT, FAILURES
+
+   Strides are bytes: 0 packed, negative the bottom row first with `pixels` at the top one. Values are summed as they
+   are: sums of sRGB codes are sums of codes; decode first where light is meant. A create that fails sets *out to NULL
+   and holds nothing (OpenGL: an object for its message, to be destroyed). On OpenGL pixels come in and go out by
+   textures: glTexSubImage2D into the input; sat_gl_table attached to a framebuffer, then glReadPixels.
+
    NUMERICS
 
    u = 2^-24, v = 2^-53; errors of one box sum, worst case for non-negative pixels; sat_error_bound knows the constants.
@@ -725,6 +732,38 @@ static inline uint16_t sat__half_from_float(float value)
     }
     magnitude += 0xfffu + ((magnitude >> 13) & 1u);
     return (uint16_t)(sign | ((magnitude - 0x38000000u) >> 13));
+}
+
+/* Base-2 logarithm of a positive number that is no subnormal: exponent plus a polynomial that is exact at both ends of
+   the octave, 1 + t; error below 2.3e-6. */
+static inline float sat__log2_octave(float t)
+{
+    float q = 0.442544943f + t * (-0.275600307f + t * (0.18194886f + t * (-0.0959564262f + t * 0.0258414329f)));
+    return t + t * (1 - t) * q;
+}
+
+static inline float sat__log2(float v)
+{
+    uint32_t bits = sat__float_bits(v);
+    float t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
+    return (float)((int32_t)(bits >> 23) - 127) + sat__log2_octave(t);
+}
+
+/* Octahedral square (Cigolle et al. 2014), a and b in -1..1: the y axis in the middle, -y at the four corners.
+   Directions may have any length and come back as points of the octahedron; 0 is the middle. */
+static inline void sat__octahedral_fold(float *a, float *b, const float d[3])
+{
+    float sum = fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]), scale = sum > 0 ? 1 / sum : 0, x = d[0] * scale,
+          z = d[2] * scale;
+    *a = d[1] < 0 ? copysignf(1 - fabsf(z), x) : x;
+    *b = d[1] < 0 ? copysignf(1 - fabsf(x), z) : z;
+}
+
+static inline void sat__octahedral_unfold(float d[3], float a, float b)
+{
+    d[1] = 1 - fabsf(a) - fabsf(b);
+    d[0] = d[1] < 0 ? copysignf(1 - fabsf(b), a) : a;
+    d[2] = d[1] < 0 ? copysignf(1 - fabsf(a), b) : b;
 }
 
 /* IEC 61966-2-1, both directions on 0..1. */

@@ -55,6 +55,13 @@
      leave column_of_row as it was: NaN and -infinity SAT_ERR_NON_FINITE, too large SAT_ERR_ARGUMENT, more rows than
      places or forbidden pairs that leave no choice SAT_ERR_LIMIT.
 
+   ROWS, LIGHT, FAILURES
+     Strides of matrices are in floats, those of pictures in bytes: 0 packed, negative the bottom row first with the
+     pointer at the top one. Features are means of the values as they are: sRGB codes are the more even measure of what
+     is seen, linear light of what is drawn small. A create that fails sets *out to NULL and holds nothing (OpenGL: an
+     object for its message, to be destroyed). On OpenGL matrices go up by softassign_gl_set_costs and come back by
+     softassign_gl_published.
+
    NUMERICS
      Costs are floats, prices and path lengths doubles, sums compensated. A pair has one cost, always rounded the same
      way. lower_bound is below every assignment's cost, rounding included; after EXACT the gap is that rounding, about

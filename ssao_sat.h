@@ -85,6 +85,15 @@
    error nothing is written; ssao_sat_explain and ssao_sat_explain_input say in a sentence what was wrong. NULL options
    are the defaults. Options may carry a parallel_for: rows, slabs and estimates are shared out by it.
 
+   ROWS, LIGHT, FAILURES
+
+   Accessibilities are linear: multiply ambient light by them before tone mapping and sRGB. Strides are bytes: 0 packed,
+   negative the bottom row first with the pointer at the top one; options.bottom_up where the picture itself is upside
+   down, as OpenGL's. A create that fails sets *out to NULL and holds nothing (OpenGL: an object for its message, to be
+   destroyed). On OpenGL pixels come in and go out by textures: the depth texture you drew to; out or
+   ssao_sat_gl_texture sampled, or attached to a framebuffer for glReadPixels. Another radius each frame:
+   ssao_sat_resize, on OpenGL ssao_sat_gl_set_options; both cost nothing.
+
    NUMERICS
 
    - Tables are integers modulo 2^32: sums over boxes are exact at every size (the picture may be 32768 wide), so a box

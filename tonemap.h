@@ -51,6 +51,14 @@
      threads shares out bands of 64 rows. Every call checks its arguments and answers with a sat_result; on an error the
      output is untouched. An object serves one call at a time.
 
+   ROWS, LIGHT, FAILURES
+
+     Pictures are linear light (decode sRGB first), results sRGB codes or, by tonemap_apply_f32, linear. Strides are
+     bytes: 0 packed, negative the bottom row first, the pointer then at the top one. A create that fails sets *out to
+     NULL and holds nothing (OpenGL: an object for its message, to be destroyed). On OpenGL pixels come in and go out by
+     textures: glTexSubImage2D into hdr; ldr or tonemap_gl_texture attached to a framebuffer, then glReadPixels. There
+     the order of rows does not matter.
+
    NUMERICS
 
      Sums are integers: the scaled luminance is rounded to 2^-12 and cut at 256, where the display has 0.4 % left; box
@@ -574,19 +582,6 @@ struct tonemap {
 
 /* ---- base-2 logarithm: exponent plus a polynomial that is exact at both ends of the octave; error below 2.3e-6 */
 
-static inline float tonemap__log2_octave(float t)
-{
-    float q = 0.442544943f + t * (-0.275600307f + t * (0.18194886f + t * (-0.0959564262f + t * 0.0258414329f)));
-    return t + t * (1 - t) * q;
-}
-
-static inline float tonemap__log2(float v)
-{
-    uint32_t bits = sat__float_bits(v);
-    float t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
-    return (float)((int32_t)(bits >> 23) - 127) + tonemap__log2_octave(t);
-}
-
 /* |v| < 60; relative error below 5e-6 */
 static inline float tonemap__exp2(float v)
 {
@@ -683,7 +678,7 @@ static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, 
         bits = sat__float_bits(y);
         t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
         log_sum += (int64_t)weight * (((int32_t)(bits >> 23) - 127) * 65536 +
-                                      (int32_t)(tonemap__log2_octave(t) * 65536 + 0.5f));
+                                      (int32_t)(sat__log2_octave(t) * 65536 + 0.5f));
         positive++;
         counted += weight;
         if (w->histogram) w->histogram[(bits - TONEMAP__DARKEST_BITS) >> 19] += weight;
@@ -1027,7 +1022,7 @@ static inline void tonemap__adapt(tonemap *map, const double *measured, double d
    2.4483 jumps at 0.0034. */
 static inline float tonemap__capacity(float cd)
 {
-    float ln = 0.693147181f * tonemap__log2(cd < TONEMAP__DARKEST ? TONEMAP__DARKEST : cd);
+    float ln = 0.693147181f * sat__log2(cd < TONEMAP__DARKEST ? TONEMAP__DARKEST : cd);
     if (cd < 0.0034f) return cd * (1 / 0.0014f);
     if (cd < 1) return 16.5431894f + ln * (1 / 0.4027f);
     if (cd < 7.2444f) return 16.5431894f + (cd - 1) * (1 / 0.4027f);
@@ -1710,7 +1705,7 @@ static inline void tonemap__steps_row(float *out, const tonemap *map, int j)
     for (; x < map->row; x++) {
         float v = luminance[x] * scale;
         v = v < TONEMAP__LOCAL_CAP ? v : TONEMAP__LOCAL_CAP;
-        out[x] = (tonemap__log2(v > darkest ? v : darkest) + TONEMAP__OCTAVES) * TONEMAP__STEPS;
+        out[x] = (sat__log2(v > darkest ? v : darkest) + TONEMAP__OCTAVES) * TONEMAP__STEPS;
     }
     if (!map->row_unusable[j]) return;
     for (last = 0; last < map->width && sat__float_bits(luminance[last]) == TONEMAP__UNUSABLE; last++) {}
@@ -2193,7 +2188,7 @@ static inline void tonemap__gamut_plain(float *v, float top, float grey, float g
     float dim, share;
     int c;
     top = top < TONEMAP__GAMUT_TOP ? top : TONEMAP__GAMUT_TOP;
-    dim = tonemap__exp2(-gamut * tonemap__log2(top));
+    dim = tonemap__exp2(-gamut * sat__log2(top));
     grey = (grey < 1 ? grey : 1) * dim;
     share = top * dim - grey;
     share = (1 - grey) / (share > 1e-20f ? share : 1e-20f);
@@ -2358,7 +2353,7 @@ static inline void tonemap__agx(float *v)
     int c;
     tonemap__matrix(v, in);
     for (c = 0; c < 3; c++) {
-        float x = (tonemap__log2(v[c] > 1e-9f ? v[c] : 1e-9f) + 12.47393f) * (1 / 16.5f), x2, x4;
+        float x = (sat__log2(v[c] > 1e-9f ? v[c] : 1e-9f) + 12.47393f) * (1 / 16.5f), x2, x4;
         x = x < 0 ? 0 : x > 1 ? 1 : x;
         x2 = x * x;
         x4 = x2 * x2;
@@ -2366,7 +2361,7 @@ static inline void tonemap__agx(float *v)
             15.5f * x4 * x2 - 40.14f * x4 * x + 31.96f * x4 - 6.868f * x2 * x + 0.4298f * x2 + 0.1191f * x - 0.00232f;
     }
     tonemap__matrix(v, out);
-    for (c = 0; c < 3; c++) v[c] = v[c] > 1e-9f ? tonemap__exp2(2.2f * tonemap__log2(v[c])) : 0;
+    for (c = 0; c < 3; c++) v[c] = v[c] > 1e-9f ? tonemap__exp2(2.2f * sat__log2(v[c])) : 0;
 }
 
 /* Stephen Hill's fit of the ACES reference rendering and sRGB output transforms (BakingLab, ACES.hlsl). */
@@ -2414,9 +2409,9 @@ static inline void tonemap__curve_planes(tonemap__planes p, tonemap_operator cur
 /* SMPTE ST 2084; cd: cd/m2. Within 3e-4: a third of a code of 10 bits. */
 static inline float tonemap__pq(float cd)
 {
-    float y = cd > 1e-7f ? tonemap__exp2(0.1593017578125f * tonemap__log2(cd * 1e-4f)) : 0;
+    float y = cd > 1e-7f ? tonemap__exp2(0.1593017578125f * sat__log2(cd * 1e-4f)) : 0;
     y = (0.8359375f + 18.8515625f * y) / (1 + 18.6875f * y);
-    return cd > 1e-7f ? tonemap__exp2(78.84375f * tonemap__log2(y)) : 0;
+    return cd > 1e-7f ? tonemap__exp2(78.84375f * sat__log2(y)) : 0;
 }
 
 /* ITU-R BT.2100: the light of the scene. */
@@ -2424,7 +2419,7 @@ static inline float tonemap__hlg(float scene)
 {
     float v = scene < 1 ? scene : 1;
     if (v <= 1 / 12.0f) return sqrtf(3 * v);
-    return 0.17883277f * 0.693147181f * tonemap__log2(12 * v - 0.28466892f) + 0.55991073f;
+    return 0.17883277f * 0.693147181f * sat__log2(12 * v - 0.28466892f) + 0.55991073f;
 }
 
 static inline void tonemap__encode_planes(tonemap__planes v, const tonemap *map, int n)
@@ -2440,7 +2435,7 @@ static inline void tonemap__encode_planes(tonemap__planes v, const tonemap *map,
             for (c = 0; c < 3; c++) v[c][i] = tonemap__pq(v[c][i] * peak_cd);
             continue;
         }
-        factor = y > 1e-9f ? tonemap__exp2(power * tonemap__log2(y)) : 0;
+        factor = y > 1e-9f ? tonemap__exp2(power * sat__log2(y)) : 0;
         for (c = 0; c < 3; c++) v[c][i] = tonemap__hlg(v[c][i] * factor);
     }
 }

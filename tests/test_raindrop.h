@@ -1242,7 +1242,9 @@ TEST(raindrop_options_are_checked_and_named)
                 const char *text;
                 if (at == 5 && f->type == 'i') continue;
                 r.count = 10;
-                m.resolution = 16;
+                m.resolution = e.resolution = 16;
+                e.far_resolution = 8;
+                e.far_samples = 16;
                 sat__field_set(f, options, at == 5 ? (double)sat__float_from_bits(0x7fc00000u) : values[at]);
                 if (!strcmp(f->name, "look") && at == 1) continue; /* which needs a map */
                 if (!strcmp(f->name, "diameter_min_mm") && at == 2) r.diameter_min_mm = 5.9;
