@@ -908,12 +908,12 @@ static inline ssao_sat__vector ssao_sat__normal(const ssao_sat *s, int x, int y,
     return n;
 }
 
-/* Every step-th pixel of row y from x0 on: distances and normals. */
-static void ssao_sat__read_row(const ssao_sat *s, int y, int x0, int step, float *z, float *nx, float *ny, float *nz,
-                               ssao_sat_stats *stats)
+/* Every step-th pixel of row y from x0 up to `end`: distances and normals. */
+static void ssao_sat__read_row(const ssao_sat *s, int y, int x0, int end, int step, float *z, float *nx, float *ny,
+                               float *nz, ssao_sat_stats *stats)
 {
     int x, i = 0;
-    for (x = x0; x < s->width; x += step, i++) {
+    for (x = x0; x < end; x += step, i++) {
         float d = ssao_sat__distance(s, x, y);
         ssao_sat__vector n = {0, 0, -1};
         if (d > 0) n = ssao_sat__normal(s, x, y, d, stats);
@@ -944,23 +944,32 @@ static inline float ssao_sat__sample(const ssao_sat *s, int i, int j)
     return ssao_sat__distance(s, x, y);
 }
 
-/* Keeps the TRIM + 1 least of what it is given. */
+/* Keeps the 2 TRIM + 1 least of what it is given. */
 static void ssao_sat__keep_least(float *kept, float v)
 {
     int i;
-    if (!(v < kept[SSAO_SAT__TRIM])) return;
-    for (i = SSAO_SAT__TRIM; i > 0 && kept[i - 1] > v; i--) kept[i] = kept[i - 1];
+    if (!(v < kept[2 * SSAO_SAT__TRIM])) return;
+    for (i = 2 * SSAO_SAT__TRIM; i > 0 && kept[i - 1] > v; i--) kept[i] = kept[i - 1];
     kept[i] = v;
 }
 
+/* Mean of those after the first `trim`, so that one more or less of them hardly moves it. */
+static float ssao_sat__mean_least(const float *kept, int trim)
+{
+    float sum = 0;
+    int i;
+    for (i = trim; i <= 2 * trim; i++) sum += kept[i];
+    return sum / (float)(trim + 1);
+}
+
 /* Nearest and farthest distance that slabs and quanta follow: of the sample, in blocks of 2 x 2, less the TRIM blocks
-   with the nearest and those with the farthest pixels. So no pixel and no small object (a bird, a spark) moves them. 0
-   when the sample meets nothing. */
+   with the nearest and those with the farthest pixels, the mean of the next TRIM + 1. So no pixel and no small object
+   (a bird, a spark) moves them. 0 when the sample meets nothing. */
 static int ssao_sat__sample_range(ssao_sat *s)
 {
-    float least[SSAO_SAT__TRIM + 1], most[SSAO_SAT__TRIM + 1];
+    float least[2 * SSAO_SAT__TRIM + 1], most[2 * SSAO_SAT__TRIM + 1];
     int i, j, k, blocks = 0, trim;
-    for (i = 0; i <= SSAO_SAT__TRIM; i++) least[i] = most[i] = 3e38f;
+    for (i = 0; i <= 2 * SSAO_SAT__TRIM; i++) least[i] = most[i] = 3e38f;
     for (j = 0; j < SSAO_SAT__GRID; j += 2)
         for (i = 0; i < SSAO_SAT__GRID; i += 2) {
             float low = 3e38f, high = 0;
@@ -977,8 +986,8 @@ static int ssao_sat__sample_range(ssao_sat *s)
         }
     trim = sat__min_int(SSAO_SAT__TRIM, blocks / 16);
     if (!blocks) return 0;
-    s->nearest = least[trim];
-    s->farthest = -most[trim];
+    s->nearest = ssao_sat__mean_least(least, trim);
+    s->farthest = -ssao_sat__mean_least(most, trim);
     if (s->farthest < s->nearest) s->farthest = s->nearest; /* half of the picture nearer than the other by a block */
     return 1;
 }
@@ -1213,7 +1222,8 @@ static void ssao_sat__hold_rows(int begin, int end, int worker, void *context)
         size_t at = ssao_sat__at(s, y);
         ssao_sat_stats unused, *stats = y >= s->begin && y < s->end ? &w->stats : &unused;
         memset(&unused, 0, sizeof unused);
-        ssao_sat__read_row(s, y * s->step, 0, s->step, s->z + at, s->nx + at, s->ny + at, s->nz + at, stats);
+        ssao_sat__read_row(s, y * s->step, 0, s->width, s->step, s->z + at, s->nx + at, s->ny + at, s->nz + at,
+                           stats);
 #ifndef SSAO_SAT_NO_SLABS
         if (s->options.method == SSAO_SAT_SLABS) {
             ssao_sat__hold_words(s, y, s->scratch + (size_t)worker * 8 * s->stride, w);
@@ -1577,18 +1587,19 @@ static void ssao_sat__add_terms(ssao_sat__cells *c, const ssao_sat__kernel *kern
     }
 }
 
-/* All rings around the point; those that round to the same pixels are looked up once. */
-static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, float half_side, int first_slab, int end_slab)
+/* The first `rings` rings around the point; those that round to the same pixels are looked up once. */
+static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, float half_side, int rings, int first_slab,
+                                int end_slab)
 {
     float r = half_side;
     int inner[2], outer[2], next[2][2], ring, first = 0, k;
     ssao_sat__cells cells;
-    for (ring = 0; ring <= s->options.scales; ring++, r *= 1 / 3.0f) {
+    for (ring = 0; ring <= rings; ring++, r *= 1 / 3.0f) {
         next[0][0] = sat__max_int(1, (int)(r / 3 + 0.5f));
         next[1][0] = sat__max_int(next[0][0] + 1, (int)(r + 0.5f));
         next[0][1] = sat__max_int(1, (int)(r * s->camera.aspect / 3 + 0.5f));
         next[1][1] = sat__max_int(next[0][1] + 1, (int)(r * s->camera.aspect + 0.5f));
-        if (ring > 0 && (ring == s->options.scales || memcmp(next[0], inner, sizeof inner) ||
+        if (ring > 0 && (ring == rings || memcmp(next[0], inner, sizeof inner) ||
                          memcmp(next[1], outer, sizeof outer))) {
             ssao_sat__cut_cells(&cells, s, p->x, p->y, inner, outer);
             ssao_sat__add_terms(&cells, &ssao_sat__kernels[s->options.scales - 1], first, ring);
@@ -1636,6 +1647,14 @@ static inline int ssao_sat__is_flat(const ssao_sat *s, int x, int y, float half_
     return s->options.skip_flat &&
            ssao_sat__box(s, s->flags, 1, sat__max_int(x - rx, 0), sat__max_int(y - ry, 0),
                          sat__min_int(x + rx + 1, s->columns), sat__min_int(y + ry + 1, s->rows)) == 0;
+}
+
+/* How many rings, from the outermost on, have anything but one plane in sight. */
+static inline int ssao_sat__ring_count(const ssao_sat *s, int x, int y, float half_side)
+{
+    int rings = 1;
+    while (rings < s->options.scales && !ssao_sat__is_flat(s, x, y, half_side *= 1 / 3.0f)) rings++;
+    return rings;
 }
 
 static void ssao_sat__set_point(ssao_sat__point *p, const ssao_sat *s, int x, int y, size_t at)
@@ -1687,7 +1706,7 @@ static void ssao_sat__estimate_slabs(ssao_sat *s, int x, int y, ssao_sat_stats *
         side_y = (int)(half_side * s->camera.aspect) + 1;
         stats->border += x < side_x || y < side_y || x + side_x >= s->columns || y + side_y >= s->rows;
         stats->estimated++;
-        ssao_sat__add_rings(&p, s, half_side, first, end);
+        ssao_sat__add_rings(&p, s, half_side, ssao_sat__ring_count(s, x, y, half_side), first, end);
         fade *= ssao_sat__by_facing(s, &p);
         s->open[at] =
             ssao_sat__accessibility(s, ssao_sat__sum_lanes(p.occlusion[0], p.occlusion[1]), fade * s->fit.gain);
@@ -2055,6 +2074,40 @@ static void ssao_sat__upsample_lanes(const ssao_sat *s, const ssao_sat__picture_
         for (c = 0; c < 3; c++) ssao_sat__store(r->blocked[c] + first, ssao_sat__div(blocked[c], total));
 }
 
+/* Are all table pixels around these four of the picture open? Then they are, whatever the weights. */
+static inline int ssao_sat__is_open(const ssao_sat *s, int y, int first)
+{
+    const ssao_sat__f one = ssao_sat__set(1);
+    int j;
+    if (s->bent_wanted || s->is_signed) return 0;
+    for (j = sat__max_int(y / 2 - 1, 0); j <= sat__min_int(y / 2 + 1, s->rows - 1); j++) {
+        const float *open = s->open + ssao_sat__at(s, j) + (size_t)first;
+        if (ssao_sat__any_positive(ssao_sat__sub(one, ssao_sat__load(open - 1))) ||
+            ssao_sat__any_positive(ssao_sat__sub(one, ssao_sat__load(open + 1))))
+            return 0;
+    }
+    return 1;
+}
+
+/* Every second pixel of row y, from x0 on, into r. */
+static void ssao_sat__upsample_row(const ssao_sat *s, const ssao_sat__picture_row *r, int x0, int y)
+{
+    ssao_sat_stats unused;
+    int i;
+    memset(&unused, 0, sizeof unused);
+    for (i = 0; x0 + 2 * i < s->width; i += 4) {
+        int x = x0 + 2 * i;
+        if (ssao_sat__is_open(s, y, i)) {
+            ssao_sat__store(r->open + i, ssao_sat__set(1));
+            ssao_sat__store(r->z + i, ssao_sat__set(1));
+            continue;
+        }
+        ssao_sat__read_row(s, y, x, sat__min_int(x + 8, s->width), 2, r->z + i, r->nx + i, r->ny + i, r->nz + i,
+                           &unused);
+        ssao_sat__upsample_lanes(s, r, x0, y, i);
+    }
+}
+
 static void ssao_sat__write_row(const ssao_sat *s, const ssao_sat__picture_row *r, int x0, int y)
 {
     float *out = ssao_sat__out_row(s->out, s->out_stride, y);
@@ -2075,9 +2128,7 @@ static void ssao_sat__write_rows(int begin, int end, int worker, void *context)
     ssao_sat *s = (ssao_sat *)context;
     float *scratch = s->scratch + (size_t)worker * 8 * s->stride;
     ssao_sat__picture_row r;
-    ssao_sat_stats unused;
-    int y, x0, i, c;
-    memset(&unused, 0, sizeof unused);
+    int y, x0, c;
     r.z = scratch;
     r.nx = scratch + s->stride;
     r.ny = scratch + 2 * s->stride;
@@ -2090,8 +2141,7 @@ static void ssao_sat__write_rows(int begin, int end, int worker, void *context)
             continue;
         }
         for (x0 = 0; x0 < 2 && x0 < s->width; x0++) {
-            ssao_sat__read_row(s, y, x0, 2, r.z, r.nx, r.ny, r.nz, &unused);
-            for (i = 0; x0 + 2 * i < s->width; i += 4) ssao_sat__upsample_lanes(s, &r, x0, y, i);
+            ssao_sat__upsample_row(s, &r, x0, y);
             ssao_sat__write_row(s, &r, x0, y);
         }
     }
@@ -2655,15 +2705,15 @@ static const char ssao_sat__gl_range[] =
     "        if (z > 0.0) r = vec2(min(r.x, z), max(r.y, z));\n"
     "    }\n"
     "#else\n"
-    "    float least[TRIM + 1], most[TRIM + 1];\n"
+    "    float least[2 * TRIM + 1], most[2 * TRIM + 1];\n"
     "    int blocks = 0, trim;\n"
-    "    for (int i = 0; i <= TRIM; i++) least[i] = most[i] = 3e38;\n"
+    "    for (int i = 0; i <= 2 * TRIM; i++) least[i] = most[i] = 3e38;\n"
     "    for (int k = 0; k < GRID * GRID / 4; k++) {\n"
     "        vec2 v = texelFetch(finer, ivec2(k % (GRID / 2), k / (GRID / 2)), 0).xy;\n"
     "        if (!(v.y > 0.0)) continue;\n"
     "        blocks++;\n"
     "        v.y = -v.y;\n"
-    "        for (int i = 0; i <= TRIM; i++) {\n"
+    "        for (int i = 0; i <= 2 * TRIM; i++) {\n"
     "            float a = least[i], b = most[i];\n"
     "            least[i] = min(a, v.x);\n"
     "            v.x = max(a, v.x);\n"
@@ -2672,7 +2722,9 @@ static const char ssao_sat__gl_range[] =
     "        }\n"
     "    }\n"
     "    trim = min(TRIM, blocks / 16);\n"
-    "    vec2 r = blocks > 0 ? vec2(least[trim], -most[trim]) : vec2(1.0);\n"
+    "    vec2 r = vec2(0.0);\n"
+    "    for (int i = trim; i <= 2 * trim; i++) r += vec2(least[i], -most[i]) / float(trim + 1);\n"
+    "    if (blocks == 0) r = vec2(1.0);\n"
     "    r.y = max(r.x, r.y);\n"
     "#endif\n"
     "    result = vec4(r, 0.0, 0.0);\n"

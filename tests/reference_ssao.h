@@ -913,8 +913,8 @@ static const char *const ref_method_names[REF_METHODS] = {
 /* Fitted for each method by bench_ssao_sat: radius, second parameter, gain, power, and the sharpness of the blur. */
 typedef struct ref_fit { float parameters[2], sharp, gain, power; } ref_fit;
 static const ref_fit ref_fits[REF_METHODS] = {
-    {{1.4f, 0.01f}, 0.04f, 0.818f, 2.0f}, {{1.4f, 0.25f}, 0.04f, 1.646f, 1.5f}, {{2.0f, 0.3f}, 0.02f, 0.468f, 4.0f},
-    {{1.4f, 0.01f}, 0.04f, 0.818f, 2.0f}, {{1.4f, 0.25f}, 0.04f, 1.646f, 1.5f}, {{2.0f, 0.3f}, 0.02f, 0.468f, 4.0f}};
+    {{1.4f, 0.0f}, 0.04f, 0.538f, 3.0f}, {{1.4f, 0.3f}, 0.04f, 1.893f, 1.5f}, {{1.7f, 0.45f}, 0.02f, 0.233f, 8.0f},
+    {{1.4f, 0.0f}, 0.04f, 0.538f, 3.0f}, {{1.4f, 0.3f}, 0.04f, 1.893f, 1.5f}, {{1.7f, 0.45f}, 0.02f, 0.233f, 8.0f}};
 
 /* The whole method: occlusion in out, `other` is scratch of the same size. */
 static inline void ref_run(ref_method method, const ref_fit *fit, const ref_picture *p, float radius, float *out,
