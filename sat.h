@@ -30,7 +30,9 @@
    - An error bound and an expected error for every table, and a plan that picks the cheapest kind for a wanted error.
    - k-ary scans by recursive doubling and by balanced trees, with the work they do counted (Slomp 2012, chapter 4), for
      any type and operation.
-   - OpenGL 3.3 / ES 3.0 passes that build tables from textures, and GLSL functions that look boxes up.
+   - OpenGL 3.3 / ES 3.0 passes that build the tiles from textures, 1 to 4 channels at once, integers and quanta bit for
+     bit those of the CPU, without an extension; box filters and variances there, and GLSL functions that look boxes up.
+     The passes of Slomp 2012 (trees and recursive doubling, any k) over flat tables, too.
 
    WHAT IT DOES NOT
 
@@ -88,17 +90,51 @@
 
    COST
 
-   A build reads each pixel once and writes each sum once. Per pixel and channel: 4.8 bytes (TILED; 18 in a column one
-   pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE, FIXED64). A lookup reads 4 sums (TILED: up to 4 a touched tile, at most 9
-   tiles, then strips). Measured ratios, one core, SSE2 (bench_sat):
+   A build writes each sum once and reads each pixel once (TILED: twice, the second time from the cache). Per pixel and
+   channel: 4.8 bytes (TILED; 18 in a column one pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE, FIXED64). A lookup reads 4
+   sums (TILED: up to 4 a touched tile, at most 9 tiles; beyond, 16 for each super tile of 1024 pixels). Measured ratios,
+   one core of a busy machine, SSE2 (bench_sat):
 
-     build, time over a memcpy of the same traffic    512^2    2048^2   4096^2   8192^2
-       TILED                                                            2.3 to 2.7
-       FLOAT (with AVX2)                              3.1 2.2  0.9 1.1  1.0 1.0  1.3 1.4
-       DOUBLE                                         3.2      1.15     1.3      2.0
-       FIXED32, FIXED64                               5.7      1.3, 1.9 2.0, 2.3 3.0, 3.3
-     cv::integral over FLOAT                          2.6      2.5      2.4      1.6
-     lookup of random boxes, TILED over FLOAT: 1.5 to 2.1 at radius 1, 5 and 20, 6 at 100
+     build, time over a memcpy of the same traffic     512^2        2048^2       4096^2
+       TILED                                           5.1 to 5.3   2.0 to 2.7   2.2 to 2.8
+       TILED, a spike in every tile                                 3.5
+       FLOAT, DOUBLE                                   2.5 to 3.2   1.3, 1.5
+       FIXED32, FIXED64                                3.5 to 5.6   1.4, 1.9
+     cv::integral over FLOAT, over DOUBLE              2.1, 1.7     1.8, 1.4
+     box filter over cv::blur at radius 1, 5, 20, 100, 1024^2
+       TILED                                           1.0 1.0 1.2 1.4, with the build 1.7 1.5 to 2.1 1.4 to 2.2 1.7
+       FLOAT, DOUBLE, FIXED32                          0.6 to 0.9, 0.6 to 0.8, 0.5 to 0.6
+     lookup of random boxes, TILED over FLOAT: 1.5 to 2.3 at radius 1, 5 and 20, 6 to 7 at 100
+     lookup of FLOAT, sat_sums over sat_sum: 0.7
+*/
+
+/*
+   CONTENTS: each section begins with its mark
+
+   >> types                   what all six headers share: results, memory, threads, images
+   >> scans                   interface of the k-ary scans
+   >> tables                  interface: kinds, options, build, sums and means, filters, bounds, plans, streams
+   >> moments                 interface: variance and covariance
+   >> on OpenGL               interface: tables from textures, lookups in GLSL
+   >> for siblings            options and their tables, sentences, images, vectors; private
+   >> for siblings, OpenGL    functions, programs; private
+   >> for siblings, textures  textures, passes, state, time; private
+   >> scanning                the three algorithms
+   >> layout                  what a table holds, the options' rows, creation
+   >> rows                    running sums of one row, by vectors and plainly
+   >> reading pixels          what no sum can hold, rounding to integers
+   >> looking up tiles        boxes in SAT_KIND_TILED
+   >> building tiles          quanta, spikes, giants, 64-bit cells, strips
+   >> building flat tables    and what all builds share
+   >> lookups                 sums and means, borders, many boxes
+   >> filters                 box filters of whole images
+   >> bounds                  of errors, and plans
+   >> summing moments         about the mean of each tile
+   >> streams                 images a row at a time
+   >> shaders                 flat tables in GLSL
+   >> shaders of tiles        the same for tiles
+   >> passes                  the object, programs, builds on the GPU
+   >> passes of flat tables   the published algorithms, means, creation
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SAT_IMPLEMENTATION)
@@ -134,7 +170,7 @@ extern "C" {
 #endif
 
 /* ------------------------------------------------------------------------------------------------
-   Types shared by all six headers
+   >> types: shared by all six headers
    ------------------------------------------------------------------------------------------------ */
 
 /* What every fallible call of the six headers returns; sat_result_text() gives the sentence. */
@@ -201,7 +237,7 @@ SAT_DEF sat_image sat_image_f32(const float *pixels, int width, int height, int 
 SAT_DEF const char *sat_explain_image(char *text, size_t size, const sat_image *image);
 
 /* ------------------------------------------------------------------------------------------------
-   Scans: out[i] = in[0] + ... + in[i], for any associative sum (Slomp 2012, sections 4.3 to 4.5)
+   >> scans: out[i] = in[0] + ... + in[i], for any associative sum (Slomp 2012, sections 4.3 to 4.5)
    ------------------------------------------------------------------------------------------------ */
 
 typedef enum sat_scan_algorithm {
@@ -251,7 +287,7 @@ SAT_DEF sat_result sat_scan_any(void *out, const void *in, size_t n, size_t elem
 SAT_DEF double sat_reduce_f32(const float *in, size_t n, ptrdiff_t stride, int k);
 
 /* ------------------------------------------------------------------------------------------------
-   Tables: the sum over any box from four corners (Slomp 2012, eq 4.1 to 4.4)
+   >> tables: the sum over any box from four corners (Slomp 2012, eq 4.1 to 4.4)
    ------------------------------------------------------------------------------------------------ */
 
 /* How sums are stored. Bytes a pixel and channel; see NUMERICS for errors and COST for times. */
@@ -370,7 +406,7 @@ SAT_DEF sat_result sat_stream_push(sat_stream *stream, float *out_row, int *rows
 SAT_DEF void sat_stream_destroy(sat_stream *stream); /* NULL is fine */
 
 /* ------------------------------------------------------------------------------------------------
-   Moments: variance and covariance over any box, right where the variance is small beside the mean
+   >> moments: variance and covariance over any box, right where the variance is small beside the mean
    ------------------------------------------------------------------------------------------------ */
 
 typedef struct sat_moments_options {
@@ -418,7 +454,7 @@ __attribute__((used)) static int sat__hint(void) { return sat__define_SAT_IMPLEM
 #endif /* SAT_H */
 
 /* ------------------------------------------------------------------------------------------------
-   OpenGL: tables on the GPU, for GL 3.3 core and ES 3.0 / WebGL 2 (define SAT_GL)
+   >> on OpenGL: tables on the GPU, for GL 3.3 core and ES 3.0 / WebGL 2 (define SAT_GL)
    ------------------------------------------------------------------------------------------------ */
 
 #if defined(SAT_GL) && !defined(SAT__GL_API)
@@ -528,7 +564,7 @@ SAT_DEF const char *sat_gl_glsl(void);
    ------------------------------------------------------------------------------------------------ */
 
 /* ------------------------------------------------------------------------------------------------
-   For the sibling headers
+   >> for siblings
 
    What the six implementations share stands here once, as static inline functions. A sibling's
    implementation part gets it by defining SAT_SIBLING and including this header again; nothing of
@@ -1210,7 +1246,7 @@ SAT__IEEE_END
 #endif /* SAT__SHARED */
 
 /* ------------------------------------------------------------------------------------------------
-   For the sibling headers: OpenGL
+   >> for siblings, OpenGL
 
    Written for GL 3.3 core, and for ES 3.0 as long as the shaders stay within GLSL ES 3.00. A sibling
    defines SAT_SIBLING and SAT_SIBLING_GL before it includes this header in its implementation part, keeps
@@ -1734,7 +1770,8 @@ static inline sat_result sat__gl_build(sat__gl *gl, unsigned *program, const sat
     return result;
 }
 
-/* ---- textures, framebuffers. These change bindings: call them between sat__gl_begin and sat__gl_end. */
+/* ---- >> for siblings, textures: and framebuffers. These change bindings: call them between sat__gl_begin and
+   sat__gl_end. */
 
 /* The client format and type that belong to a sized internal format: floats for the float formats (half floats
    too), 32-bit integers for the 32-bit integer ones, bytes for the 8-bit ones. Returns the bytes of a pixel. */
@@ -2188,7 +2225,7 @@ SAT_DEF sat_image sat_image_f32(const float *pixels, int width, int height, int 
     return image;
 }
 
-/* ---- scans */
+/* ---- >> scanning */
 
 static const sat__field sat__scan_fields[] = {
     SAT__FIELD(sat_scan_options, 'i', algorithm, 0, 0, SAT_SCAN_BALANCED_TREE, ' '),
@@ -2509,7 +2546,7 @@ SAT_DEF double sat_reduce_f32(const float *in, size_t n, ptrdiff_t stride, int k
     return total;
 }
 
-/* ---- tables: layout
+/* ---- >> layout: of tables
 
    Corners are numbered like grid lines: corner (X, Y) holds the sum of [0,X) x [0,Y), so X = 0 and Y = 0 are a stored
    border of zeros and no lookup branches at an edge (eq 4.4 with its cases put in order). Channels are planes.
@@ -2810,7 +2847,7 @@ SAT_DEF void sat_destroy(sat_table *table)
     }
 }
 
-/* ---- tables: one row of running sums
+/* ---- >> rows: one row of running sums
 
    Each step takes eight pixels: add them to the running column sums, then make prefix sums of these eight by halves
    (pairs, fours, eight), then add the carry of the row so far. Only that last addition waits for the step before.
@@ -3072,7 +3109,7 @@ SAT__DEFINE_SUM_ROW_2(u64, uint64_t, uint64_t)
 #define sat__sum_row_u64(out, column, in, n, carry, stream, signs) ((void)(stream), sat__sum_row_plain_u64(out, column, in, n, carry, signs))
 #endif
 
-/* ---- tables: reading pixels */
+/* ---- >> reading pixels */
 
 /* How much a build looks at its pixels. Sums absorb NaN and infinity, so that a finished row tells whether it met any:
    most images are never looked at, and a band that did meet one is built again with more care. */
@@ -3185,7 +3222,7 @@ static void sat__quantise(const sat_table *t, uint64_t *out, const float *in, in
     }
 }
 
-/* ---- tables: building */
+/* ---- >> looking up tiles */
 
 typedef struct sat__build {
     sat_table *table;
@@ -3425,7 +3462,7 @@ static inline double sat__tiled_sum(const sat_table *t, int channel, int x0, int
     }
 }
 
-/* ---- tables: building tiles */
+/* ---- >> building tiles */
 
 #if defined(SAT__SSE2)
 #define SAT__PREFETCH(p) _mm_prefetch((const char *)(const void *)(p), _MM_HINT_T0)
@@ -4019,6 +4056,8 @@ static void sat__build_tiled(sat__build *b)
     sat__parallel_for(&t->options.threads, b->supers * t->channels, sat__stack_supers, b);
 }
 
+/* ---- >> building flat tables */
+
 /* The sum of a row so far, in the table's type. It travels in a variable: reading it back from the table would wait for
    the stores that went past the cache. */
 typedef union sat__carry {
@@ -4353,7 +4392,7 @@ SAT_DEF sat_stats sat_get_stats(const sat_table *table)
     return s;
 }
 
-/* ---- tables: lookups */
+/* ---- >> lookups */
 
 /* The two corner rows of a box in a flat table. */
 typedef struct sat__rows {
@@ -4615,7 +4654,7 @@ SAT_DEF double sat_mean_border(const sat_table *table, int channel, double x0, d
     return area > 0 ? sat__sum_pieces(table, channel, &px, &py) / area : 0;
 }
 
-/* ---- tables: box filters */
+/* ---- >> filters */
 
 typedef struct sat__filter {
     const sat_table *table;
@@ -4916,7 +4955,7 @@ SAT_DEF sat_result sat_box_filter_variable(float *out, ptrdiff_t out_stride, con
     return SAT_OK;
 }
 
-/* ---- error bounds */
+/* ---- >> bounds */
 
 /* Roundings that one stored sum goes through when `rows` rows of `columns` pixels are added: down the column, three
    within eight pixels, and one carry for every eight. */
@@ -5110,7 +5149,7 @@ SAT_DEF sat_result sat_plan_options(sat_options *out, const sat_image *image, in
 }
 
 
-/* ---- moments
+/* ---- >> summing moments
 
    A tile holds local sums of d = x - m and of products d d', m the tile's mean as a float. A box takes from each tile
    that it touches the count, the means and the co-moment; (n, mean, M) are joined pairwise (Chan, Golub, LeVeque 1983):
@@ -5437,7 +5476,7 @@ SAT_DEF sat_result sat_moments_filter(float *out, float *mean, ptrdiff_t out_str
     return SAT_OK;
 }
 
-/* ---- streaming
+/* ---- >> streams
 
    The table is a ring: the last 2 radius + 2 corner rows, and the strips above the tile rows that these lie in. */
 
@@ -5611,7 +5650,7 @@ SAT__IEEE_BEGIN
 extern "C" {
 #endif
 
-/* ---- shaders */
+/* ---- >> shaders */
 
 /* Two-float sums: with the larger term first, the rounding error of a sum is exact (Dekker 1971). A compiler that takes
    sums for associative would lose it, and GLSL 3.30 has no `precise`: so every rounded sum is multiplied by a 1 that
@@ -5847,7 +5886,7 @@ static const char sat__glsl_mean[] =
     "    result = STORED(sum * factor);\n"
     "}\n";
 
-/* ---- tiles: shaders
+/* ---- >> shaders of tiles
 
    The table of SAT_KIND_TILED in passes that stay inside a tile: a row of a tile is gauged (the four lanes of the CPU,
    row by row, so that the sums round alike), a tile settles its quantum and its spikes, integers are summed along the
@@ -6216,7 +6255,7 @@ static const char sat__glsl_tile_variance[] =
 
 SAT_DEF const char *sat_gl_glsl_tiles(void) { return sat__glsl_tile_lookups; }
 
-/* ---- the object */
+/* ---- >> passes: the object */
 
 enum { SAT__GL_LEVELS = 32 };
 
@@ -6652,7 +6691,7 @@ SAT_DEF sat_result sat_gl_variance(sat_gl *gl, unsigned texture, int radius)
     return sat__gl_filter_tiles(gl, SAT__GL_VARIANCE, texture, radius);
 }
 
-/* ---- programs of the flat tables */
+/* ---- >> passes of flat tables */
 
 static sat_result sat__gl_make_kernels(sat_gl *g)
 {

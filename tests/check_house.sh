@@ -160,8 +160,8 @@ check_contents() {
     offences contents "$(awk '
         /^ *CONTENTS/ { listing = 1; next }
         listing && /\*\// { listing = 0 }
-        match($0, />> [A-Za-z][A-Za-z0-9 ,_-]*/) {
-            name = substr($0, RSTART + 3, RLENGTH - 3); sub(/(  .*| +)$/, "", name)
+        match($0, /^[ \/*-]*>> [A-Za-z][A-Za-z0-9 ,_-]*/) { # not the operator
+            name = substr($0, RSTART, RLENGTH); sub(/^[^>]*>> /, "", name); sub(/(  .*| +)$/, "", name)
             if (listing) { want[++n] = name; next }
             if (name != want[++found]) print "section " name " stands where the list says " (found in want ? want[found] : "nothing")
             if (found > 1 && FNR - at > 700) print "section " last " has " FNR - at " lines"

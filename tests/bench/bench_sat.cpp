@@ -462,6 +462,74 @@ static void bench_whole_images(void)
     free(out);
 }
 
+/* ---- one scan for all: should tonemap.h and ssao_sat.h take their rows of sums modulo 2^32 from here? */
+
+enum { RING_ROWS = 64 };
+
+struct ring_work {
+    uint32_t *ring, *column;
+    const uint32_t *in;
+    int width;
+};
+
+static void ring_loop(void *user) /* what they write */
+{
+    ring_work *w = (ring_work *)user;
+    for (int y = 1; y < RING_ROWS; y++) {
+        uint32_t *row = w->ring + (size_t)y * (size_t)w->width, sum = 0;
+        const uint32_t *above = row - w->width, *in = w->in + (size_t)(y % 8) * (size_t)w->width;
+        for (int x = 0; x < w->width; x++) {
+            sum += in[x];
+            row[x] = above[x] + sum;
+        }
+    }
+}
+
+static void ring_shared(void *user)
+{
+    ring_work *w = (ring_work *)user;
+    int32_t signs = 0;
+    for (int y = 1; y < RING_ROWS; y++)
+        sat__sum_row_u32(w->ring + (size_t)y * (size_t)w->width, w->column, w->in + (size_t)(y % 8) * (size_t)w->width,
+                         w->width, 0, 0, &signs);
+}
+
+static void ring_table(void *user) /* a table of its own in memory, for the same rows of floats */
+{
+    build_work *w = (build_work *)user;
+    sat_build(w->table, &w->image);
+}
+
+static void bench_siblings(void)
+{
+    static const int widths[] = {512, 1024, 2048};
+    bench_table("One scan for siblings: a ring of 64 rows of sums modulo 2^32, time against the loop of tonemap.h",
+                "width\tshared_row_ratio\tfixed32_build_ratio\tdefault");
+    bench_note("shared_row_ratio: sat__sum_row_u32; fixed32_build_ratio: sat_build, which rounds floats as well");
+    for (int k = 0; k < 3; k++) {
+        int n = widths[k];
+        ring_work w;
+        build_work b;
+        sat_options o = sat_defaults();
+        float *p = (float *)malloc((size_t)n * RING_ROWS * 4);
+        support_fill(p, (size_t)n * RING_ROWS, 0, 1, 3);
+        w.width = n;
+        w.ring = (uint32_t *)calloc((size_t)n * RING_ROWS, 4);
+        w.column = (uint32_t *)calloc((size_t)n + 16, 4);
+        w.in = (const uint32_t *)(const void *)p;
+        o.kind = SAT_KIND_FIXED32;
+        o.max_value = 1;
+        if (sat_create(&b.table, n, RING_ROWS, 1, &o) != SAT_OK) return;
+        b.image = sat_image_f32(p, n, RING_ROWS, 1);
+        double shared = bench_ratio(ring_shared, &w, ring_loop, &w, bench_rounds(11)).ratio;
+        bench_row("%d\t%.2f\t%.2f\t%d", n, shared, bench_ratio(ring_table, &b, ring_loop, &w, bench_rounds(11)).ratio, 1);
+        sat_destroy(b.table);
+        free(p);
+        free(w.ring);
+        free(w.column);
+    }
+}
+
 /* ---- error bounds */
 
 static void bench_bounds(void)
@@ -559,6 +627,7 @@ int main(void)
 #ifdef HAVE_OPENCV
     bench_blur();
 #endif
+    bench_siblings();
     bench_bounds();
     bench_scans();
     bench_precision();
