@@ -91,9 +91,9 @@
    COST
 
    A build writes each sum once and reads each pixel once (TILED: twice, the second time from the cache). Per pixel and
-   channel: 4.8 bytes (TILED; 18 in a column one pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE, FIXED64). A lookup reads 4
-   sums (TILED: up to 4 a touched tile, at most 9 tiles; beyond, 16 for each super tile of 1024 pixels). Measured ratios,
-   one core of a busy machine, SSE2 (bench_sat):
+   channel: 4.8 bytes (TILED; 18 in a column one pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE, FIXED64). A lookup reads
+   4 sums (TILED: up to 4 a touched tile, at most 9 tiles; beyond, 16 for each super tile of 1024 pixels). Measured
+   ratios, one core of a busy machine, SSE2 (bench_sat):
 
      build, time over a memcpy of the same traffic     512^2        2048^2       4096^2
        TILED                                           5.1 to 5.3   2.0 to 2.7   2.2 to 2.8
