@@ -141,6 +141,7 @@
 #define SAT_IMPLEMENTATION
 #endif
 
+/* dist: interface */
 #ifndef SAT_H
 #define SAT_H
 
@@ -559,6 +560,7 @@ SAT_DEF const char *sat_gl_glsl(void);
 #endif
 #endif /* SAT__GL_API */
 
+/* dist: nothing */
 /* ------------------------------------------------------------------------------------------------
    Stop here if you only want to use the library.
    ------------------------------------------------------------------------------------------------ */
@@ -571,6 +573,7 @@ SAT_DEF const char *sat_gl_glsl(void);
    it is part of the interface, and names may change with any version.
    ------------------------------------------------------------------------------------------------ */
 
+/* dist: shared */
 #if (defined(SAT_IMPLEMENTATION) || defined(SAT_SIBLING)) && !defined(SAT__SHARED)
 #define SAT__SHARED
 
@@ -1244,6 +1247,7 @@ static inline int sat__version_matches(void)
 
 SAT__IEEE_END
 #endif /* SAT__SHARED */
+/* dist: nothing */
 
 /* ------------------------------------------------------------------------------------------------
    >> for siblings, OpenGL
@@ -1260,6 +1264,7 @@ SAT__IEEE_END
    A frame's calls ask nothing of the GPU that makes the CPU wait.
    ------------------------------------------------------------------------------------------------ */
 
+/* dist: shared_gl */
 #if ((defined(SAT_IMPLEMENTATION) && defined(SAT_GL)) || defined(SAT_SIBLING_GL)) && !defined(SAT__SHARED_GL)
 #define SAT__SHARED_GL
 
@@ -2187,11 +2192,13 @@ static inline double sat__gl_timer_end(sat__gl *gl, sat__gl_timer *timer)
 }
 
 #endif /* SAT__SHARED_GL */
+/* dist: nothing */
 
 /* ------------------------------------------------------------------------------------------------
    Implementation
    ------------------------------------------------------------------------------------------------ */
 
+/* dist: core */
 #if defined(SAT_IMPLEMENTATION) && !defined(SAT_IMPLEMENTED)
 #define SAT_IMPLEMENTED
 
@@ -2204,6 +2211,7 @@ extern "C" {
 const int sat__define_SAT_IMPLEMENTATION_in_exactly_one_c_file = SAT_VERSION;
 #endif
 
+/* dist: helpers */
 SAT_DEF int sat_version(void) { return SAT_VERSION; }
 
 #define SAT__RESULT_TEXT(name, text) text,
@@ -2224,6 +2232,7 @@ SAT_DEF sat_image sat_image_f32(const float *pixels, int width, int height, int 
     image.format = SAT_F32;
     return image;
 }
+/* dist: core */
 
 /* ---- >> scanning */
 

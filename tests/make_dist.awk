@@ -2,34 +2,23 @@
 #
 #     awk -f tests/make_dist.awk sat.h tonemap.h >dist/tonemap.h
 #
-# sat.h is cut at its own marks into its interface (down to "Stop here"), the parts for the sibling headers, with and
-# without OpenGL, and the implementation; a part that the header does not use stays out. Of the interface the types are
+# sat.h is cut at its marks "dist: PART" into its interface, the parts for the sibling headers, with and without OpenGL, and the
+# implementation; a part that the header does not use stays out. Of the interface the types are
 # kept, and the few functions that callers of any header need; all other functions of sat.h appear only where the header
 # is implemented, so that a file which merely includes an edition gets nothing but declarations. All editions carry the
 # same text under the same guards: several may meet in one file, and in several files of one program.
 
-BEGIN { helpers = "^(sat_version|sat_result_text|sat_image_f32)$"; part = "head" }
+BEGIN { helpers = "^(sat_version|sat_result_text|sat_image_f32)$"; part = "nothing" }
 
 function add(name, text) { text_of[name, ++size[name]] = text }
 
 # ---- sat.h, cut into parts ----
 
 FNR == NR {
-    if (part == "head" && /^#ifndef SAT_H$/) part = "interface"
-    else if (/^#if .*!defined\(SAT__SHARED\)$/) part = "shared"
-    else if (/^#if .*!defined\(SAT__SHARED_GL\)$/) part = "shared_gl"
-    else if (/^#if .*!defined\(SAT_IMPLEMENTED\)$/) part = "core"
-    else if (part == "core" && /^SAT_DEF int sat_version/) part = "helpers"
-    if (part == "interface" && /^\/\* -+$/) { held = $0; next }     # the rule above a heading, maybe of "Stop here"
-    if (part == "interface" && /Stop here if you only want/) part = "between"
-    if (part == "interface" && held != "") add(part, held)
-    held = ""
+    if (/^\/\* dist: [a-z_]+ \*\/$/) { part = $3; next }
     line = $0
     gsub(/defined\(SAT_IMPLEMENTATION\)/, "1", line)
     add(part, line)
-    if (/^#endif \/\* SAT__SHARED(_GL)? \*\/$/) part = "between"
-    if (part == "helpers" && /^SAT_DEF sat_image sat_image_f32/) last_helper = 1
-    if (last_helper && /^}/) { part = "core"; last_helper = 0 }
     next
 }
 
