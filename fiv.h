@@ -1677,7 +1677,7 @@ static void fiv__project(float *px, float *py, float box[4], const fiv__raster *
 #endif
 }
 
-/* 1 when all texels of the box are set already; *empty when it holds no texel centre. */
+/* 1 when all texels of the box are set already. */
 static inline int fiv__is_covered(const uint64_t *rows, int x0, int x1, int y0, int y1)
 {
     uint64_t bits = fiv__bits(x0, x1 + 1);

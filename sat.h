@@ -4161,6 +4161,7 @@ static void sat__tally_flat(sat_table *t, const sat_image *image)
 {
     sat__tally ignored;
     int channel, x, y;
+    memset(&ignored, 0, sizeof ignored);
     for (channel = 0; channel < t->channels; channel++) {
         sat__tally *total = &t->total[channel];
         if (!total->negative) {
@@ -4257,6 +4258,7 @@ static void sat__measure_means(sat_table *t, const sat_image *image)
 {
     sat__tally ignored;
     int channel, x, y, i;
+    memset(&ignored, 0, sizeof ignored);
     t->options.subtract_mean = 0;
     for (channel = 0; channel < t->channels; channel++) {
         double total = 0;

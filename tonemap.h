@@ -2943,7 +2943,7 @@ static const char tonemap__glsl_count[] =
 static const char tonemap__glsl_state[] =
     "uniform highp isampler2D sums;\n"
     "uniform sampler2D old, histogram;\n"
-    "uniform float weight, weight_darker, key, white, pixels, exposure, lowest, highest, dead_band;\n" /* key and white as log2, or NaN bits: estimated */
+    "uniform float weight, weight_darker, key, white, pixels, exposure, lowest, highest, dead_band;\n" /* key and white as log2; 0: estimated */
     "out vec4 value;\n"
     "float tonemap_value(int bin, float part) { return float(bin / 16 - 100) + log2(1.0 + (float(bin % 16) + part) / 16.0); }\n"
     "float tonemap_count(int bin) { return texelFetch(histogram, ivec2(bin % 64, bin / 64), 0).x; }\n"
