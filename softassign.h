@@ -390,6 +390,7 @@ extern "C" {
                                           leave */
 #define SOFTASSIGN__BOUND_FEATURES 1024 /* features beyond these are left out of the cheap bound */
 #define SOFTASSIGN__BLOCK 16           /* columns that share a block minimum */
+#define SOFTASSIGN__STEP 64            /* the same in a path on the matrix */
 
 /* A sum whose rounding error does not grow with the number of terms (Neumaier 1974). */
 typedef struct softassign__sum {
@@ -475,7 +476,8 @@ struct softassign {
     size_t bytes;
     void *block;
     int rows, columns, max_slots, padded, list, has_lists;
-    int dense;             /* costs stand in `matrix` */
+    int dense;             /* costs stand in `matrix`, or */
+    int in_place;          /* in problem.cost, as they are */
     size_t paths_from;     /* stats.work when the paths on the matrix began */
     int dense_paths;       /* and paths are searched on it, without lists */
     int unit_capacities;   /* every slot holds one row */
@@ -578,12 +580,17 @@ static inline float softassign__pair(const softassign_problem *p, int row, int c
                                 p->column_features + (size_t)column * (size_t)p->feature_count, p->feature_count);
 }
 
+static inline const float *softassign__matrix_row(const softassign *s, int row)
+{
+    return s->in_place ? softassign__cost_row(&s->problem, row) : s->matrix + (size_t)row * (size_t)s->columns;
+}
+
 /* The cost that is minimised: less the bonus for staying. */
 static inline float softassign__cost(const softassign *s, int row, int slot)
 {
     int column = softassign__column(s, slot);
     float cost;
-    if (s->dense) return s->matrix[(size_t)row * (size_t)s->columns + (size_t)column];
+    if (s->dense) return softassign__matrix_row(s, row)[column];
     cost = softassign__pair(&s->problem, row, column);
     return s->problem.previous && s->problem.previous[row] == column ? cost - s->bonus : cost;
 }
@@ -1406,52 +1413,56 @@ static void softassign__finish(softassign *s, int slot)
    slots, which are full in every assignment: any v).
    ------------------------------------------------------------------------------------------------ */
 
-#ifdef SAT__SSE2
-static inline __m128d softassign__load_two(const float *p)
+/* 1 when one of eight values cost - price is below the limit. */
+static inline int softassign__eight_below(const float *cost, const double *price, double limit)
 {
-    double two; /* floats at any address */
-    memcpy(&two, p, sizeof two);
-    return _mm_cvtps_pd(_mm_castpd_ps(_mm_set_sd(two)));
-}
+#ifdef SAT__SSE2
+    __m128 c = _mm_loadu_ps(cost), e = _mm_loadu_ps(cost + 4);
+    __m128d top = _mm_set1_pd(limit), a = _mm_sub_pd(_mm_cvtps_pd(c), _mm_loadu_pd(price)),
+            b = _mm_sub_pd(_mm_cvtps_pd(_mm_movehl_ps(c, c)), _mm_loadu_pd(price + 2)),
+            d = _mm_sub_pd(_mm_cvtps_pd(e), _mm_loadu_pd(price + 4)),
+            f = _mm_sub_pd(_mm_cvtps_pd(_mm_movehl_ps(e, e)), _mm_loadu_pd(price + 6));
+    return _mm_movemask_pd(_mm_cmplt_pd(_mm_min_pd(_mm_min_pd(a, b), _mm_min_pd(d, f)), top)) != 0;
+#else
+    int j, below = 0;
+    for (j = 0; j < 8; j++) below |= (double)cost[j] - price[j] < limit;
+    return below;
 #endif
+}
 
-/* The smallest and the second smallest cost - price of a row; ties go to the smaller index. Returns the index. */
+/* The smallest and the second smallest cost - price of a row; ties go to the smaller index. Returns the index. Few
+   eights hold one that is below the second smallest so far. */
 static int softassign__two_smallest(const float *cost, const double *price, int n, double *smallest, double *second)
 {
-    double m1, m2;
-    int j = 0, best = -1;
-#ifdef SAT__SSE2
-    double low[2], high[2], index[2];
-    __m128d a = _mm_set1_pd((double)SOFTASSIGN__INFINITY), b = a, at = _mm_set1_pd(-1), here = _mm_set_pd(1, 0),
-            two = _mm_set1_pd(2);
-    for (; j + 2 <= n; j += 2) {
-        __m128d v = _mm_sub_pd(softassign__load_two(cost + j), _mm_loadu_pd(price + j)), less = _mm_cmplt_pd(v, a);
-        b = _mm_min_pd(b, _mm_max_pd(v, a));
-        a = _mm_min_pd(v, a);
-        at = _mm_or_pd(_mm_and_pd(less, here), _mm_andnot_pd(less, at));
-        here = _mm_add_pd(here, two);
-    }
-    _mm_storeu_pd(low, a);
-    _mm_storeu_pd(high, b);
-    _mm_storeu_pd(index, at);
-    best = low[1] < low[0] || (!(low[0] < low[1]) && index[1] < index[0]);
-    m1 = low[best];
-    m2 = low[1 - best] < high[best] ? low[1 - best] : high[best];
-    best = (int)index[best];
-#else
-    m1 = m2 = (double)SOFTASSIGN__INFINITY;
-#endif
-    for (; j < n; j++) {
-        double value = (double)cost[j] - price[j];
-        if (value < m1) {
-            m2 = m1;
-            m1 = value;
-            best = j;
-        } else if (value < m2) m2 = value;
+    double m1 = (double)SOFTASSIGN__INFINITY, m2 = m1;
+    int j = 0, end, best = -1;
+    while (j < n) {
+        for (end = j + 8; end <= n && j > 0 && !softassign__eight_below(cost + j, price + j, m2); end += 8) j += 8;
+        if (end > n) end = n;
+        for (; j < end; j++) {
+            double value = (double)cost[j] - price[j];
+            if (value < m1) {
+                m2 = m1;
+                m1 = value;
+                best = j;
+            } else if (value < m2) m2 = value;
+        }
     }
     *smallest = m1;
     *second = m2;
     return best;
+}
+
+/* The smallest cost - price of a row, which is known to be at most `known`. */
+static double softassign__smallest(const float *cost, const double *price, int n, double known)
+{
+    int j = 0, k;
+    for (; j + 8 <= n; j += 8)
+        for (k = softassign__eight_below(cost + j, price + j, known) ? j : j + 8; k < j + 8; k++)
+            if ((double)cost[k] - price[k] < known) known = (double)cost[k] - price[k];
+    for (; j < n; j++)
+        if ((double)cost[j] - price[j] < known) known = (double)cost[j] - price[j];
+    return known;
 }
 
 /* A list that ended below the row's own value is made anew first when the solver is done: the bound is then tight. */
@@ -1461,9 +1472,8 @@ static double softassign__row_bound(softassign *s, int row)
     int stay = s->problem.previous ? s->problem.previous[row] : -1, own = s->slot_of_row[row];
     double least;
     if (s->dense_paths) { /* with the switching bonus, which only lowers it */
-        double second;
-        softassign__two_smallest(s->matrix + (size_t)row * (size_t)s->columns, s->price, s->columns, &least, &second);
-        return least;
+        least = own >= 0 ? (double)s->cost_of_row[row] - s->price[own] : (double)SOFTASSIGN__INFINITY;
+        return softassign__smallest(softassign__matrix_row(s, row), s->price, s->columns, least);
     }
     if (s->phase == SOFTASSIGN__DONE && own >= 0 && s->list_limit[row] < (double)s->cost_of_row[row] - s->price[own])
         softassign__relist(s, row);
@@ -1577,6 +1587,17 @@ static int softassign__auction(softassign *s, double eps, size_t budget)
    (Jonker and Volgenant 1987, with prices that never rise above 0). Capacities of 1 only.
    ------------------------------------------------------------------------------------------------ */
 
+/* One row that a path has reached, and the slots it is compared with. */
+typedef struct softassign__dense_step {
+    const float *cost;
+    double base, own_cost, own_price; /* distance, cost and price of the row's own slot */
+    const double *price;              /* of open slots */
+    double *distance, *block;         /* block: the smallest distance of SOFTASSIGN__STEP slots */
+    int *pred;
+    const int *first_row;
+    int row;
+} softassign__dense_step;
+
 static void softassign__dense_swap(softassign *s, int row, int slot)
 {
     int out = s->first_row[slot];
@@ -1591,27 +1612,33 @@ static void softassign__dense_swap(softassign *s, int row, int slot)
 static void softassign__reduce_columns(softassign *s)
 {
     int n = s->columns, i, j, *from = s->parent, *times = s->touched;
+    float *least = s->parent_cost;
     for (j = 0; j < n; j++) {
-        s->price[j] = (double)SOFTASSIGN__INFINITY;
+        least[j] = SOFTASSIGN__INFINITY;
         from[j] = -1;
         times[j] = 0;
     }
     for (i = 0; i < n; i++) {
-        const float *cost = s->matrix + (size_t)i * (size_t)n;
-        for (j = 0; j < n; j++)
-            if ((double)cost[j] < s->price[j]) {
-                s->price[j] = (double)cost[j];
-                from[j] = i;
-            }
+        const float *cost = softassign__matrix_row(s, i);
+        for (j = 0; j < n; j++) {
+#ifdef SAT__SSE2
+            while (j + 4 <= n && !_mm_movemask_ps(_mm_cmplt_ps(_mm_loadu_ps(cost + j), _mm_loadu_ps(least + j)))) j += 4;
+            if (j >= n) break;
+#endif
+            if (!(cost[j] < least[j])) continue;
+            least[j] = cost[j];
+            from[j] = i;
+        }
     }
     for (j = n - 1; j >= 0; j--) {
-        if (from[j] < 0) s->price[j] = 0;
-        else if (!times[from[j]]++) softassign__dense_swap(s, from[j], j);
+        s->price[j] = from[j] < 0 ? 0 : (double)least[j];
+        if (from[j] < 0) continue;
+        if (!times[from[j]]++) softassign__dense_swap(s, from[j], j);
     }
     for (i = 0; i < n; i++) {
         double m1, m2;
         if (times[i] != 1) continue;
-        softassign__two_smallest(s->matrix + (size_t)i * (size_t)n, s->price, n, &m1, &m2);
+        softassign__two_smallest(softassign__matrix_row(s, i), s->price, n, &m1, &m2);
         if (m2 < (double)SOFTASSIGN__INFINITY) s->price[s->slot_of_row[i]] -= m2 - m1;
     }
 }
@@ -1622,7 +1649,7 @@ static int softassign__reduce_rows(softassign *s, int *rows, int count)
     int next = 0, left = 0, j, budget = 8 * count + 64;
     while (next < count) {
         int row = rows[next++], best, other = -1, out;
-        const float *cost = s->matrix + (size_t)row * (size_t)s->columns;
+        const float *cost = softassign__matrix_row(s, row);
         double m1, m2;
         best = softassign__two_smallest(cost, s->price, s->slot_count, &m1, &m2);
         for (j = 0; m2 <= m1 && other < 0 && j < s->slot_count; j++) /* a tie: another slot of that value */
@@ -1649,97 +1676,139 @@ static int softassign__reduce_rows(softassign *s, int *rows, int count)
     return left;
 }
 
-/* Relaxes all slots from `row` and returns the nearest open one; free slots win ties. A closed slot has an infinite
-   distance here and a price of minus infinity, so that nothing is below either. */
-static int softassign__relax_dense(const float *cost, int n, double base, double own_cost, double own_price,
-                                   const double *price, double *distance, int *pred, const int *first_row, int row)
+/* The smallest of n distances. */
+static double softassign__least_distance(const double *distance, int n)
 {
     double nearest = (double)SOFTASSIGN__INFINITY;
-    int j = 0, at = -1;
+    int j = 0;
 #ifdef SAT__SSE2
     double lanes[2];
-    __m128d c0 = _mm_set1_pd(own_cost), p0 = _mm_set1_pd(own_price), from = _mm_set1_pd(base),
-            least = _mm_set1_pd(nearest), least2 = least;
+    __m128d a = _mm_set1_pd(nearest), b = a;
     for (; j + 4 <= n; j += 4) {
-        __m128 four = _mm_loadu_ps(cost + j);
-        __m128d x = _mm_sub_pd(_mm_cvtps_pd(four), c0), y = _mm_sub_pd(_mm_cvtps_pd(_mm_movehl_ps(four, four)), c0);
-        __m128d d = _mm_loadu_pd(distance + j), e = _mm_loadu_pd(distance + j + 2);
-        int less;
-        x = _mm_add_pd(from, _mm_sub_pd(x, _mm_sub_pd(_mm_loadu_pd(price + j), p0)));
-        y = _mm_add_pd(from, _mm_sub_pd(y, _mm_sub_pd(_mm_loadu_pd(price + j + 2), p0)));
-        less = _mm_movemask_pd(_mm_cmplt_pd(x, d)) | _mm_movemask_pd(_mm_cmplt_pd(y, e)) << 2;
-        d = _mm_min_pd(x, d);
-        e = _mm_min_pd(y, e);
-        least = _mm_min_pd(d, least);
-        least2 = _mm_min_pd(e, least2);
-        if (!less) continue;
-        _mm_storeu_pd(distance + j, d);
-        _mm_storeu_pd(distance + j + 2, e);
-        if (less & 1) pred[j] = row;
-        if (less & 2) pred[j + 1] = row;
-        if (less & 4) pred[j + 2] = row;
-        if (less & 8) pred[j + 3] = row;
+        a = _mm_min_pd(_mm_loadu_pd(distance + j), a);
+        b = _mm_min_pd(_mm_loadu_pd(distance + j + 2), b);
     }
-    _mm_storeu_pd(lanes, _mm_min_pd(least, least2));
+    _mm_storeu_pd(lanes, _mm_min_pd(a, b));
     nearest = lanes[1] < lanes[0] ? lanes[1] : lanes[0];
 #endif
-    for (; j < n; j++) {
-        double w = base + (((double)cost[j] - own_cost) - (price[j] - own_price));
-        if (w < distance[j]) {
-            distance[j] = w;
-            pred[j] = row;
-        }
-        nearest = distance[j] < nearest ? distance[j] : nearest;
+    for (; j < n; j++) nearest = distance[j] < nearest ? distance[j] : nearest;
+    return nearest;
+}
+
+/* Relaxes slots from a row; *changed says that a distance did. Returns a free slot that is no farther than `base`, which
+   ends the path, or -1. */
+static int softassign__relax_slots(const softassign__dense_step *q, int begin, int end, int *changed)
+{
+    int j = begin;
+#ifdef SAT__SSE2
+    __m128d c0 = _mm_set1_pd(q->own_cost), p0 = _mm_set1_pd(q->own_price), from = _mm_set1_pd(q->base);
+    __m128i row = _mm_set1_epi32(q->row);
+    for (; j + 4 <= end; j += 4) {
+        __m128 four = _mm_loadu_ps(q->cost + j);
+        __m128d x = _mm_sub_pd(_mm_cvtps_pd(four), c0), y = _mm_sub_pd(_mm_cvtps_pd(_mm_movehl_ps(four, four)), c0);
+        __m128d d = _mm_loadu_pd(q->distance + j), e = _mm_loadu_pd(q->distance + j + 2), lower, lower2;
+        __m128i less, old;
+        int near_base, k;
+        x = _mm_add_pd(from, _mm_sub_pd(x, _mm_sub_pd(_mm_loadu_pd(q->price + j), p0)));
+        y = _mm_add_pd(from, _mm_sub_pd(y, _mm_sub_pd(_mm_loadu_pd(q->price + j + 2), p0)));
+        lower = _mm_cmplt_pd(x, d);
+        lower2 = _mm_cmplt_pd(y, e);
+        if (!_mm_movemask_pd(_mm_or_pd(lower, lower2))) continue;
+        *changed = 1;
+        _mm_storeu_pd(q->distance + j, _mm_min_pd(x, d));
+        _mm_storeu_pd(q->distance + j + 2, _mm_min_pd(y, e));
+        less = _mm_castps_si128(_mm_shuffle_ps(_mm_castpd_ps(lower), _mm_castpd_ps(lower2), _MM_SHUFFLE(2, 0, 2, 0)));
+        old = _mm_loadu_si128((const __m128i *)(const void *)(q->pred + j));
+        old = _mm_or_si128(_mm_and_si128(less, row), _mm_andnot_si128(less, old));
+        _mm_storeu_si128((__m128i *)(void *)(q->pred + j), old);
+        near_base = _mm_movemask_pd(_mm_and_pd(lower, _mm_cmple_pd(x, from))) |
+                    _mm_movemask_pd(_mm_and_pd(lower2, _mm_cmple_pd(y, from))) << 2;
+        for (k = 0; near_base >> k; k++)
+            if (near_base >> k & 1 && q->first_row[j + k] < 0) return j + k;
+    }
+#endif
+    for (; j < end; j++) {
+        double w = q->base + (((double)q->cost[j] - q->own_cost) - (q->price[j] - q->own_price));
+        if (!(w < q->distance[j])) continue;
+        *changed = 1;
+        q->distance[j] = w;
+        q->pred[j] = q->row;
+        if (w <= q->base && q->first_row[j] < 0) return j;
+    }
+    return -1;
+}
+
+/* Relaxes all slots from a row and returns the nearest open one; free slots win ties. A closed slot has an infinite
+   distance here and a price of minus infinity, so that nothing is below either. */
+static int softassign__relax_dense(const softassign__dense_step *q, int n)
+{
+    double nearest = (double)SOFTASSIGN__INFINITY;
+    int j, b, end, at = -1, step = SOFTASSIGN__STEP;
+    for (b = 0; b * step < n; b++) {
+        int changed = 0;
+        end = n - b * step < step ? n : (b + 1) * step;
+        if ((j = softassign__relax_slots(q, b * step, end, &changed)) >= 0) return j;
+        if (changed) q->block[b] = softassign__least_distance(q->distance + b * step, end - b * step);
+        nearest = q->block[b] < nearest ? q->block[b] : nearest;
     }
     if (!(nearest < (double)SOFTASSIGN__INFINITY)) return -1;
-    for (j = 0; j < n; j++) {
-#ifdef SAT__SSE2
-        for (; j + 4 <= n; j += 4) /* four that are all farther */
-            if (_mm_movemask_pd(_mm_or_pd(_mm_cmple_pd(_mm_loadu_pd(distance + j), _mm_set1_pd(nearest)),
-                                          _mm_cmple_pd(_mm_loadu_pd(distance + j + 2), _mm_set1_pd(nearest))))) break;
-        if (j >= n) break;
-#endif
-        if (distance[j] > nearest) continue;
-        if (first_row[j] < 0) return j;
-        if (at < 0) at = j;
+    for (b = 0; b * step < n; b++) {
+        if (q->block[b] > nearest) continue;
+        end = n - b * step < step ? n : (b + 1) * step;
+        for (j = b * step; j < end; j++) {
+            if (q->distance[j] > nearest) continue;
+            if (q->first_row[j] < 0) return j;
+            if (at < 0) at = j;
+        }
     }
     return at;
 }
 
+/* A slot leaves the search. */
+static void softassign__close_dense(const softassign__dense_step *q, double *price, int slot, int n)
+{
+    int b = slot / SOFTASSIGN__STEP, begin = b * SOFTASSIGN__STEP;
+    q->distance[slot] = (double)SOFTASSIGN__INFINITY;
+    price[slot] = -(double)SOFTASSIGN__INFINITY;
+    q->block[b] = softassign__least_distance(q->distance + begin, sat__min_int(n - begin, SOFTASSIGN__STEP));
+}
+
 static int softassign__augment_dense(softassign *s, int root)
 {
-    const float *cost = s->matrix + (size_t)root * (size_t)s->columns;
-    double *d = s->distance, *open_price = s->dense_price, own_cost = 0, own_price = 0, base = 0,
-           least = (double)SOFTASSIGN__INFINITY;
-    int *pred = s->parent, closed = 0, row = root, j, k, end;
+    softassign__dense_step q;
+    double *d = s->distance, *open_price = s->dense_price, least, second;
+    int *pred = s->parent, closed = 0, row, j, k, end;
     s->stats.paths++;
-    for (j = 0; j < s->slot_count; j++) {
-        double value = (double)cost[j] - s->price[j];
-        d[j] = (double)SOFTASSIGN__INFINITY;
-        open_price[j] = s->price[j];
-        if (value < least) {
-            least = value;
-            own_cost = (double)cost[j];
-            own_price = s->price[j];
-        }
-    }
+    q.cost = softassign__matrix_row(s, root);
+    end = softassign__two_smallest(q.cost, s->price, s->slot_count, &least, &second);
+    if (end < 0) return 0;
+    for (j = 0; j < s->slot_count; j++) d[j] = (double)SOFTASSIGN__INFINITY;
+    memcpy(open_price, s->price, (size_t)s->slot_count * sizeof *open_price);
+    q.row = root;
+    q.base = 0;
+    q.own_cost = (double)q.cost[end];
+    q.own_price = s->price[end];
+    q.price = open_price;
+    q.distance = d;
+    q.block = s->closed_distance + s->slot_count;
+    for (k = 0; k <= s->slot_count / SOFTASSIGN__STEP; k++) q.block[k] = (double)SOFTASSIGN__INFINITY;
+    q.pred = pred;
+    q.first_row = s->first_row;
     for (;;) {
         s->stats.work++;
-        end = softassign__relax_dense(cost, s->slot_count, base, own_cost, own_price, open_price, d, pred, s->first_row,
-                                      row);
+        end = softassign__relax_dense(&q, s->slot_count);
         if (end < 0) return 0;
-        if (d[end] > base) base = d[end]; /* else rounding */
+        if (d[end] > q.base) q.base = d[end]; /* else rounding */
         if (s->first_row[end] < 0) break;
-        row = s->first_row[end];
+        q.row = s->first_row[end];
         s->closed[closed] = end;
-        s->closed_distance[closed++] = base;
-        d[end] = (double)SOFTASSIGN__INFINITY;
-        open_price[end] = -(double)SOFTASSIGN__INFINITY;
-        cost = s->matrix + (size_t)row * (size_t)s->columns;
-        own_cost = (double)cost[end];
-        own_price = s->price[end];
+        s->closed_distance[closed++] = q.base;
+        softassign__close_dense(&q, open_price, end, s->slot_count);
+        q.cost = softassign__matrix_row(s, q.row);
+        q.own_cost = (double)q.cost[end];
+        q.own_price = s->price[end];
     }
-    for (k = 0; k < closed; k++) s->price[s->closed[k]] += s->closed_distance[k] - base;
+    for (k = 0; k < closed; k++) s->price[s->closed[k]] += s->closed_distance[k] - q.base;
     for (j = end;;) {
         int old;
         row = pred[j];
@@ -2139,16 +2208,25 @@ static void softassign__leave_dense(softassign *s)
     s->phase = SOFTASSIGN__LISTS;
 }
 
-/* Half of the rows have a best column of their own, or one of several. */
-static int softassign__rows_differ(softassign *s)
+/* The first choices of a wide problem: 1 when half of the rows have a best slot of their own, or one of several. A row
+   whose slot is still free takes it and pays down to its second best; prices only fall, so that one may be nearer than
+   it was, but never farther. The others are left in s->kept. */
+static int softassign__first_choices(softassign *s, int *count)
 {
-    int i, j, different = 0;
+    int i, j, different = 0, left = 0;
     for (j = 0; j < s->columns; j++) s->touched[j] = 0;
     for (i = 0; i < s->rows; i++) {
         double m1, m2;
-        j = softassign__two_smallest(s->matrix + (size_t)i * (size_t)s->columns, s->price, s->columns, &m1, &m2);
+        if (s->slot_of_row[i] >= 0) continue;
+        j = softassign__two_smallest(softassign__matrix_row(s, i), s->price, s->columns, &m1, &m2);
         different += m2 <= m1 || j < 0 || !s->touched[j]++;
+        if (j < 0 || s->first_row[j] >= 0) s->kept[left++] = i;
+        else {
+            softassign__dense_swap(s, i, j);
+            if (m2 < (double)SOFTASSIGN__INFINITY) s->price[j] -= m2 - m1;
+        }
     }
+    *count = left;
     return different > s->rows / 2;
 }
 
@@ -2160,13 +2238,14 @@ static sat_result softassign__dense_phase(softassign *s)
     size_t spent;
     if (s->next == 0) {
         int count = 0;
-        if (large && !softassign__rows_differ(s)) {
+        if (s->rows == s->columns) {
+            if (!s->prices_known) softassign__reduce_columns(s);
+            for (i = 0; i < s->rows; i++)
+                if (s->slot_of_row[i] < 0) s->kept[count++] = i;
+        } else if (!softassign__first_choices(s, &count) && large) {
             softassign__leave_dense(s);
             return SAT_OK;
         }
-        if (s->rows == s->columns && !s->prices_known) softassign__reduce_columns(s);
-        for (i = 0; i < s->rows; i++)
-            if (s->slot_of_row[i] < 0) s->kept[count++] = i;
         s->left = softassign__reduce_rows(s, s->kept, count);
         s->left = softassign__reduce_rows(s, s->kept, s->left);
         s->stats.work += (size_t)s->rows;
@@ -2253,7 +2332,7 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
            list = rows * (size_t)s->list;
     size_t shared = seats * (sizeof(softassign__fixed) / sizeof(float));
     int workers = sat__worker_count(&s->options.threads), w;
-    if (s->dense && !sat__multiply_size(&cells, rows, (size_t)s->columns)) a->overflow = 1;
+    if (s->dense && !s->in_place && !sat__multiply_size(&cells, rows, (size_t)s->columns)) a->overflow = 1;
     s->matrix = (float *)sat__carve(a, cells, sizeof(float));
     s->price = (double *)sat__carve(a, seats, sizeof(double));
     s->top = (double *)sat__carve(a, seats, sizeof(double));
@@ -2261,7 +2340,8 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->row_distance = (double *)sat__carve(a, rows, sizeof(double));
     s->bid = (double *)sat__carve(a, rows, sizeof(double));
     s->dense_price = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
-    s->closed_distance = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
+    s->closed_distance =
+        (double *)sat__carve(a, s->dense ? seats + seats / SOFTASSIGN__STEP + 1 : 0, sizeof(double));
     s->list_limit = (double *)sat__carve(a, rows, sizeof(double));
     s->basis = (double *)sat__carve(a, (size_t)(2 * SOFTASSIGN__DIMS + 1) * (size_t)features, sizeof(double));
     s->price_f = (float *)sat__carve(a, padded, sizeof(float));
@@ -3220,6 +3300,28 @@ static sat_result softassign__check_cost(float cost)
     return sat__is_finite(cost) && fabsf(cost) > SOFTASSIGN__LARGEST_COST ? SAT_ERR_ARGUMENT : SAT_OK;
 }
 
+/* The largest |cost| as bits, in whose order infinities and NaN are above all numbers. */
+static uint32_t softassign__largest_bits(const float *cost, int n)
+{
+    uint32_t largest = 0;
+    int j = 0;
+#ifdef SAT__SSE2
+    int lanes[4], k;
+    __m128i top = _mm_setzero_si128(), rest = _mm_set1_epi32(0x7fffffff);
+    for (; j + 4 <= n; j += 4) {
+        __m128i bits = _mm_and_si128(_mm_castps_si128(_mm_loadu_ps(cost + j)), rest), more = _mm_cmpgt_epi32(bits, top);
+        top = _mm_or_si128(_mm_and_si128(more, bits), _mm_andnot_si128(more, top));
+    }
+    _mm_storeu_si128((__m128i *)(void *)lanes, top);
+    for (k = 0; k < 4; k++) largest = (uint32_t)lanes[k] > largest ? (uint32_t)lanes[k] : largest;
+#endif
+    for (; j < n; j++) {
+        uint32_t size = sat__float_bits(cost[j]) & 0x7fffffffu;
+        largest = size > largest ? size : largest;
+    }
+    return largest;
+}
+
 static void softassign__check_range(int begin, int end, int worker, void *context)
 {
     softassign *s = (softassign *)context;
@@ -3227,16 +3329,13 @@ static void softassign__check_range(int begin, int end, int worker, void *contex
     int i, j;
     (void)worker;
     for (i = begin; i < end; i++) {
-        float *copy = s->dense ? s->matrix + (size_t)i * (size_t)s->columns : NULL;
+        float *copy = s->dense && !s->in_place ? s->matrix + (size_t)i * (size_t)s->columns : NULL;
         uint32_t largest = 0;
         int *wrong = &s->list_length[i], stay = p->previous ? p->previous[i] : -1;
         *wrong = SAT_OK;
         if (p->cost) {
             const float *cost = softassign__cost_row(p, i);
-            for (j = 0; j < s->columns; j++) {
-                uint32_t size = sat__float_bits(cost[j]) & 0x7fffffffu;
-                largest = size > largest ? size : largest;
-            }
+            largest = softassign__largest_bits(cost, s->columns);
             if (copy) memcpy(copy, cost, (size_t)s->columns * sizeof(float));
         }
         for (j = 0; !p->cost && j < s->columns; j++) {
@@ -3378,6 +3477,7 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     result = softassign__make_slots(s);
     if (result != SAT_OK) return result;
     s->bonus = softassign__switching_bonus(s);
+    s->in_place = s->dense && problem->cost && s->options.method == SOFTASSIGN_AUTO && s->bonus <= 0;
     result = softassign__check_costs(s);
     if (result != SAT_OK) return result;
     for (j = 0; j < s->max_slots; j++) s->top[j] = 0;
@@ -3435,7 +3535,8 @@ SOFTASSIGN_DEF softassign_options softassign_method_defaults(softassign_method m
 
 SOFTASSIGN_DEF softassign_options softassign_defaults(void) { return softassign_method_defaults(SOFTASSIGN_AUTO); }
 
-/* What a solver of these sizes needs; `features` of the basis and `extra` mandatory slots are 0 where not wanted. */
+/* What a solver of these sizes needs; `features` of the basis and `extra` mandatory slots are 0 where not wanted. matrix: 1
+   costs are given as one, 2 and stay where they are. */
 static sat_result softassign__allocate(softassign **out, int rows, int columns, int extra, int features, int matrix,
                                        const softassign_options *options)
 {
@@ -3458,6 +3559,7 @@ static sat_result softassign__allocate(softassign **out, int rows, int columns, 
     measure.dense = method == SOFTASSIGN_ENTROPIC || method == SOFTASSIGN_PUBLISHED ||
                     (method == SOFTASSIGN_AUTO &&
                      (int64_t)rows * columns <= (matrix ? SOFTASSIGN__MATRIX_CELLS : SOFTASSIGN__DENSE_CELLS));
+    measure.in_place = measure.dense && method == SOFTASSIGN_AUTO && matrix == 2;
     measure.has_lists = 1;
     measure.list = sat__min_int(options->neighbours, measure.max_slots);
     sat__carve(&arena, 1, sizeof *s);
@@ -3959,7 +4061,8 @@ SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_
     }
     if (problem->maximise || problem->unassigned_cost > 0)
         return softassign__solve_wrapped(column_of_row, problem, &o, stats);
-    return softassign__solve_plain(column_of_row, problem, &o, problem->cost != NULL, stats);
+    return softassign__solve_plain(column_of_row, problem, &o,
+                                   !problem->cost ? 0 : problem->previous && o.switching > 0 ? 1 : 2, stats);
 }
 
 #ifndef SOFTASSIGN_NO_MOSAIC
