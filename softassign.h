@@ -98,6 +98,44 @@
      alpha decide), ants +2 to 3 %.
 */
 
+/*
+   CONTENTS (each section begins with its mark: search for it)
+
+     >> types            structs of problems, options and what a call found out
+     >> easy calls       defaults, solve, features, mosaic
+     >> full calls       create, step, explain
+     >> calls of OpenGL  the same matrix methods on the GPU
+     >> sums             limits, sums, random numbers
+     >> options          their table, and what is refused
+     >> solver           the struct of the solver
+     >> costs            of a pair, keys below them
+     >> bound            projections of features
+     >> lists            nearest columns of a row
+     >> prices           start prices of EXACT
+     >> assignment       who is where
+     >> paths            on lists
+     >> finish           columns left below their top price
+     >> certificate      the bound of prices
+     >> auction          FAST
+     >> dense            paths on the matrix
+     >> repair           fixed point of 320 bits
+     >> proof            complementary slackness
+     >> phases           what a step does next
+     >> memory           one block
+     >> greedy           GREEDY, GREEDY_2OPT
+     >> annealing        ANNEALING
+     >> ants             ANTS
+     >> entropic         ENTROPIC
+     >> published        PUBLISHED
+     >> statistics       costs, gaps, dual prices, progress
+     >> checks           NaN and what is too large
+     >> start            slots, bonus, first phase
+     >> step             softassign_create, softassign_step
+     >> solve            softassign_solve
+     >> mosaics          features, drawing
+     >> OpenGL           programs, textures, passes
+*/
+
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SOFTASSIGN_IMPLEMENTATION)
 #define SOFTASSIGN_IMPLEMENTATION
 #endif
@@ -136,6 +174,7 @@ extern "C" {
 #endif
 
 /* ------------------------------------------------------------------------------------------------
+   >> types
    Types
    ------------------------------------------------------------------------------------------------ */
 
@@ -256,6 +295,7 @@ typedef struct softassign_options {
 } softassign_options;
 
 /* ------------------------------------------------------------------------------------------------
+   >> easy calls
    Easy calls
    ------------------------------------------------------------------------------------------------ */
 
@@ -282,6 +322,7 @@ SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride
                                             int grid_height, const sat_image *target, float blend);
 
 /* ------------------------------------------------------------------------------------------------
+   >> full calls
    Full calls: anytime, and frame after frame
    ------------------------------------------------------------------------------------------------ */
 
@@ -310,6 +351,7 @@ SOFTASSIGN_DEF const char *softassign_explain_problem(char *text, size_t size, c
 #endif /* SOFTASSIGN_H */
 
 /* ------------------------------------------------------------------------------------------------
+   >> calls of OpenGL
    OpenGL: the matrix methods on the GPU, for GL 3.3 core and ES 3.0 / WebGL 2 with float render targets
    (define SOFTASSIGN_GL)
    ------------------------------------------------------------------------------------------------ */
@@ -378,6 +420,7 @@ extern "C" {
 #endif
 
 /* ------------------------------------------------------------------------------------------------
+   >> sums
    Portability, limits, small sums
    ------------------------------------------------------------------------------------------------ */
 
@@ -436,6 +479,134 @@ static inline double softassign__uniform(uint64_t *state)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> options
+   The table of options, and what is refused
+   ------------------------------------------------------------------------------------------------ */
+
+static const sat__field softassign__fields[] = {
+    SAT__FIELD(softassign_options, 'i', method, SOFTASSIGN_AUTO, SOFTASSIGN_AUTO, SOFTASSIGN_ANTS, ' '),
+    SAT__FIELD(softassign_options, 'd', gap, 0.001, 0, 1e300, 'I'),
+    SAT__FIELD(softassign_options, 'i', capacity_default, 1, 0, 2147483647, ' '),
+    SAT__FIELD(softassign_options, 'i', neighbours, 160, 4, 256, ' '),
+    SAT__FIELD(softassign_options, 'i', certify, 1, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'd', temperature, 0.3, 0, 1e30, ' '),
+    SAT__FIELD(softassign_options, 'd', cooling, 0.5, 0, 1, ' '),
+    {"iterations[0]", offsetof(softassign_options, iterations), 'i', ' ', 6, 0, 2147483647, NULL},
+    {"iterations[1]", offsetof(softassign_options, iterations) + sizeof(int), 'i', ' ', 10, 0, 2147483647, NULL},
+    {"iterations[2]", offsetof(softassign_options, iterations) + 2 * sizeof(int), 'i', ' ', 10, 0, 2147483647, NULL},
+    SAT__FIELD(softassign_options, 'd', alpha, 1, -1e30, 1e30, ' '),
+    SAT__FIELD(softassign_options, 'd', outlier, 1e6, 0, 1e30, ' '),
+    SAT__FIELD(softassign_options, 'i', outlier_evolves, 0, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'i', gold, 0, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'i', double_precision, 0, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'i', gather, 4, 2, 64, ' '),
+    SAT__FIELD(softassign_options, 'i', ants, 30, 1, 2147483647, ' '),
+    SAT__FIELD(softassign_options, 'd', evaporation, 0.1, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'd', noise, 1, 0, 1, ' '),
+    SAT__FIELD(softassign_options, 'd', switching, 0, 0, 1e6, ' '),
+    SAT__FIELD(softassign_options, 'i', grid_width, 0, 0, 2147483647, ' '),
+    SAT__FIELD(softassign_options, 'd', min_distance, 0, 0, 1e9, ' '),
+    SAT__FIELD(softassign_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(softassign_options, 't', threads, 0, 0, 0, ' '),
+};
+
+/* The table, and what one field asks of another. 1 when all is well. */
+static int softassign__explain_options(sat__text *t, const softassign_options *o)
+{
+    const sat__field *wrong = sat__fields_check(o, softassign__fields, SAT__COUNT(softassign__fields));
+    if (wrong) sat__text_field(t, wrong, o);
+    else if (o->min_distance > 0 && o->grid_width < 1)
+        sat__text_add(t, "grid_width is 0; min_distance above 0 needs the grid");
+    else if ((o->row_price || o->column_price) && (int)o->method > (int)SOFTASSIGN_EXACT)
+        sat__text_add(t, "row_price or column_price is given; only AUTO and EXACT have them");
+    else return 1;
+    return 0;
+}
+
+static int softassign__options_are_valid(const softassign_options *o)
+{
+    sat__text ignored = sat__text_begin(NULL, 0);
+    return softassign__explain_options(&ignored, o);
+}
+
+SOFTASSIGN_DEF const char *softassign_explain(char *text, size_t size, const softassign_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (options) softassign__explain_options(&t, options);
+    return text;
+}
+
+static int softassign__explain_element(sat__text *t, const char *name, int index, int value, int low, int high)
+{
+    if (value >= low && value <= high) return 1;
+    sat__text_add(t, name);
+    sat__text_add(t, "[");
+    sat__text_number(t, index);
+    sat__text_range(t, "]", value, low, high, ' ');
+    return 0;
+}
+
+/* Where the costs come from, and the lists that go with columns and rows. */
+static int softassign__explain_costs(sat__text *t, const softassign_problem *p)
+{
+    int i;
+    if (!p) sat__text_add(t, "problem is NULL");
+    else if (p->rows < 1) sat__text_range(t, "rows", p->rows, 1, 2147483647, ' ');
+    else if (p->columns < 1) sat__text_range(t, "columns", p->columns, 1, 2147483647, ' ');
+    else if (p->cost && p->stride && p->stride < p->columns && p->stride > -(ptrdiff_t)p->columns && p->rows > 1)
+        sat__text_add(t, "stride is shorter than a row of the matrix");
+    else if (!p->cost && !p->cost_fn && !p->row_features) sat__text_add(t, "cost, cost_fn and row_features are NULL");
+    else if (!p->cost && !p->cost_fn && !p->column_features) sat__text_add(t, "column_features is NULL");
+    else if (!p->cost && !p->cost_fn && p->feature_count < 1)
+        sat__text_range(t, "feature_count", p->feature_count, 1, 2147483647, ' ');
+    else if (p->maximise < 0 || p->maximise > 1) sat__text_range(t, "maximise", p->maximise, 0, 1, ' ');
+    else if (!(p->unassigned_cost >= 0 && p->unassigned_cost <= SOFTASSIGN__LARGEST_COST))
+        sat__text_range(t, "unassigned_cost", (double)p->unassigned_cost, 0, 1e30, ' ');
+    else {
+        for (i = 0; p->capacity && i < p->columns; i++)
+            if (!softassign__explain_element(t, "capacity", i, p->capacity[i], 0, 2147483647)) return 0;
+        for (i = 0; p->minimum_use && i < p->columns; i++)
+            if (!softassign__explain_element(t, "minimum_use", i, p->minimum_use[i], 0, 2147483647)) return 0;
+        for (i = 0; p->previous && i < p->rows; i++)
+            if (!softassign__explain_element(t, "previous", i, p->previous[i], -1, p->columns - 1)) return 0;
+        return 1;
+    }
+    return 0;
+}
+
+/* What not every method can do. */
+static int softassign__explain_problem(sat__text *t, const softassign_problem *p, const softassign_options *o)
+{
+    int j, exact = (int)o->method <= (int)SOFTASSIGN_FAST;
+    if (!softassign__explain_costs(t, p)) return 0;
+    for (j = 0; p->minimum_use && j < p->columns; j++)
+        if (!softassign__explain_element(t, "minimum_use", j, p->minimum_use[j], 0, p->capacity ? p->capacity[j] : o->capacity_default)) return 0;
+    if (p->minimum_use && !exact) sat__text_add(t, "minimum_use is given; only AUTO, EXACT and FAST take it");
+    else if (p->minimum_use && (o->row_price || o->column_price)) sat__text_add(t, "minimum_use is given; row_price and column_price do not go with it");
+    else if (p->maximise && !exact) sat__text_add(t, "maximise is 1; only AUTO, EXACT and FAST take it");
+    else if (p->unassigned_cost > 0 && !exact) sat__text_add(t, "unassigned_cost is above 0; only AUTO, EXACT and FAST take it");
+    else if (p->unassigned_cost > 0 && o->min_distance > 0) sat__text_add(t, "unassigned_cost is above 0; min_distance does not go with it");
+    else return 1;
+    return 0;
+}
+
+static int softassign__problem_is_valid(const softassign_problem *p)
+{
+    sat__text ignored = sat__text_begin(NULL, 0);
+    return softassign__explain_costs(&ignored, p);
+}
+
+SOFTASSIGN_DEF const char *softassign_explain_problem(char *text, size_t size, const softassign_problem *problem,
+                                                const softassign_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    softassign_options o = options ? *options : softassign_defaults();
+    if (softassign__explain_options(&t, &o)) softassign__explain_problem(&t, problem, &o);
+    return text;
+}
+
+/* ------------------------------------------------------------------------------------------------
+   >> solver
    The solver's memory
    ------------------------------------------------------------------------------------------------ */
 
@@ -539,6 +710,7 @@ static inline void softassign__set_price(softassign *s, int slot, double price)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> costs
    Costs
    ------------------------------------------------------------------------------------------------ */
 
@@ -700,6 +872,7 @@ static void softassign__keys(const softassign *s, int row, softassign__scratch *
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> bound
    The cheap bound: projection onto the main directions of the column features
    ------------------------------------------------------------------------------------------------ */
 
@@ -830,6 +1003,7 @@ static void softassign__start_bound(softassign *s)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> lists
    Lists: the slots of smallest cost - price of a row, and a limit that no other slot falls below
 
    Prices only fall while paths are searched, so a list made at some prices stays valid with its limit. It need not
@@ -988,6 +1162,7 @@ static double softassign__list_least(const softassign *s, int row)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> prices
    Softassign prices on lists
 
    min <C,X> + eps sum x ln x, row sums 1, column sums <= capacity. The projection onto a column's inequality is
@@ -1097,6 +1272,7 @@ static float softassign__price_sweep(softassign *s, float eps)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> assignment
    Assignment: rows of a slot are a chain
    ------------------------------------------------------------------------------------------------ */
 
@@ -1123,6 +1299,7 @@ static void softassign__assign(softassign *s, int row, int slot, float cost)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> paths
    Shortest augmenting paths on lists
 
    Dijkstra over slots with reduced costs (c_ij - c_ix) - (v_j - v_x), where x is the row's own slot: differences of
@@ -1335,6 +1512,7 @@ static int softassign__augment(softassign *s, int root)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> finish
    Finish: a slot with room must have its top price. Where the start prices left one below, it is raised along a
    shortest path of slots; the distance between slots a and b is the smallest reduced cost, in a, of a row of b.
    Costs of a whole column are computed, no list is needed.
@@ -1409,6 +1587,7 @@ static void softassign__finish(softassign *s, int slot)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> certificate
    The certificate: sum_i min_j (c_ij - v_j) + sum_j capacity_j v_j is below every assignment when v <= 0 (mandatory
    slots, which are full in every assignment: any v).
    ------------------------------------------------------------------------------------------------ */
@@ -1511,6 +1690,7 @@ static void softassign__certify(softassign *s)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> auction
    Auction on lists (Bertsekas 1988): every row bids for its best slot and pays down to its second best, less eps.
    The places of a slot are alike: one that is full has the price of its cheapest place, which the next bidder takes
    over (Bertsekas and Castanon 1989); one with room has its top price. So the bound loses at most eps a row.
@@ -1583,6 +1763,7 @@ static int softassign__auction(softassign *s, double eps, size_t budget)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> dense
    The dense solver for small problems: shortest augmenting paths after two rounds of augmenting row reduction
    (Jonker and Volgenant 1987, with prices that never rise above 0). Capacities of 1 only.
    ------------------------------------------------------------------------------------------------ */
@@ -1723,8 +1904,8 @@ static int softassign__relax_slots(const softassign__dense_step *q, int begin, i
         _mm_storeu_si128((__m128i *)(void *)(q->pred + j), old);
         near_base = _mm_movemask_pd(_mm_and_pd(lower, _mm_cmple_pd(x, from))) |
                     _mm_movemask_pd(_mm_and_pd(lower2, _mm_cmple_pd(y, from))) << 2;
-        for (k = 0; near_base >> k; k++)
-            if (near_base >> k & 1 && q->first_row[j + k] < 0) return j + k;
+        for (k = 0; near_base && k < 4; k++)
+            if (near_base & 1 << k && q->first_row[j + k] < 0) return j + k;
     }
 #endif
     for (; j < end; j++) {
@@ -1835,6 +2016,7 @@ static void softassign__dense_publish(softassign *s)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> repair
    Exact repair
 
    Prices are sums of costs: with costs from 1e-45 to 1e30 in one problem no double holds them. Where the proof in
@@ -2064,6 +2246,7 @@ static sat_result softassign__repair_phase(softassign *s)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> proof
    The proof: with every slot full or at its top price, no assignment is cheaper than this one less the excess, the sum
    over the rows of what their own slot's cost - price lies above the least one (complementary slackness).
    ------------------------------------------------------------------------------------------------ */
@@ -2121,6 +2304,7 @@ static int softassign__prove(softassign *s)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> phases
    The solver: phases that can be left at any time
    ------------------------------------------------------------------------------------------------ */
 
@@ -2323,6 +2507,7 @@ static sat_result softassign__advance(softassign *s, size_t budget)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> memory
    Memory
    ------------------------------------------------------------------------------------------------ */
 
@@ -2395,6 +2580,7 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
 static int softassign__progress(softassign *s, const int *seats);
 
 /* ------------------------------------------------------------------------------------------------
+   >> greedy
    Greedy search (Slomp 2012, section 3.4.2), and moves and swaps while they help
    ------------------------------------------------------------------------------------------------ */
 
@@ -2562,6 +2748,7 @@ static void softassign__take_back(softassign *s, const int *best)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> annealing
    Simulated annealing (Slomp 2012, eq 3.7 and 3.8). alpha cancels, as every state has one element a row. A slot is
    drawn at random: free, the row moves; taken, the two rows swap, which section 3.4.3 does for square problems only.
    ------------------------------------------------------------------------------------------------ */
@@ -2611,6 +2798,7 @@ static void softassign__anneal(softassign *s, int *best)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> ants
    Ants (Slomp 2012, appendix 3.A): every ant builds an assignment row by row, drawn by pheromone times similarity; all
    trails evaporate, good ones are renewed; what is shown has a share of random tiles that falls to none.
    Pheromone lies on the lists (in list_value); a row whose list is used up takes the best of some random free slots.
@@ -2736,6 +2924,7 @@ static void softassign__run_ants(softassign *s, int *best, int *leader, int *sho
 #ifndef SOFTASSIGN_NO_MATRIX
 
 /* ------------------------------------------------------------------------------------------------
+   >> entropic
    Softassign with inequality columns over the whole matrix
 
    One sweep gives, row by row, the minimum of c - v (which is the row's share of the bound and keeps exp from
@@ -2882,6 +3071,7 @@ static void softassign__entropic(softassign *s, softassign__sweep *w, double *be
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> published
    The published softassign, statement by statement (Slomp 2012, section 3.6; D = cost / largest |cost|):
 
        Q = M .* (D - alpha);  M = exp(clamp(-Q / t)) / sqrt(t)          (Gold et al. 1997: exp(clamp(-(D - alpha) / t)))
@@ -3069,6 +3259,7 @@ static int softassign__extract(softassign *s, const int *wanted)
 #endif /* SOFTASSIGN_NO_MATRIX */
 
 /* ------------------------------------------------------------------------------------------------
+   >> statistics
    Reports
    ------------------------------------------------------------------------------------------------ */
 
@@ -3167,130 +3358,9 @@ static int softassign__fill(softassign *s, int *seats)
 }
 
 /* ------------------------------------------------------------------------------------------------
-   Checks
+   >> checks
+   Checks of costs and features
    ------------------------------------------------------------------------------------------------ */
-
-static const sat__field softassign__fields[] = {
-    SAT__FIELD(softassign_options, 'i', method, SOFTASSIGN_AUTO, SOFTASSIGN_AUTO, SOFTASSIGN_ANTS, ' '),
-    SAT__FIELD(softassign_options, 'd', gap, 0.001, 0, 1e300, 'I'),
-    SAT__FIELD(softassign_options, 'i', capacity_default, 1, 0, 2147483647, ' '),
-    SAT__FIELD(softassign_options, 'i', neighbours, 160, 4, 256, ' '),
-    SAT__FIELD(softassign_options, 'i', certify, 1, 0, 1, ' '),
-    SAT__FIELD(softassign_options, 'd', temperature, 0.3, 0, 1e30, ' '),
-    SAT__FIELD(softassign_options, 'd', cooling, 0.5, 0, 1, ' '),
-    {"iterations[0]", offsetof(softassign_options, iterations), 'i', ' ', 6, 0, 2147483647, NULL},
-    {"iterations[1]", offsetof(softassign_options, iterations) + sizeof(int), 'i', ' ', 10, 0, 2147483647, NULL},
-    {"iterations[2]", offsetof(softassign_options, iterations) + 2 * sizeof(int), 'i', ' ', 10, 0, 2147483647, NULL},
-    SAT__FIELD(softassign_options, 'd', alpha, 1, -1e30, 1e30, ' '),
-    SAT__FIELD(softassign_options, 'd', outlier, 1e6, 0, 1e30, ' '),
-    SAT__FIELD(softassign_options, 'i', outlier_evolves, 0, 0, 1, ' '),
-    SAT__FIELD(softassign_options, 'i', gold, 0, 0, 1, ' '),
-    SAT__FIELD(softassign_options, 'i', double_precision, 0, 0, 1, ' '),
-    SAT__FIELD(softassign_options, 'i', gather, 4, 2, 64, ' '),
-    SAT__FIELD(softassign_options, 'i', ants, 30, 1, 2147483647, ' '),
-    SAT__FIELD(softassign_options, 'd', evaporation, 0.1, 0, 1, ' '),
-    SAT__FIELD(softassign_options, 'd', noise, 1, 0, 1, ' '),
-    SAT__FIELD(softassign_options, 'd', switching, 0, 0, 1e6, ' '),
-    SAT__FIELD(softassign_options, 'i', grid_width, 0, 0, 2147483647, ' '),
-    SAT__FIELD(softassign_options, 'd', min_distance, 0, 0, 1e9, ' '),
-    SAT__FIELD(softassign_options, 'a', allocator, 0, 0, 0, ' '),
-    SAT__FIELD(softassign_options, 't', threads, 0, 0, 0, ' '),
-};
-
-/* The table, and what one field asks of another. 1 when all is well. */
-static int softassign__explain_options(sat__text *t, const softassign_options *o)
-{
-    const sat__field *wrong = sat__fields_check(o, softassign__fields, SAT__COUNT(softassign__fields));
-    if (wrong) sat__text_field(t, wrong, o);
-    else if (o->min_distance > 0 && o->grid_width < 1)
-        sat__text_add(t, "grid_width is 0; min_distance above 0 needs the grid");
-    else if ((o->row_price || o->column_price) && (int)o->method > (int)SOFTASSIGN_EXACT)
-        sat__text_add(t, "row_price or column_price is given; only AUTO and EXACT have them");
-    else return 1;
-    return 0;
-}
-
-static int softassign__options_are_valid(const softassign_options *o)
-{
-    sat__text ignored = sat__text_begin(NULL, 0);
-    return softassign__explain_options(&ignored, o);
-}
-
-SOFTASSIGN_DEF const char *softassign_explain(char *text, size_t size, const softassign_options *options)
-{
-    sat__text t = sat__text_begin(text, size);
-    if (options) softassign__explain_options(&t, options);
-    return text;
-}
-
-static int softassign__explain_element(sat__text *t, const char *name, int index, int value, int low, int high)
-{
-    if (value >= low && value <= high) return 1;
-    sat__text_add(t, name);
-    sat__text_add(t, "[");
-    sat__text_number(t, index);
-    sat__text_range(t, "]", value, low, high, ' ');
-    return 0;
-}
-
-/* Where the costs come from, and the lists that go with columns and rows. */
-static int softassign__explain_costs(sat__text *t, const softassign_problem *p)
-{
-    int i;
-    if (!p) sat__text_add(t, "problem is NULL");
-    else if (p->rows < 1) sat__text_range(t, "rows", p->rows, 1, 2147483647, ' ');
-    else if (p->columns < 1) sat__text_range(t, "columns", p->columns, 1, 2147483647, ' ');
-    else if (p->cost && p->stride && p->stride < p->columns && p->stride > -(ptrdiff_t)p->columns && p->rows > 1)
-        sat__text_add(t, "stride is shorter than a row of the matrix");
-    else if (!p->cost && !p->cost_fn && !p->row_features) sat__text_add(t, "cost, cost_fn and row_features are NULL");
-    else if (!p->cost && !p->cost_fn && !p->column_features) sat__text_add(t, "column_features is NULL");
-    else if (!p->cost && !p->cost_fn && p->feature_count < 1)
-        sat__text_range(t, "feature_count", p->feature_count, 1, 2147483647, ' ');
-    else if (p->maximise < 0 || p->maximise > 1) sat__text_range(t, "maximise", p->maximise, 0, 1, ' ');
-    else if (!(p->unassigned_cost >= 0 && p->unassigned_cost <= SOFTASSIGN__LARGEST_COST))
-        sat__text_range(t, "unassigned_cost", (double)p->unassigned_cost, 0, 1e30, ' ');
-    else {
-        for (i = 0; p->capacity && i < p->columns; i++)
-            if (!softassign__explain_element(t, "capacity", i, p->capacity[i], 0, 2147483647)) return 0;
-        for (i = 0; p->minimum_use && i < p->columns; i++)
-            if (!softassign__explain_element(t, "minimum_use", i, p->minimum_use[i], 0, 2147483647)) return 0;
-        for (i = 0; p->previous && i < p->rows; i++)
-            if (!softassign__explain_element(t, "previous", i, p->previous[i], -1, p->columns - 1)) return 0;
-        return 1;
-    }
-    return 0;
-}
-
-/* What not every method can do. */
-static int softassign__explain_problem(sat__text *t, const softassign_problem *p, const softassign_options *o)
-{
-    int j, exact = (int)o->method <= (int)SOFTASSIGN_FAST;
-    if (!softassign__explain_costs(t, p)) return 0;
-    for (j = 0; p->minimum_use && j < p->columns; j++)
-        if (!softassign__explain_element(t, "minimum_use", j, p->minimum_use[j], 0, p->capacity ? p->capacity[j] : o->capacity_default)) return 0;
-    if (p->minimum_use && !exact) sat__text_add(t, "minimum_use is given; only AUTO, EXACT and FAST take it");
-    else if (p->minimum_use && (o->row_price || o->column_price)) sat__text_add(t, "minimum_use is given; row_price and column_price do not go with it");
-    else if (p->maximise && !exact) sat__text_add(t, "maximise is 1; only AUTO, EXACT and FAST take it");
-    else if (p->unassigned_cost > 0 && !exact) sat__text_add(t, "unassigned_cost is above 0; only AUTO, EXACT and FAST take it");
-    else if (p->unassigned_cost > 0 && o->min_distance > 0) sat__text_add(t, "unassigned_cost is above 0; min_distance does not go with it");
-    else return 1;
-    return 0;
-}
-
-static int softassign__problem_is_valid(const softassign_problem *p)
-{
-    sat__text ignored = sat__text_begin(NULL, 0);
-    return softassign__explain_costs(&ignored, p);
-}
-
-SOFTASSIGN_DEF const char *softassign_explain_problem(char *text, size_t size, const softassign_problem *problem,
-                                                const softassign_options *options)
-{
-    sat__text t = sat__text_begin(text, size);
-    softassign_options o = options ? *options : softassign_defaults();
-    if (softassign__explain_options(&t, &o)) softassign__explain_problem(&t, problem, &o);
-    return text;
-}
 
 /* What is wrong with a row of costs; also the copy into the matrix. Costs that are finite and small enough pass a
    comparison of exponents; only a row with others is looked at more closely. */
@@ -3386,6 +3456,7 @@ static sat_result softassign__check_costs(softassign *s)
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> start
    Starting a problem
    ------------------------------------------------------------------------------------------------ */
 
@@ -3503,6 +3574,7 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> step
    Public: create, step, destroy
    ------------------------------------------------------------------------------------------------ */
 
@@ -3659,6 +3731,7 @@ SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> solve
    Public: one problem, any method
    ------------------------------------------------------------------------------------------------ */
 
@@ -4068,6 +4141,7 @@ SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_
 #ifndef SOFTASSIGN_NO_MOSAIC
 
 /* ------------------------------------------------------------------------------------------------
+   >> mosaics
    Public: photomosaics
    ------------------------------------------------------------------------------------------------ */
 
@@ -4171,6 +4245,7 @@ SAT__IEEE_END
 #endif /* SOFTASSIGN_IMPLEMENTATION */
 
 /* ------------------------------------------------------------------------------------------------
+   >> OpenGL
    OpenGL (Slomp 2012, section 3.7)
 
    Textures are columns x rows, R32F. Sums are trees: a pass writes the sum of `gather` texels along one axis, until one
