@@ -29,7 +29,8 @@ static float take_float(input *in)
 
 static void query(const sat_table *t, input *in)
 {
-    int i;
+    int i, box[8];
+    double sums[2];
     volatile double sink = 0;
     for (i = 0; i < 8; i++) {
         int x0 = (int)take(in, 0), y0 = (int)take(in, 0), x1 = (int)take(in, 0), y1 = (int)take(in, 0);
@@ -38,6 +39,10 @@ static void query(const sat_table *t, input *in)
         sink += sat_sum_fractional(t, 0, fx, fy, (double)take_float(in), (double)take_float(in));
         sink += sat_mean_border(t, 0, fx, fy, (double)take_float(in), fy + 3, (sat_border)take(in, 5),
                                 (sat_border)take(in, 5));
+        box[0] = x0, box[1] = y0, box[2] = x1, box[3] = y1;
+        box[4] = x0 % 64, box[5] = y0 % 64, box[6] = x1 % 64, box[7] = y1 % 64;
+        sat_sums(sums, t, i % 5 - 1, box, 2);
+        sink += sums[0] + sums[1] + sat_error_bound_box(t, 0, x0 % 64, y0 % 64, x1, y1);
         sink += sat_error_bound(t, 0, x0, y0) + sat_error_rms(t, 0, x1, y1) + (double)sat_restore(t, 0, x0, y0);
     }
 }
