@@ -32,11 +32,11 @@
    - rho^2 times the vector is interpolated, samples inside the mesh are left out, and where the horizon cuts an
      occluder (by the extent of the mesh, not of its ball) a clipped cap in closed form stands for it; the published
      factor (d + R) / 2R makes a FIV, which is too small there, smaller still, and remains as FIV_TRILINEAR.
-   - Suns leave the cube as directional lights with exact direction and power. Their shadow is the interpolated distance
-     to the silhouette, not an interpolated bit.
-   - Near contact no interpolation is right: an occluder that keeps its mesh (keep_mesh) draws a mask for each such
-     receiver, and the edges of its suns are rays: what rests on a floor does not leak, and ears keep their shadows.
-     fiv_irradiance only; OpenGL, self-shadows and loaded occluders interpolate.
+   - Suns and lamps, up to 32, leave the cube as directional lights with their direction, power and angular size. Each
+     occluder has a depth map along each of them; the light's disc past it is the penumbra, a ray answers where the map
+     of a sharp sun is not sure.
+   - Near contact no interpolation is right: there receivers draw masks of their own, and what rests on a floor does not
+     leak. Receivers in a row, such as pixels, share them. fiv_irradiance only; OpenGL and self-shadows interpolate.
    - Overlapping occluders: the union of their masks (FIV_MASK), or discs of their true solid angle; never below 0.
    Deviations from the text: sums carry the solid angle of their texels, which eq 6 to 10 leave out; a sample's position
    is the occluder's centre minus the receiver; the first shell is free (0.3 R halves the error of the inner tangent
@@ -53,10 +53,11 @@
      FIV_NO_SELF         no self-shadows (eq 13)             FIV_NO_DELTA          no split-off lights
 
    MEMORY, THREADS, ERRORS
-   An environment is one block; an occluder has one each for tables, masks (keep_masks) and mesh (keep_mesh, or no
-   keep_masks). Only create, share and load allocate. Functions take sat_threads in their options; different objects may
-   be used at once, and any number of threads may call fiv_irradiance on the same ones. All arguments are checked in
-   every build. No function takes more than 32 KB of stack; at most 256 workers take part in one fiv_irradiance.
+   An environment is one block; an occluder has one each for tables, mesh and masks (keep_masks). Only create, share and
+   load allocate; X_explain says in a sentence what was refused. Functions take sat_threads in their options; different
+   objects may be used at once, and any number of threads may call fiv_irradiance on the same ones. All arguments are
+   checked in every build. No function takes more than 32 KB of stack; at most 256 workers take part in one
+   fiv_irradiance.
 
    ROWS, LIGHT, FAILURES
    Light is linear radiance (decode sRGB first), and so are the results. The stride of the picture is in bytes: 0
@@ -73,25 +74,53 @@
    - A texel of 1e8 changes no other vector: relative error of a span sum below 1e-10 (double prefixes), of the power of
      a split-off light 4e-5 (beside the poles of the image up to 2 % of it stays in the cube). Masks equal rays through
      the texel centres but for rays that graze an edge (2e-6 of the texels set).
-   - OpenGL: within 2e-3 of the largest irradiance of fiv_irradiance and fiv_self_irradiance with cutoff 0, 1e-4 rms.
-   - I_tot: within 6e-4 of its largest value of the sum over all texels. Turned vectors: 1.7 % rms of the same
-     vectors computed from a turned mesh.
+   - OpenGL: half floats, filtered by the hardware: within 2e-3 of the largest irradiance of fiv_irradiance and
+     fiv_self_irradiance with cutoff, own_masks and rays 0, 1e-4 rms (measured 1e-4 and 2e-5, in software).
+   - Of neighbours that share a mask each is within own_tolerance of its own, as far as the masks of both ends say.
+   - I_tot: within 6e-4 of its largest value of the sum over all texels. Turned vectors: 1.7 % rms of the same vectors
+     computed from a turned mesh.
    - Receivers up to 1e9 radii away, anywhere inside and on the mesh, scale 0. Below the first shell its samples stand.
 
    COST (tests/bench/bench_fiv.c; bunny of 3674 triangles, one core; ratios of one run). NRMSE is eq 17 on a plane below
    the bunny against rays to every texel, in brackets the published one:
      samples      NRMSE forest    city    1 point light    masks made  light again  vectors  masks
-     32x17x15     0.014 (0.023)   0.026   0.051 (0.1)      1.3 s       5 to 8 ms    0.33 MB  1.2 MB   default
-     64x33x30     0.006 (0.008)   0.013   0.037            10 s        30 ms        2.5 MB   8.9 MB
-   - A receiver costs 0.15 us an occluder, 350 to 550 times less than its rays; FIV_MASK 1 to 2 us where masks are
-     needed.
-   - keep_mesh, a floor 3 R wide that the mesh stands on, 32x17x15, forest: NRMSE of the box 0.090 -> 0.004, of the
-     queen 0.069 -> 0.005, of a bare sun 0.14 -> 0. A mask takes 0.01 ms (box) to 0.5 ms (queen, 10k triangles), for 10
-     to 40 % of these receivers; a ray 1 to 2 us, for 35 to 60 %.
+     32x17x15     0.014 (0.023)   0.011   0.002 (0.1)      1.3 s       6 to 10 ms   0.33 MB  1.2 MB   default
+     64x33x30     0.006 (0.008)                            10 s        30 ms        2.5 MB   8.9 MB
+   - A receiver costs 0.17 to 0.45 us an occluder (the more the wider its lights), 300 to 800 times less than its rays;
+     FIV_MASK 1 to 2 us where masks are needed. Depth maps take 0.5 MB an occluder.
+   - Standing on a floor 3 R wide, forest, gap 0 and 0.002 R; interpolated -> with own masks (default), and the same at
+     64x33x30: box 0.087 -> 0.004 (0.003), queen 0.065 -> 0.005 (0.0024), fandisk 0.031 -> 0.007 (0.0036), bunny 0.032
+     -> 0.005 (0.0023), dragon of 11k triangles 0.006 (0.0032). The box ends at 0.003: where a row of the cube's texels
+     goes behind an edge at once the light itself is a step (0.007, 0.0034, 0.002 with 16, 32, 64 texels).
+   - An own mask takes 0.01 ms (box) to 0.5 ms (queen, 10k triangles) for 10 to 40 % of those receivers. In a picture
+     few pixels stand so near and share: demo, 1280 x 720 x 4, two sculptures: 3.2 % of the ground's pixels, 3.0 us a
+     pixel in place of 0.6; 7.1 unshared, 1.7 with own_tolerance 0.03.
+   - Suns, floor 4 R wide below the bunny: a bare sun has the error 0 of rays at 0.2 us (rays for 0.5 % of receivers;
+     maps alone 0.017); beside 128 of Embree's rays to lights drawn by power and cosine the error in city is 0.006 to
+     0.012, in night 0.003 to 0.017, in forest 0.004 to 0.016, at 1.2 to 1.5 times the time on the floor, at 1/20 to
+     1/60 of it where nothing is in contact. Twenty lamps: 0.0005, with 8 lights 0.04. A disc's penumbra: 0.008, as of a
+     point 0.07.
    - A mask costs 0.94 times Embree's eight-wide rays at 3.7k triangles, 1.3 to 1.75 times at 11k to 48k.
    - Two occluders, 64x33x30: NRMSE 0.034 with eq 14-15, 0.0105 FIV_SCALED, 0.007 FIV_MASK.
    - Cut by the horizon: FIV_SCALED has 0.14 to 0.36 of the error of (d + R) / 2R at d = 0 to 0.6 R.
    - Half octahedral storage: 0.29 times the published memory at 1.16 times the error (64x33x30).
+
+   CONTENTS (each mark stands once more, where its section begins)
+   >> interface      environments, occluders, receivers, deforming occluders; the OpenGL part
+   >> options        tables of options, defaults, X_explain
+   >> geometry       vectors, the cube's faces
+   >> environments   from the image to the cube; directional lights
+   >> integrals      prefix sums of the cube's rows, I_tot
+   >> meshes         clusters, bounding ball
+   >> masks          cones on rows of bits, rays, spans
+   >> samples        shells, grids, cells
+   >> occluders      creation, support function, all masks
+   >> lighting       depth maps of the lights, vectors
+   >> lookups        one occluder above one receiver: vectors, own masks, lights
+   >> receivers      several occluders, tiles, self-shadows, lazy samples
+   >> saves          saving and loading
+   >> shaders        GLSL
+   >> opengl         textures, scenes, passes
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(FIV_IMPLEMENTATION)
@@ -134,6 +163,7 @@ extern "C" {
 #endif
 
 /* ------------------------------------------------------------------------------------------------
+   >> interface
    Environments: the light
    ------------------------------------------------------------------------------------------------ */
 
@@ -432,7 +462,134 @@ extern "C" {
 
 FIV_DEF int fiv_version(void) { return FIV_VERSION; }
 
-/* ---- small vectors and matrices */
+/* >> options   ---- defaults, ranges and sentences */
+
+static const sat__field fiv__environment_fields[] = {
+    SAT__FIELD(fiv_environment_options, 'i', resolution, 32, 8, 64, ' '),
+    SAT__FIELD(fiv_environment_options, 'f', delta_ratio, 100, 0, 1e38, ' '),
+    SAT__FIELD(fiv_environment_options, 'i', max_lights, 32, 0, FIV_MAX_LIGHTS, ' '),
+    SAT__FIELD(fiv_environment_options, 'f', max_radiance, 1e10, 1e-30, 1e38, ' '),
+    SAT__FIELD(fiv_environment_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(fiv_environment_options, 't', threads, 0, 0, 0, ' '),
+};
+
+FIV_DEF fiv_environment_options fiv_environment_defaults(void)
+{
+    fiv_environment_options o;
+    sat__fields_default(&o, sizeof o, fiv__environment_fields, SAT__COUNT(fiv__environment_fields));
+    return o;
+}
+
+FIV_DEF const char *fiv_explain_environment(char *text, size_t size, const sat_image *image,
+                                            const fiv_environment_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    const sat__field *wrong =
+        options ? sat__fields_check(options, fiv__environment_fields, SAT__COUNT(fiv__environment_fields)) : NULL;
+    if (!sat__image_is_valid(image)) return sat_explain_image(text, size, image);
+    if (image->channels == 2) sat__text_add(&t, "channels is 2; 1, 3 or 4");
+    else if (image->width > 1 << 20) sat__text_range(&t, "width", image->width, 1, 1 << 20, ' ');
+    else if (image->height > 1 << 20) sat__text_range(&t, "height", image->height, 1, 1 << 20, ' ');
+    else if (wrong) sat__text_field(&t, wrong, options);
+    return t.size ? text : "";
+}
+
+static const sat__field fiv__occluder_fields[] = {
+    SAT__FIELD(fiv_occluder_options, 'i', theta, 32, 4, 4096, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', phi, 17, 3, 2049, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', rho, 15, 2, 256, ' '),
+    SAT__FIELD(fiv_occluder_options, 'f', first_shell, 0.3, 1e-6, 1000, ' '),
+    SAT__FIELD(fiv_occluder_options, 'f', last_shell, 6, 1e-6, 1000, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', resolution, 32, 8, 64, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', storage, FIV_STORAGE_FLOAT, FIV_STORAGE_FLOAT, FIV_STORAGE_HALF_OCTAHEDRAL, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', keep_masks, 1, 0, 1, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', lazy, 0, 0, 1, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', sun_map, 512, 64, 4096, ' '),
+    SAT__FIELD(fiv_occluder_options, 'a', allocator, 0, 0, 0, ' '),
+    SAT__FIELD(fiv_occluder_options, 't', threads, 0, 0, 0, ' '),
+};
+
+FIV_DEF fiv_occluder_options fiv_occluder_defaults(void)
+{
+    fiv_occluder_options o;
+    sat__fields_default(&o, sizeof o, fiv__occluder_fields, SAT__COUNT(fiv__occluder_fields));
+    return o;
+}
+
+static int fiv__explain_occluder_options(sat__text *t, const fiv_occluder_options *o)
+{
+    const sat__field *wrong = sat__fields_check(o, fiv__occluder_fields, SAT__COUNT(fiv__occluder_fields));
+    if (wrong) sat__text_field(t, wrong, o);
+    else if (o->theta & 1) sat__text_add(t, "theta is odd");
+    else if (!(o->first_shell < o->last_shell)) sat__text_add(t, "last_shell is not beyond first_shell");
+    else if (o->keep_masks && o->lazy) sat__text_add(t, "lazy is 1 with keep_masks; what deforms keeps none");
+#ifdef FIV_NO_MASKS
+    else if (o->keep_masks) sat__text_add(t, "keep_masks is 1; 0 with FIV_NO_MASKS");
+#endif
+    else return 1;
+    return 0;
+}
+
+static int fiv__occluder_options_are_valid(const fiv_occluder_options *o)
+{
+    sat__text ignored = sat__text_begin(NULL, 0);
+    return fiv__explain_occluder_options(&ignored, o);
+}
+
+/* 0 and a sentence where an index is beyond the vertices, or a pointer is missing. */
+static int fiv__explain_mesh(sat__text *t, const float *positions, size_t vertex_count, const unsigned *indices,
+                             size_t triangle_count)
+{
+    size_t i;
+    if (triangle_count && (!positions || !indices)) sat__text_add(t, "positions or indices are NULL");
+    else {
+        for (i = 0; i < 3 * triangle_count && indices[i] < vertex_count; i++) {}
+        if (i == 3 * triangle_count) return 1;
+        sat__text_add(t, "triangle ");
+        sat__text_number(t, (double)(i / 3));
+        sat__text_add(t, ": its index is ");
+        sat__text_number(t, (double)indices[i]);
+        sat__text_add(t, " of ");
+        sat__text_number(t, (double)vertex_count);
+        sat__text_add(t, " vertices");
+    }
+    return 0;
+}
+
+FIV_DEF const char *fiv_explain_occluder(char *text, size_t size, const float *positions, size_t vertex_count,
+                                         const unsigned *indices, size_t triangle_count,
+                                         const fiv_occluder_options *options)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (vertex_count > 0x7fffffff || triangle_count > 0x7fffffff / 3) sat__text_add(&t, "more than 2147483647 vertices or indices");
+    else if (!options || fiv__explain_occluder_options(&t, options))
+        fiv__explain_mesh(&t, positions, vertex_count, indices, triangle_count);
+    return t.size ? text : "";
+}
+
+enum { FIV__TILE = 64, FIV__SHARES = 256 };
+
+static const sat__field fiv__irradiance_fields[] = {
+    SAT__FIELD(fiv_irradiance_options, 'i', accuracy, FIV_SCALED, FIV_NEAREST, FIV_MASK, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', partial, 1, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', overlap, 1, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'f', cutoff, 0.001, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', own_masks, FIV__TILE, 0, FIV__TILE, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', own_triangles, 20000, 0, 2147483647, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'f', own_tolerance, 0.01, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', rays, 1, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'f', penumbra, 1, 0, 100, ' '),
+    SAT__FIELD(fiv_irradiance_options, 't', threads, 0, 0, 0, ' '),
+};
+
+FIV_DEF fiv_irradiance_options fiv_irradiance_defaults(void)
+{
+    fiv_irradiance_options o;
+    sat__fields_default(&o, sizeof o, fiv__irradiance_fields, SAT__COUNT(fiv__irradiance_fields));
+    return o;
+}
+
+/* >> geometry   ---- small vectors and matrices */
 
 static inline float fiv__dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -560,6 +717,8 @@ static inline double fiv__texel_angle(int x, int y, int size)
            fiv__corner_angle(u0, v0);
 }
 
+/* >> environments */
+
 /* ---- environments */
 
 enum {
@@ -597,36 +756,6 @@ struct fiv_environment {
     double *sums;        /* its integrals */
     double *angles;      /* solid angles of the texels of a face */
 };
-
-static const sat__field fiv__environment_fields[] = {
-    SAT__FIELD(fiv_environment_options, 'i', resolution, 32, 8, 64, ' '),
-    SAT__FIELD(fiv_environment_options, 'f', delta_ratio, 100, 0, 1e38, ' '),
-    SAT__FIELD(fiv_environment_options, 'i', max_lights, 32, 0, FIV_MAX_LIGHTS, ' '),
-    SAT__FIELD(fiv_environment_options, 'f', max_radiance, 1e10, 1e-30, 1e38, ' '),
-    SAT__FIELD(fiv_environment_options, 'a', allocator, 0, 0, 0, ' '),
-    SAT__FIELD(fiv_environment_options, 't', threads, 0, 0, 0, ' '),
-};
-
-FIV_DEF fiv_environment_options fiv_environment_defaults(void)
-{
-    fiv_environment_options o;
-    sat__fields_default(&o, sizeof o, fiv__environment_fields, SAT__COUNT(fiv__environment_fields));
-    return o;
-}
-
-FIV_DEF const char *fiv_explain_environment(char *text, size_t size, const sat_image *image,
-                                            const fiv_environment_options *options)
-{
-    sat__text t = sat__text_begin(text, size);
-    const sat__field *wrong =
-        options ? sat__fields_check(options, fiv__environment_fields, SAT__COUNT(fiv__environment_fields)) : NULL;
-    if (!sat__image_is_valid(image)) return sat_explain_image(text, size, image);
-    if (image->channels == 2) sat__text_add(&t, "channels is 2; 1, 3 or 4");
-    else if (image->width > 1 << 20) sat__text_range(&t, "width", image->width, 1, 1 << 20, ' ');
-    else if (image->height > 1 << 20) sat__text_range(&t, "height", image->height, 1, 1 << 20, ' ');
-    else if (wrong) sat__text_field(&t, wrong, options);
-    return t.size ? text : "";
-}
 
 /* ---- from the image to the source cube: every image texel is cut into `cut` x `cut` points, and a patch of the cube
    takes the weighted mean of the points that fall into it */
@@ -923,6 +1052,8 @@ static void fiv__split_lights(fiv_environment *e, const sat_image *image)
 }
 
 #endif /* FIV_NO_DELTA */
+
+/* >> integrals */
 
 /* ---- from the source cube to the integrals, seen from any frame */
 
@@ -1262,6 +1393,8 @@ FIV_DEF size_t fiv_environment_lights(float *directions, float *powers, size_t c
     return split + texels;
 }
 
+/* >> meshes */
+
 /* ---- meshes: clusters of up to 64 triangles that lie near each other, with their own vertices as three arrays */
 
 enum {
@@ -1517,6 +1650,8 @@ static void fiv__mesh_layout(fiv__mesh *mesh, sat__arena *arena)
     mesh->source = (uint32_t *)sat__carve(arena, vertices, sizeof(uint32_t));
     mesh->corner = (unsigned char *)sat__carve(arena, 3 * mesh->triangle_count, 1);
 }
+
+/* >> masks */
 
 /* ---- masks: which texels a mesh covers, seen from the origin when its centre stands at `offset`. One word a row, a
    bit a texel, set when the ray through the texel's centre meets a triangle, borders included. The triangle is the cone
@@ -1982,6 +2117,8 @@ static void fiv__integrate_above(double sum[FIV__TERMS], const double *sums, con
 }
 #endif
 
+/* >> samples */
+
 /* ---- the positions of the samples: shells of logarithmic radii, on each a grid of directions */
 
 enum { FIV__MAX_SHELLS = 256 };
@@ -2085,6 +2222,8 @@ static void fiv__locate(fiv__cell *cell, const fiv__grid *g, const float c[3])
     cell->shell = k;
 }
 
+/* >> occluders */
+
 /* ---- occluders */
 
 enum {
@@ -2125,79 +2264,6 @@ struct fiv_occluder {
 static inline uint16_t *fiv__half_sample(const fiv_occluder *o, size_t sample)
 {
     return o->half_table + 1 + FIV__TERMS * sample;
-}
-
-static const sat__field fiv__occluder_fields[] = {
-    SAT__FIELD(fiv_occluder_options, 'i', theta, 32, 4, 4096, ' '),
-    SAT__FIELD(fiv_occluder_options, 'i', phi, 17, 3, 2049, ' '),
-    SAT__FIELD(fiv_occluder_options, 'i', rho, 15, 2, 256, ' '),
-    SAT__FIELD(fiv_occluder_options, 'f', first_shell, 0.3, 1e-6, 1000, ' '),
-    SAT__FIELD(fiv_occluder_options, 'f', last_shell, 6, 1e-6, 1000, ' '),
-    SAT__FIELD(fiv_occluder_options, 'i', resolution, 32, 8, 64, ' '),
-    SAT__FIELD(fiv_occluder_options, 'i', storage, FIV_STORAGE_FLOAT, FIV_STORAGE_FLOAT, FIV_STORAGE_HALF_OCTAHEDRAL, ' '),
-    SAT__FIELD(fiv_occluder_options, 'i', keep_masks, 1, 0, 1, ' '),
-    SAT__FIELD(fiv_occluder_options, 'i', lazy, 0, 0, 1, ' '),
-    SAT__FIELD(fiv_occluder_options, 'i', sun_map, 512, 64, 4096, ' '),
-    SAT__FIELD(fiv_occluder_options, 'a', allocator, 0, 0, 0, ' '),
-    SAT__FIELD(fiv_occluder_options, 't', threads, 0, 0, 0, ' '),
-};
-
-FIV_DEF fiv_occluder_options fiv_occluder_defaults(void)
-{
-    fiv_occluder_options o;
-    sat__fields_default(&o, sizeof o, fiv__occluder_fields, SAT__COUNT(fiv__occluder_fields));
-    return o;
-}
-
-static int fiv__explain_occluder_options(sat__text *t, const fiv_occluder_options *o)
-{
-    const sat__field *wrong = sat__fields_check(o, fiv__occluder_fields, SAT__COUNT(fiv__occluder_fields));
-    if (wrong) sat__text_field(t, wrong, o);
-    else if (o->theta & 1) sat__text_add(t, "theta is odd");
-    else if (!(o->first_shell < o->last_shell)) sat__text_add(t, "last_shell is not beyond first_shell");
-    else if (o->keep_masks && o->lazy) sat__text_add(t, "lazy is 1 with keep_masks; what deforms keeps none");
-#ifdef FIV_NO_MASKS
-    else if (o->keep_masks) sat__text_add(t, "keep_masks is 1; 0 with FIV_NO_MASKS");
-#endif
-    else return 1;
-    return 0;
-}
-
-static int fiv__occluder_options_are_valid(const fiv_occluder_options *o)
-{
-    sat__text ignored = sat__text_begin(NULL, 0);
-    return fiv__explain_occluder_options(&ignored, o);
-}
-
-/* 0 and a sentence where an index is beyond the vertices, or a pointer is missing. */
-static int fiv__explain_mesh(sat__text *t, const float *positions, size_t vertex_count, const unsigned *indices,
-                             size_t triangle_count)
-{
-    size_t i;
-    if (triangle_count && (!positions || !indices)) sat__text_add(t, "positions or indices are NULL");
-    else {
-        for (i = 0; i < 3 * triangle_count && indices[i] < vertex_count; i++) {}
-        if (i == 3 * triangle_count) return 1;
-        sat__text_add(t, "triangle ");
-        sat__text_number(t, (double)(i / 3));
-        sat__text_add(t, ": its index is ");
-        sat__text_number(t, (double)indices[i]);
-        sat__text_add(t, " of ");
-        sat__text_number(t, (double)vertex_count);
-        sat__text_add(t, " vertices");
-    }
-    return 0;
-}
-
-FIV_DEF const char *fiv_explain_occluder(char *text, size_t size, const float *positions, size_t vertex_count,
-                                         const unsigned *indices, size_t triangle_count,
-                                         const fiv_occluder_options *options)
-{
-    sat__text t = sat__text_begin(text, size);
-    if (vertex_count > 0x7fffffff || triangle_count > 0x7fffffff / 3) sat__text_add(&t, "more than 2147483647 vertices or indices");
-    else if (!options || fiv__explain_occluder_options(&t, options))
-        fiv__explain_mesh(&t, positions, vertex_count, indices, triangle_count);
-    return t.size ? text : "";
 }
 
 static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
@@ -2537,6 +2603,8 @@ FIV_DEF sat_result fiv_occluder_share(fiv_occluder **out, const fiv_occluder *ma
     return result;
 }
 
+/* >> lighting */
+
 /* ---- split-off lights: a depth map each, seen along the light (orthographic), which says how far the mesh reaches
    towards it. All of them share a square of map_side^2 texels: cells of a grid, the middle of each the bounding ball,
    two texels at its border empty. A texel is 0 where there is nothing, else 1 + 65534 (z + 1) / 2. */
@@ -2847,29 +2915,9 @@ FIV_DEF sat_result fiv_occluder_invalidate(fiv_occluder *o, const float *positio
     return result;
 }
 
+/* >> lookups */
+
 /* ---- lookups */
-
-enum { FIV__TILE = 64, FIV__SHARES = 256 };
-
-static const sat__field fiv__irradiance_fields[] = {
-    SAT__FIELD(fiv_irradiance_options, 'i', accuracy, FIV_SCALED, FIV_NEAREST, FIV_MASK, ' '),
-    SAT__FIELD(fiv_irradiance_options, 'i', partial, 1, 0, 1, ' '),
-    SAT__FIELD(fiv_irradiance_options, 'i', overlap, 1, 0, 1, ' '),
-    SAT__FIELD(fiv_irradiance_options, 'f', cutoff, 0.001, 0, 1, ' '),
-    SAT__FIELD(fiv_irradiance_options, 'i', own_masks, FIV__TILE, 0, FIV__TILE, ' '),
-    SAT__FIELD(fiv_irradiance_options, 'i', own_triangles, 20000, 0, 2147483647, ' '),
-    SAT__FIELD(fiv_irradiance_options, 'f', own_tolerance, 0.01, 0, 1, ' '),
-    SAT__FIELD(fiv_irradiance_options, 'i', rays, 1, 0, 1, ' '),
-    SAT__FIELD(fiv_irradiance_options, 'f', penumbra, 1, 0, 100, ' '),
-    SAT__FIELD(fiv_irradiance_options, 't', threads, 0, 0, 0, ' '),
-};
-
-FIV_DEF fiv_irradiance_options fiv_irradiance_defaults(void)
-{
-    fiv_irradiance_options o;
-    sat__fields_default(&o, sizeof o, fiv__irradiance_fields, SAT__COUNT(fiv__irradiance_fields));
-    return o;
-}
 
 /* Half floats of this table are finite, so that one multiplication does for normal and subnormal numbers. */
 static inline float fiv__half(uint16_t half)
@@ -3434,6 +3482,8 @@ static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], fiv__re
     return 1;
 }
 
+/* >> receivers */
+
 /* ---- several occluders. Sums are taken in fixed point, as parts of I_tot, so that their order does not matter. */
 
 #define FIV__ONE 1099511627776.0 /* 2^40 */
@@ -3970,6 +4020,8 @@ FIV_DEF sat_result fiv_occluder_prepare(fiv_occluder *o, size_t *computed, const
     return SAT_OK;
 }
 
+/* >> saves */
+
 /* ---- saves: a header of fixed-width little-endian fields, the states, the support function, the counts of words, the
    words; then the mesh: of each cluster the counts of vertices and triangles, the vertices, the corners */
 
@@ -4223,6 +4275,7 @@ SAT__IEEE_END
 #endif /* FIV_IMPLEMENTATION */
 
 /* ------------------------------------------------------------------------------------------------
+   >> shaders
    OpenGL
    ------------------------------------------------------------------------------------------------ */
 
@@ -4499,6 +4552,8 @@ static const char fiv__glsl_main[] =
     "    int self = FIV_SELF != 0 && point.w >= 2.0 && point.w < 66.0 ? int(point.w) - 2 : -1;\n"
     "    value = vec4(fiv_receive(self, point.xyz, texelFetch(fiv_normals, p, 0).xyz), 1.0);\n"
     "}\n";
+
+/* >> opengl   ---- objects, scenes, passes */
 
 enum {
     FIV__GL_UNITS = 7,

@@ -161,7 +161,7 @@ static void place(object *o, float x, float z)
         o->instance.position[k] = -centre * o->instance.scale;
     }
     o->instance.position[0] += x;
-    o->instance.position[1] = 0.01f - low * o->instance.scale;
+    o->instance.position[1] = -low * o->instance.scale;
     o->instance.position[2] += z;
 }
 
