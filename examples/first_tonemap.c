@@ -28,6 +28,7 @@ int main(void)
     options.white = 0;                         /* what is shown as white: estimated */
     options.mesopic = TONEMAP_MESOPIC_LOCAL;   /* reds fade where it is dark */
     options.cd_per_unit = 1;                   /* a luminance of 1 is 1 cd/m2 */
+    options.dither = 1;                        /* no bands in the slow gradients of the wall */
     if (tonemap_once_u8(shown, pixels, WIDTH, HEIGHT, 3, &options) != SAT_OK) {
         fprintf(stderr, "%s\n", tonemap_explain(why, sizeof why, WIDTH, HEIGHT, &options));
         return 1;

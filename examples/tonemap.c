@@ -1,11 +1,12 @@
 /* tonemap - maps a high dynamic range picture to one for the screen.  SPDX-License-Identifier: MIT-0 OR Unlicense
 
-       tonemap in.exr out.png                        local photographic operator; out.exr: floats
+       tonemap in.exr out.png                        guided local operator; out.exr: floats
        tonemap in.hdr out.png --operator ashikhmin --mesopic local --stats
-       tonemap in.exr sheet.png --compare            all operators on one contact sheet
+       tonemap in.exr sheet.png --compare --cell 400 all operators on one contact sheet, and pfstools' where installed
+       tonemap in.exr hdr10.exr --peak 5 --encoding pq --display 2020
        tonemap                                       a scene of its own: 10 decades from a dark room to the sun */
 
-#define _POSIX_C_SOURCE 200809L
+#define _XOPEN_SOURCE 700
 #define SAT_IMPLEMENTATION
 #define TONEMAP_IMPLEMENTATION
 #include "../tonemap.h"
@@ -105,48 +106,107 @@ static int map_picture(const common_settings *common, unsigned char *bytes, floa
     return result == SAT_OK || common_say_result(common, "tone mapping", result, tonemap_explain(why, sizeof why, picture->width, picture->height, options));
 }
 
-typedef struct variant {
-    const char *label;
-    tonemap_operator operation;
-    tonemap_mesopic mesopic;
-    int automatic;
-    double soft;
-} variant;
+/* ---- what else can be installed: pfstools' operators, which read and write files ---- */
 
-static int write_sheet(const common_settings *common, const image *picture, const tonemap_options *options)
+/* Runs one on the picture; 0 when it is not there. */
+static int map_by_peer(unsigned char *bytes, const image *picture, const char *folder, const char *peer)
+{
+    char command[600], path[300];
+    FILE *file;
+    int width = 0, height = 0, ok;
+    snprintf(path, sizeof path, "%s/out.ppm", folder);
+    snprintf(command, sizeof command,
+             "{ pfsinexr '%s/in.exr' | %s | pfsgamma -g 2.2 | pfsoutppm '%s'; } >/dev/null 2>&1", folder, peer, path);
+    if (system(command) != 0) return 0;
+    file = fopen(path, "rb");
+    if (!file) return 0;
+    ok = fscanf(file, "P6 %d %d 255", &width, &height) == 2 && width == picture->width && height == picture->height &&
+         fgetc(file) != EOF && fread(bytes, 3, (size_t)width * (size_t)height, file) == (size_t)width * (size_t)height;
+    fclose(file);
+    remove(path);
+    return ok;
+}
+
+/* The picture without what they do not take. */
+static int save_for_peers(const image *picture, const char *folder)
+{
+    char path[300];
+    image copy = *picture;
+    size_t n = (size_t)picture->width * (size_t)picture->height * (size_t)picture->channels, i;
+    int ok;
+    copy.pixels = (float *)malloc(n * sizeof(float));
+    if (!copy.pixels) return 0;
+    for (i = 0; i < n; ++i)
+        copy.pixels[i] = picture->pixels[i] > 1e-7f && picture->pixels[i] < 1e30f ? picture->pixels[i] : 1e-7f;
+    snprintf(path, sizeof path, "%s/in.exr", folder);
+    ok = image_save(&copy, path);
+    free(copy.pixels);
+    return ok;
+}
+
+/* ---- all on a sheet ---- */
+
+typedef struct variant { const char *label; int operation; const char *peer; } variant;
+
+/* Means of the codes of whole pixels, in place. */
+static void shrink(common_cell *cell, unsigned char *bytes, int width, int height, int wanted)
+{
+    int x, y, c, u, v;
+    cell->rgb = bytes;
+    cell->width = wanted > 0 && wanted < width ? wanted : width;
+    cell->height = height * cell->width / width > 0 ? height * cell->width / width : 1;
+    for (y = 0; y < cell->height && cell->width < width; ++y)
+        for (x = 0; x < cell->width; ++x) {
+            int x0 = x * width / cell->width, x1 = (x + 1) * width / cell->width, y0 = y * height / cell->height,
+                y1 = (y + 1) * height / cell->height, sum[3] = {0, 0, 0};
+            for (v = y0; v < y1; ++v)
+                for (u = x0; u < x1; ++u)
+                    for (c = 0; c < 3; ++c) sum[c] += bytes[3 * ((size_t)v * (size_t)width + (size_t)u) + (size_t)c];
+            for (c = 0; c < 3; ++c)
+                bytes[3 * ((size_t)y * (size_t)cell->width + (size_t)x) + (size_t)c] =
+                    (unsigned char)(sum[c] / ((x1 - x0) * (y1 - y0)));
+        }
+}
+
+static int write_sheet(const common_settings *common, const image *picture, const tonemap_options *options, int width)
 {
     static const variant variants[] = {
-        {"photographic local", TONEMAP_PHOTOGRAPHIC_LOCAL, TONEMAP_MESOPIC_OFF, 0, 0},
-        {"photographic local, automatic key and white", TONEMAP_PHOTOGRAPHIC_LOCAL, TONEMAP_MESOPIC_OFF, 1, 0},
-        {"photographic global", TONEMAP_PHOTOGRAPHIC_GLOBAL, TONEMAP_MESOPIC_OFF, 0, 0},
-        {"local, mesopic uniform", TONEMAP_PHOTOGRAPHIC_LOCAL, TONEMAP_MESOPIC_UNIFORM, 0, 0},
-        {"local, mesopic local", TONEMAP_PHOTOGRAPHIC_LOCAL, TONEMAP_MESOPIC_LOCAL, 0, 0},
-        {"local, soft scales", TONEMAP_PHOTOGRAPHIC_LOCAL, TONEMAP_MESOPIC_OFF, 0, 1},
-        {"Ashikhmin", TONEMAP_ASHIKHMIN, TONEMAP_MESOPIC_OFF, 0, 0},
-        {"Ashikhmin global", TONEMAP_ASHIKHMIN_GLOBAL, TONEMAP_MESOPIC_OFF, 0, 0},
-        {"linear", TONEMAP_LINEAR, TONEMAP_MESOPIC_OFF, 0, 0},
+        {"guided (the default)", TONEMAP_GUIDED, NULL},
+        {"photographic local", TONEMAP_PHOTOGRAPHIC_LOCAL, NULL},
+        {"photographic global", TONEMAP_PHOTOGRAPHIC_GLOBAL, NULL},
+        {"Ashikhmin", TONEMAP_ASHIKHMIN, NULL},
+        {"Khronos PBR Neutral", TONEMAP_NEUTRAL, NULL},
+        {"AgX", TONEMAP_AGX, NULL},
+        {"ACES (Hill)", TONEMAP_ACES, NULL},
+        {"Hable", TONEMAP_HABLE, NULL},
+        {"pfstmo_reinhard02 -s", 0, "pfstmo_reinhard02 -s"},
+        {"pfstmo_mantiuk06", 0, "pfstmo_mantiuk06"},
+        {"pfstmo_drago03", 0, "pfstmo_drago03"},
+        {"linear", TONEMAP_LINEAR, NULL},
     };
     enum { COUNT = sizeof variants / sizeof variants[0] };
     common_cell cells[COUNT];
     common_progress progress = {0, 0};
     size_t bytes = (size_t)picture->width * (size_t)picture->height * 3;
     unsigned char *pixels = (unsigned char *)malloc(COUNT * bytes);
+    char folder[] = "/tmp/tonemap_XXXXXX", path[300];
     double seconds;
-    int i, ok = pixels != NULL || common_say(common, "no memory");
+    int i, count = 0, ok = pixels != NULL || common_say(common, "no memory"), peers = mkdtemp(folder) != NULL;
+    peers = peers && save_for_peers(picture, folder);
     for (i = 0; i < COUNT && ok; ++i) {
         tonemap_options o = *options;
-        o.operation = variants[i].operation;
-        o.mesopic = variants[i].mesopic;
-        o.soft = variants[i].soft;
-        if (variants[i].automatic) o.key = o.white = 0;
-        ok = map_picture(common, pixels + (size_t)i * bytes, NULL, picture, &o, NULL, &seconds);
-        cells[i].rgb = pixels + (size_t)i * bytes;
-        cells[i].width = picture->width;
-        cells[i].height = picture->height;
-        cells[i].label = variants[i].label;
+        unsigned char *at = pixels + (size_t)count * bytes;
+        o.operation = (tonemap_operator)variants[i].operation;
+        if (variants[i].peer && !(peers && map_by_peer(at, picture, folder, variants[i].peer))) continue;
+        if (!variants[i].peer) ok = map_picture(common, at, NULL, picture, &o, NULL, &seconds);
+        shrink(&cells[count], at, picture->width, picture->height, width);
+        cells[count++].label = variants[i].label;
         common_show_progress(&progress, "operators", i + 1, COUNT);
     }
-    ok = ok && common_contact_sheet(common, common->out, cells, COUNT, 3);
+    snprintf(path, sizeof path, "%s/in.exr", folder);
+    remove(path);
+    remove(folder);
+    ok = ok && common_contact_sheet(common, common->out, cells, count, 4);
     free(pixels);
     return ok;
 }
@@ -170,11 +230,12 @@ static int write_picture(const common_settings *common, image *picture, const to
 int main(int argc, char **argv)
 {
     tonemap_options o = tonemap_defaults();
-    int operation = o.operation, mesopic = o.mesopic, compare = 0, size[2] = {1280, 720}, ok;
+    int operation = o.operation, mesopic = o.mesopic, metering = o.metering, primaries = o.primaries,
+        display = o.display, encoding = o.encoding, compare = 0, cell = 0, size[2] = {1280, 720}, ok;
     const char *in = NULL;
     const common_option options[] = {
         {"in", 'P', (void *)&in, 0, 0, "picture to map; without one a scene is drawn"},
-        {"operator", 'w', &operation, 0, 0, "local|global|ashikhmin|ashikhmin-global|linear|guided"},
+        {"operator", 'w', &operation, 0, 0, "local|global|ashikhmin|ashikhmin-global|linear|guided|neutral|agx|aces|hable"},
         {"key", 'd', &o.key, 0, 10, "display value of the log-average; 0: estimated"},
         {"white", 'd', &o.white, 0, INFINITY, "smallest luminance shown as white; 0: estimated; inf: none"},
         {"phi", 'd', &o.phi, -16, 16, "sharpening of the scale test"},
@@ -187,7 +248,19 @@ int main(int argc, char **argv)
         {"cd", 'd', &o.cd_per_unit, 0, 1e9, "cd/m2 of a luminance of 1; 0: the log-average is 10"},
         {"lux", 'd', &o.lux_per_cd, 1e-6, 1e6, "illuminance of a luminance of 1 cd/m2"},
         {"selective", 'd', &o.selective, 0, 1e6, "search only where the gradient exceeds this; 0: everywhere"},
+        {"metering", 'w', &metering, 0, 0, "percentiles|log-average"},
+        {"exposure", 'd', &o.exposure, 0, 1e30, "factor of the light; 0: metered"},
+        {"primaries", 'w', &primaries, 0, 0, "709|p3|2020 of the picture"},
+        {"display", 'w', &display, 0, 0, "709|p3|2020 of the output"},
+        {"red", 'd', &o.balance_red, 0, 1000, "white balance"},
+        {"green", 'd', &o.balance_green, 0, 1000, "white balance"},
+        {"blue", 'd', &o.balance_blue, 0, 1000, "white balance"},
+        {"peak", 'd', &o.peak, 1, 100, "of the display, in units of white paper"},
+        {"encoding", 'w', &encoding, 0, 0, "auto|linear|pq|hlg of floats"},
+        {"paper", 'd', &o.white_cd, 1, 10000, "cd/m2 of white paper, for pq and hlg"},
+        {"dither", 'b', &o.dither, 0, 0, "no bands in slow gradients"},
         {"compare", 'b', &compare, 0, 0, "all operators on a contact sheet"},
+        {"cell", 'i', &cell, 0, 16384, "width of each picture on it; 0: as they are"},
         {"size", 'z', size, 1, 16384, "of the scene drawn when no picture is given"},
     };
     common_settings common;
@@ -198,10 +271,14 @@ int main(int argc, char **argv)
     if (!common_may_write(&common, common.out)) return 2;
     o.operation = (tonemap_operator)operation;
     o.mesopic = (tonemap_mesopic)mesopic;
+    o.metering = (tonemap_metering)metering;
+    o.primaries = (tonemap_primaries)primaries;
+    o.display = (tonemap_primaries)display;
+    o.encoding = (tonemap_encoding)encoding;
     o.threads = common.threads;
     if (!(in ? image_load(&picture, in) : make_scene(&picture, size[0], size[1])))
         return common_say(&common, picture.message), 1;
-    ok = compare ? write_sheet(&common, &picture, &o) : write_picture(&common, &picture, &o);
+    ok = compare ? write_sheet(&common, &picture, &o, cell) : write_picture(&common, &picture, &o);
     image_free(&picture);
     common_close(&common);
     return !ok;
