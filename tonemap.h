@@ -1,7 +1,7 @@
 /* tonemap.h - 0.1.0 - tone mapping of high dynamic range pictures - SPDX-License-Identifier: MIT-0 OR Unlicense
 
-   The photographic operator with local contrast on exact sums, mesopic vision, Ashikhmin's operator, adaptation over
-   time.
+   The photographic curve with local contrast from an edge-keeping filter or from exact box sums; curves that games use;
+   metering, adaptation, colours beyond the display, mesopic vision.
 
    USE
 
@@ -17,25 +17,23 @@
 
    WHAT IT DOES
 
-     photographic   Reinhard 2002 as in Slomp 2012, appendix A: the metered luminance becomes the key (eq A.1, A.2), and
-                    each pixel is compressed by the mean of the largest even neighbourhood around it (eq A.4 to A.9) or
-                    by itself (eq A.3). Optional: burn-out above a white; key and white estimated (Reinhard 2003)
-     mesopic        reds fade in dim light, by the whole picture or by each neighbourhood (eq A.10 to A.14)
-     Ashikhmin      threshold against intensity, local and global (Michael 2010, section 4.3)
-     colours        those beyond the display come back along their hue, dimmed and faded (gamut); nothing turns cyan
-     guided         the same curve with the mean of a self-guided filter of log luminance (He 2013), which leaks over no
-                    edge: the default
-     leaving out    searches away from edges (selective; Michael 2010, section 4.4)
-     metering       as a camera: between percentiles, in steps, within limits; or eq A.1's log-average; or a fixed
-                    exposure
-     adaptation     the metered light, key, white and range approach those of the picture with a time constant in
-                    seconds, one for brighter and one for darker; what wavers by less than 1/64 octave moves nothing
+     guided         the default: the photographic curve (Reinhard 2002 as in Slomp 2012, appendix A: eq A.1 to A.4),
+   with La from a self-guided filter of log luminance (He 2013), which leaks over no edge photographic   La as in the
+   thesis: the largest even neighbourhood around the pixel (eq A.5 to A.9), or the pixel itself (eq A.3). Burn-out above
+   a white; key and white estimated (Reinhard 2003) curves         Khronos PBR Neutral, AgX, ACES (Hill's fit), Hable:
+   each with its source beside it mesopic        reds fade in dim light, by the whole picture or by each neighbourhood
+   (eq A.10 to A.14) Ashikhmin      threshold against intensity, local and global (Michael 2010, section 4.3) colours
+   those beyond the display come back along their hue, dimmed and faded (gamut); primaries of Rec. 709, P3 and Rec. 2020
+   on both sides; white balance displays       sRGB bytes, dithered if wanted; floats up to a peak above white paper,
+   linear, PQ or HLG metering       as a camera: between percentiles, in steps, within limits, for the highlights,
+   through a mask; or eq A.1's log-average; or a fixed exposure adaptation     the metered light, key, white and range
+   approach those of the picture with a time constant in seconds, one for brighter and one for darker; what wavers by
+   less than 1/64 octave moves nothing leaving out    searches away from edges (selective; Michael 2010, section 4.4)
 
    WHAT IT DOES NOT
 
-     read files, resize, grade colours, show HDR displays, model glare or the loss of acuity at night, keep a history of
-     pixels (so nothing smears when the camera turns), or store anything but its options and five numbers between
-     frames.
+     read files, resize, grade colours, model glare or the loss of acuity at night, keep a history of pixels (so nothing
+     smears when the camera turns), or store anything but its options and seven numbers between frames.
 
    OPTIONS (define before the implementation)
 
@@ -61,8 +59,9 @@
 
    NUMERICS
 
-     Sums are integers: the scaled luminance is rounded to 2^-12 and cut at 256, where the display has 0.4 % left; box
-     means are then exact, and beyond the cut La is taken to grow with the pixel. The logarithms of the log-average are
+     Sums are integers, so box means are exact. The search rounds the scaled luminance to 2^-12, the guided filter its
+     logarithm to 1/64 octave; both cut it at 256, where the display has 0.4 % left, and beyond the cut La is taken to
+     grow with the pixel. The logarithms of the log-average are
      added as integers too. So the result has the same bits for any number of workers, for vector and plain code
      (without fused multiply-add), and for pictures in units that differ by a power of two from 2^-20 to 2^20.
      Against OpenGL at most 1 code differs, in 2 % of codes (on a software renderer). 8-bit codes are at most one from
@@ -71,24 +70,46 @@
      infinity is white; none of them enters the log-average, and none changes a pixel outside the 41 x 41 around it
      (1e30 does not either, but where the meter is within a hair of a step). A pixel of
      NaN or negative luminance (ringing beside lamps) shows the mean of what the usable ones around it show, up to 3
-     pixels away. A negative component of a positive luminance is kept until the display cuts it. Output lies in [0, 1]
-     for any input bits. Black pictures stay black and leave the adaptation alone; constant ones get the key (to half of
-     the meter's step of 1/64 octave).
-     Deviations from the sources: eq A.1 averages positive luminances only and has no delta, which would depend on the
-     unit; s in eq A.5 is the length in pixels; eq A.7 takes the centre of the first step that fails; the Lab of eq A.12
-     has the pixel's own luminance as white, so that the filter does not depend on exposure; Ashikhmin's range is
-     between the 0.05 % and 99.95 % quantiles, and his capacity is made continuous; the gradient of selective mapping is
-     that of the scaled luminance; what adapts over time is the whole picture's light, not each pixel's La.
+     pixels away. A negative component of a positive luminance is kept until the display cuts it. Output lies in [0, 1],
+     linear floats in [0, peak], for any input bits. PQ is within 3e-4. Black pictures stay black and leave the
+   adaptation alone; constant ones get the key (to half of the meter's step of 1/64 octave). Deviations from the
+   sources: eq A.1 averages positive luminances only and has no delta, which would depend on the unit; s in eq A.5 is
+   the length in pixels; eq A.7 takes the centre of the first step that fails; the Lab of eq A.12 has the pixel's own
+   luminance as white, so that the filter does not depend on exposure; Ashikhmin's range is between the 0.05 % and 99.95
+   % quantiles, and his capacity is made continuous; the gradient of selective mapping is that of the scaled luminance;
+   what adapts over time is the whole picture's light, not each pixel's La.
 
    COST (tests/bench/bench_tonemap.cpp; one core, SSE2, 2 megapixels of float RGB to 8 bits)
 
-     local 7.5 ns a pixel: the luminance and its logarithm 18 %, sums 8 %, search 45 %, colour and sRGB 25 %. Times
-     this: global 0.4, + mesopic 1.25, soft scales 1.4, Ashikhmin 1.7; SAT_NO_SIMD 1.9 (clang -O2) to 2.4 (gcc -O2);
-     OpenCV's global Drago operator 3.8, pfstmo_reinhard02 -s 24. SSIM against the operator with exact Gaussians 0.987
-     to 0.998. selective pays where few pixels are near edges, 0.9 to 1.1, and for
-     Ashikhmin, 0.6, at an SSIM of only 0.9.
-     Against flicker: 0.5 % of noise moves single pixels by up to 56 codes with soft = 0 and by less than 1 with soft =
-     1. */
+     What version 0.1 did by default (TONEMAP_PHOTOGRAPHIC_LOCAL, soft = 0, gamut = -1, white = INFINITY and metering =
+     TONEMAP_METERING_LOG_AVERAGE; 7.5 ns a pixel on an idle core) is 1. The default is 1.14: the guided filter itself
+     0.94, metering by percentiles 0.04, estimated white 0.04, colours beyond the display 0.15 where 20 % of the pixels
+     are such. Times the default: global 0.6, local with soft scales 1.2, + local mesopic 1.2, + uniform 1.1, Ashikhmin
+     1.6, Neutral 1.2, Hable 1.3, ACES 1.7, dithering 1.25, other primaries 1.1; SAT_NO_SIMD 2.6 (gcc -O2); OpenCV's
+     global Drago operator 3.5, pfstmo_reinhard02 -s 22.
+     Halos beside steps of 10, 100 and 1000:1: guided 3, 4 and 4 codes, the search 12, 27 and 18. SSIM of the search
+     against the operator with exact Gaussians 0.987 to 0.998. Under 0.5 % of noise single pixels move by less than 1
+     code, with soft = 0 by up to 56. selective pays where few pixels are near edges, 0.9 to 1.1 of the local time, and
+     for Ashikhmin, 0.6, at an SSIM of only 0.9. */
+
+/* What is where.
+
+   CONTENTS (search for the mark)
+
+   >> interface            types, options, statistics, calls
+   >> interface of OpenGL  the same on textures; GLSL to call
+   >> options              their table, what is left out, sentences; the object and its memory
+   >> numbers              log2 in fours, exp2 plain and in fours
+   >> measuring            first pass: luminance, histogram, what is no measurement
+   >> metering             key, white, range; adaptation; matrices of colour; the numbers of a picture
+   >> search               sums in a ring of rows; La by the photographic search and by Ashikhmin's; selective mapping
+   >> guided filter        La by it; La of a row by any operator
+   >> mesopic vision       reds in dim light
+   >> display values       gains, gamut, primaries; curves; PQ, HLG, sRGB, dithering; unusable pixels
+   >> calls                create, apply, set_options
+   >> shaders of OpenGL
+   >> passes of OpenGL     programs, textures, one picture
+*/
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(TONEMAP_IMPLEMENTATION)
 #define TONEMAP_IMPLEMENTATION
@@ -127,7 +148,7 @@ extern "C" {
 #endif
 
 /* ------------------------------------------------------------------------------------------------
-   Types
+   >> interface: types
    ------------------------------------------------------------------------------------------------ */
 
 typedef enum tonemap_operator {
@@ -181,8 +202,8 @@ typedef struct tonemap_options {
                                    <= 0: estimated from the log-average's place between dark and bright (Reinhard
                                    2003) */
     double white;               /* 0; 0..1e12 or infinity (no burn-out); the smallest luminance shown as white, in units
-                                   in which the metered luminance is the key; 0: estimated, at least 1 (infinity with
-                                   TONEMAP_NO_WHITE) */
+                                   in which the metered luminance is the key; 0: estimated, at least 1 (linear:
+                                   none; and infinity is the default with TONEMAP_NO_WHITE) */
     double phi;                 /* 8; -16..16; sharpening of the scale test, eq A.5 */
     double epsilon;             /* 0.05; 1e-9..1e9; threshold of the scale test, eq A.7 */
     double edge;                /* 0.45; 0.01..10; guided: light that varies by so many octaves around a pixel (standard
@@ -280,7 +301,7 @@ TONEMAP_DEF void tonemap_destroy(tonemap *map); /* NULL is fine */
 #endif /* TONEMAP_H */
 
 /* ------------------------------------------------------------------------------------------------
-   OpenGL 3.3 core or ES 3.0 / WebGL 2 with EXT_color_buffer_float (define TONEMAP_GL)
+   >> interface of OpenGL: 3.3 core, or ES 3.0 / WebGL 2 with EXT_color_buffer_float (define TONEMAP_GL)
    ------------------------------------------------------------------------------------------------ */
 
 #if defined(TONEMAP_GL) && !defined(TONEMAP__GL_API)
@@ -332,7 +353,7 @@ TONEMAP_DEF const char *tonemap_gl_glsl(void);
 #endif /* TONEMAP__GL_API */
 
 /* ------------------------------------------------------------------------------------------------
-   Stop here if you only want to use the library.
+   Stop here if you only want to use the library. >> options: their table, what is left out, sentences; the object
    ------------------------------------------------------------------------------------------------ */
 
 #if defined(TONEMAP_IMPLEMENTATION) && !defined(TONEMAP_IMPLEMENTED)
@@ -580,7 +601,7 @@ struct tonemap {
     unsigned char code[TONEMAP__CODES];
 };
 
-/* ---- base-2 logarithm: exponent plus a polynomial that is exact at both ends of the octave; error below 2.3e-6 */
+/* ---- >> numbers: powers of 2; the logarithms are sat.h's */
 
 /* |v| < 60; relative error below 5e-6 */
 static inline float tonemap__exp2(float v)
@@ -631,7 +652,7 @@ static inline sat__f32x4 tonemap__exp2_4(sat__f32x4 v)
 }
 #endif
 
-/* ---- first pass: luminance, its logarithm, and what is wrong with it */
+/* ---- >> measuring: first pass: luminance, its logarithm, and what is wrong with it */
 
 /* The luminance that counts, and its number in the statistics. */
 static inline float tonemap__sane_luminance(float y, tonemap_stats *stats)
@@ -807,7 +828,7 @@ static void tonemap__measure_bands(int begin, int end, int worker, void *context
     }
 }
 
-/* ---- between the passes: key, white and range of the picture */
+/* ---- >> metering: between the passes: key, white and range of the picture */
 
 /* log2 of a luminance in a bin, part of the way through it. */
 static inline double tonemap__bin_value(int bin, double part)
@@ -1152,7 +1173,8 @@ static inline void tonemap__prepare_frame(tonemap *map)
     f->edge2 = (float)(o->edge * o->edge) * (TONEMAP__STEPS * TONEMAP__STEPS);
     f->gamut = o->gamut < 0 ? -1 : (float)o->gamut;
     f->curve_factor = o->operation == TONEMAP_LINEAR ? (float)(1 / o->peak) : 1;
-    if (o->operation == TONEMAP_LINEAR && !tonemap__is_infinite(white)) f->curve_factor = (float)(1 / white);
+    if (o->operation == TONEMAP_LINEAR && o->white > 0 && !tonemap__is_infinite(white))
+        f->curve_factor = (float)(1 / white);
     if (tonemap__is_ashikhmin(o)) {
         double low = map->state[TONEMAP__LOW], high = map->state[TONEMAP__HIGH];
         f->scale = (float)exp2(-ceil(high)); /* whole octaves: a firefly does not round every pixel anew */
@@ -1174,10 +1196,11 @@ static inline void tonemap__prepare_frame(tonemap *map)
     map->stats.white = white;
 }
 
-/* ---- second pass: sums. A ring of rows of a summed-area table of the scaled luminance, rounded to a quantum and added
-   modulo 2^32. A box never reaches further than the ring, and the difference of two sums is right wherever the sums
-   began; so each worker begins its own, needs 42 rows of it instead of a table, and every box mean is exact. (sat.h's
-   SAT_KIND_FIXED32 gives the same bits; it would cost a second pass over the picture and a table of its size.) */
+/* ---- >> search: second pass: sums. A ring of rows of a summed-area table of the scaled luminance, rounded to a
+   quantum and added modulo 2^32. A box never reaches further than the ring, and the difference of two sums is right
+   wherever the sums began; so each worker begins its own, needs 42 rows of it instead of a table, and every box mean is
+   exact. (sat.h's SAT_KIND_FIXED32 gives the same bits; it would cost a second pass over the picture and a table of its
+   size.) */
 
 static inline uint32_t *tonemap__ring_row(const tonemap *map, const tonemap__worker *w, int j)
 {
@@ -1672,8 +1695,8 @@ static inline void tonemap__sobel_row(float *out, const float *above, const floa
     for (; x < width; x++) out[x] = tonemap__sobel(above, row, below, x - 1, x, sat__min_int(x + 1, width - 1));
 }
 
-/* ---- the guided filter (He 2013, eq 5, 6 and 8 with the picture as its own guide), on q = log2 of the scaled
-   luminance
+/* ---- >> guided filter: the guided filter (He 2013, eq 5, 6 and 8 with the picture as its own guide), on q = log2 of
+   the scaled luminance
 
    Around each pixel a = var / (var + edge^2) and b = mean (1 - a), over 21 x 21 pixels; La = exp2(mean(a) q + mean(b)),
    over as many. Where light varies less than edge, a is small and La the mean around; across an edge a is 1 and La the
@@ -1979,7 +2002,7 @@ static inline void tonemap__local_row(tonemap *map, tonemap__worker *w, int y, i
     else tonemap__search(w, luminance, &window, &map->frame, o->operation == TONEMAP_ASHIKHMIN, 0, map->width);
 }
 
-/* ---- mesopic vision
+/* ---- >> mesopic vision
 
    Eq A.12 scales a > 0 of Lab by rho; L and b stay. Y then stays, so Z does, and only X moves. With the pixel's own
    luminance as the white of Lab (which makes the result independent of exposure) q = X / (Xn Y), a > 0 means q > 1, and
@@ -2086,7 +2109,8 @@ static inline void tonemap__shift_red4(sat__f32x4 *v, sat__f32x4 luminance, sat_
 }
 #endif
 
-/* ---- the factor from input to display, Ld / L: multiplying R, G and B by it is what replacing Y in Yxy does */
+/* ---- >> display values: the factor from input to display, Ld / L: multiplying R, G and B by it is what replacing Y in
+   Yxy does */
 
 /* Eq A.3 and A.4 with burn-out: Ld = Lr (1 + Lr peak / white^2) / (1 + La / peak), and Lr = scale L; the thesis has a
    peak of 1; white is then the peak. Where Lr is beyond the cap of
@@ -2324,6 +2348,41 @@ static inline void tonemap__matrix(float *v, const float *m)
     v[1] = b;
 }
 
+static inline void tonemap__mix_planes(tonemap__planes p, const float *m, int n)
+{
+    int i, c;
+    for (i = 0; i < n; i++) {
+        float v[3];
+        for (c = 0; c < 3; c++) v[c] = p[c][i];
+        tonemap__matrix(v, m);
+        for (c = 0; c < 3; c++) p[c][i] = v[c];
+    }
+}
+
+/* log2 of each, from 1e-9 on. */
+static inline void tonemap__log2_row(float *v, int n)
+{
+    int i = 0;
+#ifdef SAT__VECTOR
+    for (; i + 4 <= n; i += 4)
+        sat__f32x4_store(v + i, tonemap__log2_4(sat__f32x4_max(sat__f32x4_load(v + i), sat__f32x4_set1(1e-9f))));
+#endif
+    for (; i < n; i++) v[i] = sat__log2(v[i] > 1e-9f ? v[i] : 1e-9f);
+}
+
+static inline void tonemap__power_row(float *v, float power, int n)
+{
+    int i = 0;
+    tonemap__log2_row(v, n);
+#ifdef SAT__VECTOR
+    for (; i + 4 <= n; i += 4)
+        sat__f32x4_store(v + i,
+                         tonemap__exp2_4(sat__f32x4_max(sat__f32x4_mul(sat__f32x4_load(v + i), sat__f32x4_set1(power)),
+                                                        sat__f32x4_set1(-59))));
+#endif
+    for (; i < n; i++) v[i] = tonemap__exp2(v[i] * power > -59 ? v[i] * power : -59);
+}
+
 /* Khronos 2024, "PBR Neutral tone mapper": a toe that takes off the reflection of 4 %, colours as they are up to 0.76,
    then the largest component is compressed and the colour fades. */
 static inline void tonemap__neutral(float *v)
@@ -2344,24 +2403,27 @@ static inline void tonemap__neutral(float *v)
 
 /* Sobotka's AgX in Wrensch's fit (iolite-engine.com/blog_posts/minimal_agx_implementation), its display values
    decoded with 2.2. */
-static inline void tonemap__agx(float *v)
+static inline void tonemap__agx(tonemap__planes p, int n)
 {
     static const float in[9] = {0.842479062f, 0.0784336f, 0.0792237451f, 0.0423282422f, 0.878468636f,
                                 0.0791661275f, 0.0423756549f, 0.0784336f, 0.879142974f};
     static const float out[9] = {1.196879005f, -0.0980208811f, -0.0990297441f, -0.0528968518f, 1.15190313f,
                                  -0.0989611768f, -0.0529716355f, -0.0980434501f, 1.151073673f};
-    int c;
-    tonemap__matrix(v, in);
+    int i, c;
+    tonemap__mix_planes(p, in, n);
     for (c = 0; c < 3; c++) {
-        float x = (sat__log2(v[c] > 1e-9f ? v[c] : 1e-9f) + 12.47393f) * (1 / 16.5f), x2, x4;
-        x = x < 0 ? 0 : x > 1 ? 1 : x;
-        x2 = x * x;
-        x4 = x2 * x2;
-        v[c] =
-            15.5f * x4 * x2 - 40.14f * x4 * x + 31.96f * x4 - 6.868f * x2 * x + 0.4298f * x2 + 0.1191f * x - 0.00232f;
+        tonemap__log2_row(p[c], n);
+        for (i = 0; i < n; i++) {
+            float x = (p[c][i] + 12.47393f) * (1 / 16.5f), x2, x4;
+            x = x < 0 ? 0 : x > 1 ? 1 : x;
+            x2 = x * x;
+            x4 = x2 * x2;
+            p[c][i] = 15.5f * x4 * x2 - 40.14f * x4 * x + 31.96f * x4 - 6.868f * x2 * x + 0.4298f * x2 + 0.1191f * x -
+                      0.00232f;
+        }
     }
-    tonemap__matrix(v, out);
-    for (c = 0; c < 3; c++) v[c] = v[c] > 1e-9f ? tonemap__exp2(2.2f * sat__log2(v[c])) : 0;
+    tonemap__mix_planes(p, out, n);
+    for (c = 0; c < 3; c++) tonemap__power_row(p[c], 2.2f, n);
 }
 
 /* Stephen Hill's fit of the ACES reference rendering and sRGB output transforms (BakingLab, ACES.hlsl). */
@@ -2389,13 +2451,13 @@ static inline float tonemap__hable(float x)
 static inline void tonemap__curve_planes(tonemap__planes p, tonemap_operator curve, float floor, float scale, int n)
 {
     int i, c;
+    if (curve == TONEMAP_AGX) tonemap__agx(p, n);
     for (i = 0; i < n; i++) {
         float v[3];
         for (c = 0; c < 3; c++) v[c] = p[c][i];
         if (curve == TONEMAP_NEUTRAL) tonemap__neutral(v);
-        else if (curve == TONEMAP_AGX) tonemap__agx(v);
         else if (curve == TONEMAP_ACES) tonemap__aces(v);
-        else
+        else if (curve == TONEMAP_HABLE)
             for (c = 0; c < 3; c++) v[c] = tonemap__hable(2 * v[c]) * (1 / 0.725129270f);
         for (c = 0; c < 3; c++) {
             v[c] = (v[c] < 1 ? v[c] : 1) * scale;
@@ -2447,7 +2509,7 @@ enum { TONEMAP__CODE_BASE = 0xe400, TONEMAP__CODE_SHIFT = 14 };
 
 static inline unsigned char tonemap__code(const tonemap *map, float v)
 {
-    return map->code[(sat__float_bits(v) >> TONEMAP__CODE_SHIFT) - TONEMAP__CODE_BASE];
+    return map->code[(sat__float_bits(v) >> (TONEMAP__CODE_SHIFT)) - TONEMAP__CODE_BASE];
 }
 
 static inline void tonemap__fill_codes(unsigned char *code)
@@ -2500,10 +2562,10 @@ static inline void tonemap__write_dithered(const tonemap *map, unsigned char *ou
     int i, c, colours = channels == 1 ? 1 : 3;
     for (i = 0; i < n; i++, out += channels)
         for (c = 0; c < colours; c++) {
-            uint32_t bits = sat__float_bits(v[c][i]), at = (bits >> TONEMAP__CODE_SHIFT) - TONEMAP__CODE_BASE,
+            uint32_t bits = sat__float_bits(v[c][i]), at = (bits >> (TONEMAP__CODE_SHIFT)) - TONEMAP__CODE_BASE,
                      part = bits & ((1u << TONEMAP__CODE_SHIFT) - 1), low = map->fine[at], high = map->fine[at + 1];
             out[c] =
-                (unsigned char)((low + ((high - low) * part >> TONEMAP__CODE_SHIFT) + tonemap__threshold(x + i, y)) >>
+                (unsigned char)((low + ((high - low) * part >> (TONEMAP__CODE_SHIFT)) + tonemap__threshold(x + i, y)) >>
                                 8);
         }
 }
@@ -2633,7 +2695,7 @@ static void tonemap__fill_bands(int begin, int end, int worker, void *context)
     }
 }
 
-/* ---- calls */
+/* ---- >> calls */
 
 static inline void tonemap__carve(tonemap *map, sat__arena *arena)
 {
@@ -2810,7 +2872,7 @@ SAT__IEEE_END
 #endif /* TONEMAP_IMPLEMENTATION */
 
 /* ------------------------------------------------------------------------------------------------
-   OpenGL
+   >> shaders of OpenGL
    ------------------------------------------------------------------------------------------------ */
 
 #if defined(TONEMAP_IMPLEMENTATION) && defined(TONEMAP_GL) && !defined(TONEMAP__GL_IMPLEMENTED)
@@ -2888,7 +2950,7 @@ static const char tonemap__glsl_luminance[] =
     "}\n";
 
 /* Sums over 4 x 4 texels. Texel: whole and 2^-16 parts of the sum of log2, carried over; pixels. Integers, so that the
- * log-average is the CPU's. The polynomial is the CPU's, too. */
+   log-average is the CPU's. The polynomial is the CPU's, too. */
 static const char tonemap__glsl_reduce[] =
     "#ifdef TONEMAP_FIRST\n"
     "uniform sampler2D source, mask;\n"
@@ -3256,6 +3318,8 @@ static const char tonemap__glsl_map[] =
     "#endif\n"
     "}\n";
 
+/* ---- >> passes of OpenGL */
+
 enum { TONEMAP__LEVELS = 14, TONEMAP__BIN_ROWS = (TONEMAP__BINS + 63) / 64, TONEMAP__GL_UNITS = 5 };
 
 struct tonemap_gl {
@@ -3297,7 +3361,8 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define(gl, "TONEMAP_ENCODING", (int)o->encoding);
     sat__gl_define(gl, "TONEMAP_DITHER", o->dither);
     sat__gl_define(gl, "TONEMAP_BINS", TONEMAP__BIN_ROWS * 64);
-    sat__gl_define(gl, "TONEMAP_BURN", !tonemap__is_infinite(o->white));
+    sat__gl_define(gl, "TONEMAP_BURN",
+                   !tonemap__is_infinite(o->white) && (o->white > 0 || o->operation != TONEMAP_LINEAR));
     sat__gl_define_float(gl, "TONEMAP_EPSILON", (float)o->epsilon);
     sat__gl_define_float(gl, "TONEMAP_PHI_TERM", (float)(o->epsilon * exp2(o->phi)));
     sat__gl_define_float(gl, "TONEMAP_GAMUT", o->gamut < 0 ? -1.0f : (float)o->gamut);

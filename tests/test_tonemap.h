@@ -1509,6 +1509,11 @@ TEST(pq_and_hlg_are_their_standards)
     s = shoot(&view, &o);
     pq_white = (double)s.f32[0];
     shot_free(&s);
+    o.white = 0; /* linear is the exposure alone */
+    o.encoding = TONEMAP_ENCODING_LINEAR;
+    s = shoot(&view, &o);
+    EXPECT_REL(s.f32[0], 1, 1e-6);
+    shot_free(&s);
     EXPECT_NEAR(hlg_white, 0.75, 0.005);
     EXPECT_NEAR(pq_white, 0.58, 0.005);
 }

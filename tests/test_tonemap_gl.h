@@ -163,6 +163,8 @@ TEST(gl_gives_the_cpus_picture)
     compare(&s, &o, 100, 90, 0, 0.001, "Ashikhmin global");
     o = local_options(), o.operation = TONEMAP_LINEAR, o.white = 2;
     compare(&s, &o, 100, 90, 0, 0, "linear");
+    o.white = 0;
+    compare(&s, &o, 100, 90, 0, 0, "linear, no white");
     screen_close(&s);
 }
 

@@ -92,6 +92,25 @@ static void shrink(scene *s)
     settle(s, s->name);
 }
 
+/* The photographic local operator without burn-out, metered by eq A.1. */
+static tonemap_options local_options()
+{
+    tonemap_options o = tonemap_defaults();
+    o.operation = TONEMAP_PHOTOGRAPHIC_LOCAL;
+    o.white = (double)INFINITY;
+    o.metering = TONEMAP_METERING_LOG_AVERAGE;
+    return o;
+}
+
+/* What version 0.1 did unless told. */
+static tonemap_options thesis_options()
+{
+    tonemap_options o = local_options();
+    o.soft = 0;
+    o.gamut = -1;
+    return o;
+}
+
 /* ---- one configuration as a piece of work */
 
 struct work { tonemap *map; const scene *s; unsigned char *out; tonemap_stats stats; tonemap_options options; };
@@ -228,26 +247,36 @@ static void name_missing_pfs(void) { if (!have_pfs()) bench_missing("pfstools", 
 
 static void times(scene *still)
 {
-    struct row { const char *name; tonemap_options o; } rows[12];
+    struct row { const char *name; tonemap_options o; } rows[24];
     int count = 0;
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = tonemap_defaults(), thesis = thesis_options();
     auto add = [&](const char *name) { rows[count].name = name; rows[count++].o = o; o = tonemap_defaults(); };
     scene big;
     const int width = bench_smoke() ? 320 : 1920, height = bench_smoke() ? 180 : 1080;
     enlarge(&big, still, width, height);
-    add("local");
+    add("guided (default)");
+    o = thesis, add("local of version 0.1: hard scales, log-average, clipped channels");
+    o = thesis, o.operation = TONEMAP_GUIDED, add("the same, guided");
+    o = thesis, o.soft = 1, add("the same, soft scales");
+    o = thesis, o.gamut = 0.5, add("the same, gamut 0.5");
+    o = thesis, o.metering = TONEMAP_METERING_PERCENTILES, add("the same, metered by percentiles");
+    o = thesis, o.white = 0, add("the same, estimated white");
+    o.operation = TONEMAP_PHOTOGRAPHIC_LOCAL, add("local");
     o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL, add("global");
-    o.mesopic = TONEMAP_MESOPIC_LOCAL, add("local + local mesopic");
-    o.mesopic = TONEMAP_MESOPIC_UNIFORM, add("local + uniform mesopic");
-    o.key = o.white = 0, add("local, estimated key and white");
-    o.soft = 0, add("local, hard scales");
-    o.metering = TONEMAP_METERING_LOG_AVERAGE, add("local, metered by the log-average");
-    o.selective = 0.1, add("local, selective 0.1");
+    o.mesopic = TONEMAP_MESOPIC_LOCAL, add("guided + local mesopic");
+    o.mesopic = TONEMAP_MESOPIC_UNIFORM, add("guided + uniform mesopic");
+    o.operation = TONEMAP_PHOTOGRAPHIC_LOCAL, o.selective = 0.1, add("local, selective 0.1");
     o.operation = TONEMAP_ASHIKHMIN, add("Ashikhmin");
     o.operation = TONEMAP_ASHIKHMIN_GLOBAL, add("Ashikhmin global");
+    o.operation = TONEMAP_NEUTRAL, add("Khronos PBR Neutral");
+    o.operation = TONEMAP_AGX, add("AgX");
+    o.operation = TONEMAP_ACES, add("ACES (Hill)");
+    o.operation = TONEMAP_HABLE, add("Hable");
+    o.dither = 1, add("guided, dithered");
+    o.primaries = TONEMAP_PRIMARIES_2020, o.balance_red = 1.1, add("guided, from Rec. 2020, white balance");
     bench_table("Time of one picture: StillLife mirrored to 1920 x 1080, float RGB in, 8-bit sRGB out, one core",
                 "configuration\ttime_ratio\tns_per_pixel\tdefault");
-    bench_note("time_ratio: to the local operator, in pairs; pfstools: CPU time with its stream, 1 run in 3 of each; below 1 it would be faster than we are");
+    bench_note("time_ratio: to the default, in pairs; pfstools: CPU time with its stream, 1 run in 3 of each; below 1 it would be faster than we are");
 #ifndef HAVE_OPENCV
     bench_missing("OpenCV", "libopencv-dev");
 #endif
@@ -359,12 +388,12 @@ static void accuracy(scene *scenes, int count)
     bench_table("Local operators against the exact Gaussian operator (Reinhard 2002), 8-bit codes of the display luminance",
                 "picture\toperator\tssim\trms_codes\tover_5_codes\ttime_ratio\tdefault");
     bench_plot("Error against the exact operator, and time; x=time_ratio; y=rms_codes; by=operator; log=xy; picture=plot_tonemap");
-    bench_note("time_ratio: to the local operator; exact boxes are the reference in double precision with sums of its own; pfstools: the program with its stream");
+    bench_note("time_ratio: to the local operator, soft scales; exact boxes are the reference in double precision with sums of its own; pfstools: the program with its stream");
     for (int i = 0; i < count; ++i) {
         scene *s = &scenes[i];
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         tonemap_stats stats;
-        double *codes[5], *reference, times[5], start;
+        double *codes[6], *reference, times[6], start;
         work base = make_work(s, &o);
         auto timed = [&]() {
             work w = make_work(s, &o);
@@ -373,14 +402,18 @@ static void accuracy(scene *scenes, int count)
             return ratio;
         };
         double base_time = bench_time(run_work, &base, bench_rounds(7));
-        const char *names[5] = {"tonemap.h local", "tonemap.h local, soft scales", "tonemap.h global", "exact boxes",
-                                "pfstmo_reinhard02 -s --phi 8"};
-        codes[0] = luminance_codes(s, &o, &stats);
-        times[0] = 1;
-        o.soft = 1;
+        const char *names[6] = {"tonemap.h guided", "tonemap.h local, soft scales", "tonemap.h global", "exact boxes",
+                                "pfstmo_reinhard02 -s --phi 8", "tonemap.h local, hard scales"};
+        o.soft = 0;
+        codes[5] = luminance_codes(s, &o, &stats);
+        times[5] = timed();
+        o = local_options();
         codes[1] = luminance_codes(s, &o, NULL);
-        times[1] = timed();
-        o = tonemap_defaults();
+        times[1] = 1;
+        o.operation = TONEMAP_GUIDED;
+        codes[0] = luminance_codes(s, &o, NULL);
+        times[0] = timed();
+        o = local_options();
         o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
         codes[2] = luminance_codes(s, &o, NULL);
         times[2] = timed();
@@ -392,7 +425,7 @@ static void accuracy(scene *scenes, int count)
         codes[4] = pfs_codes(s);
         times[4] = (support_clock() - start) / base_time;
         free_work(&base);
-        for (int k = 0; k < 5; ++k) {
+        for (int k = 0; k < 6; ++k) {
             if (!codes[k]) continue;
             metrics_codes m = metrics_compare_codes(codes[k], reference, s->n);
             bench_row("%s\t%s\t%.4f\t%.3f\t%.4f\t%.3g\t%d", s->name, names[k], metrics_ssim(codes[k], reference, s->picture.width, s->picture.height), m.rms,
@@ -410,7 +443,7 @@ static void luminance_range(const scene *s)
                 "decades\trms_codes\tlargest_codes\tover_5_codes");
     bench_plot("Error against the range of luminance; x=decades; y=rms_codes; style=linespoints");
     bench_note(s->name);
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     work w = make_work(s, &o);
     double own = log10(w.stats.high / w.stats.low);
     free_work(&w);
@@ -434,14 +467,14 @@ static void pareto(const scene *s)
 {
     struct row { const char *kind; double value; tonemap_options o; } rows[32];
     int count = 0;
-    tonemap_options o = tonemap_defaults();
+    tonemap_options o = local_options();
     work base = make_work(s, &o);
     double *full = codes_of(s, &o, NULL);
     auto add = [&](const char *kind, double value) {
         rows[count].kind = kind;
         rows[count].value = value;
         rows[count++].o = o;
-        o = tonemap_defaults();
+        o = local_options();
     };
     for (int k = 1; k <= 8; ++k) o.scales = k, add("scales", k);
     for (double t = 0.05; t < 2; t *= 2) o.selective = t, add("selective", t);
@@ -476,7 +509,7 @@ static void mesopic(scene *scenes, int count)
     bench_note("time_ratio: to the local operator without it; the log-average counts as 10 cd/m2; pictures with colours outside Rec. 709 clip differently");
     for (int i = 0; i < count; ++i) {
         const scene *s = &scenes[i];
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         tonemap_stats stats;
         work base = make_work(s, &o);
         o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
@@ -507,7 +540,7 @@ static void ashikhmin(scene *scenes, int count)
     bench_table("Ashikhmin's operator: boxes against Gaussians, and one firefly of 1e6 times the largest luminance", "picture\tssim\trms_codes\tfirefly_largest_codes\tfirefly_rms");
     for (int i = 0; i < count; ++i) {
         const scene *s = &scenes[i];
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         tonemap_stats stats;
         o.operation = TONEMAP_ASHIKHMIN;
         double *codes = luminance_codes(s, &o, &stats), *la = metrics_alloc(s->n), *l = metrics_alloc(s->n),
@@ -566,14 +599,15 @@ static void flicker(scene *scenes, int count)
                 noisy.picture.pixels[3 * k + c] = scenes[i].picture.pixels[3 * k + c] * factor;
         }
         settle(&noisy, scenes[i].name);
-        for (int k = 0; k < 4; ++k) {
-            const char *names[4] = {"local", "local, soft 0.5", "local, soft 1", "global"};
-            tonemap_options o = tonemap_defaults();
+        for (int k = 0; k < 5; ++k) {
+            const char *names[5] = {"local, hard scales", "local, soft 0.5", "local, soft 1", "global", "guided"};
+            tonemap_options o = local_options();
             o.soft = k == 1 ? 0.5 : k == 2 ? 1 : 0;
             if (k == 3) o.operation = TONEMAP_PHOTOGRAPHIC_GLOBAL;
+            if (k == 4) o.operation = TONEMAP_GUIDED;
             double *a = luminance_codes(&scenes[i], &o, NULL), *b = luminance_codes(&noisy, &o, NULL);
             metrics_codes m = metrics_compare_codes(a, b, scenes[i].n);
-            bench_row("%s\t%s\t%.3f\t%.2f\t%d", scenes[i].name, names[k], m.rms, m.largest, k == 0);
+            bench_row("%s\t%s\t%.3f\t%.2f\t%d", scenes[i].name, names[k], m.rms, m.largest, k == 4);
             free(a);
             free(b);
         }
@@ -590,11 +624,11 @@ static void halos(void)
     bench_plot("Halo on the dark side against contrast; x=contrast; y=dark_side_codes; by=operator; log=x; style=linespoints");
     bench_note("largest distance from the code far from the edge; width: pixels that are more than 2 codes off");
     for (double contrast = 10; contrast <= 1.1e6; contrast *= 10)
-        for (int k = 0; k < 5; ++k) {
-            const char *names[5] = {"local", "local, soft scales", "local, epsilon 0.025", "local, epsilon 0.0025",
-                                    "exact Gaussian"};
+        for (int k = 0; k < 6; ++k) {
+            const char *names[6] = {"local, hard scales", "local, soft scales", "local, epsilon 0.025",
+                                    "local, epsilon 0.0025", "exact Gaussian", "guided"};
             scene s;
-            tonemap_options o = tonemap_defaults();
+            tonemap_options o = local_options();
             tonemap_stats stats;
             double dark = 0, bright = 0;
             int wide = 0;
@@ -603,6 +637,7 @@ static void halos(void)
             settle(&s, "step");
             o.soft = k == 1;
             o.epsilon = k == 2 ? 0.025 : k == 3 ? 0.0025 : 0.05;
+            if (k == 5) o.operation = TONEMAP_GUIDED;
             double *codes = luminance_codes(&s, &o, &stats);
             if (k == 4) {
                 free(codes);
@@ -615,7 +650,7 @@ static void halos(void)
                 if (x >= W / 2 && off > bright) bright = off;
                 wide += off > 2;
             }
-            bench_row("%g\t%s\t%.2f\t%.2f\t%d\t%d", contrast, names[k], dark, bright, wide, k == 0);
+            bench_row("%g\t%s\t%.2f\t%.2f\t%d\t%d", contrast, names[k], dark, bright, wide, k == 5);
             free(codes);
             image_free(&s.picture);
         }
@@ -639,7 +674,7 @@ static void michael_sizes(const scene *s)
     static const int published9[7][3] = {{226, 83, 141},   {111, 28, 78},   {80, 19, 55}, {55, 12, 37},
                                          {1719, 360, 503}, {584, 115, 190}, {195, 33, 64}};
     static const double ratio9[7] = {1.68, 2.79, 2.89, 3.08, 1.40, 1.65, 2.00};
-    tonemap_options global = tonemap_defaults(), local = global, selective;
+    tonemap_options global = local_options(), local = global, selective;
     int count = bench_quick() ? 3 : 7;
     global.operation = TONEMAP_ASHIKHMIN_GLOBAL;
     local.operation = TONEMAP_ASHIKHMIN;
@@ -689,7 +724,7 @@ static void michael_pictures(scene *scenes, int count)
                 if (strcmp(published[k][0], scenes[i].name) == 0) known = k;
             const scene *s = &scenes[i];
             int width = s->picture.width, height = s->picture.height;
-            tonemap_options local = tonemap_defaults(), global, selective;
+            tonemap_options local = local_options(), global, selective;
             tonemap_stats stats;
             local.operation = kind ? TONEMAP_PHOTOGRAPHIC_LOCAL : TONEMAP_ASHIKHMIN;
             global = selective = local;
@@ -746,7 +781,7 @@ static void slomp(const scene *s)
     bench_note("RL: relative luminance with its log-average; TM: sums, search, colour and sRGB, without (N), with uniform (MU) and local (MV) mesopic filter; FT: the whole frame with MV; the SAT is part of TM here. Overhead of MV: of the whole frame; published: GTX 280");
     for (int i = 0; i < count; ++i) {
         scene f;
-        tonemap_options o = tonemap_defaults();
+        tonemap_options o = local_options();
         double t[4];
         enlarge(&f, s, sizes[i][0], sizes[i][1]);
         work n = make_work(&f, &o), u, v;
