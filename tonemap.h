@@ -315,7 +315,7 @@ extern "C" {
    state as it was (but for pending errors, which are lost). Nothing waits for the GPU: the log-average and the
    adaptation stay there. All options but threads work. Metering by percentiles (the default), an
    estimated key or white, and Ashikhmin's range take a histogram that draws one point a pixel, and on ES
-   EXT_float_blend; TONEMAP_METERING_LOG_AVERAGE does without. */
+   EXT_float_blend; TONEMAP_METERING_LOG_AVERAGE with a white above 0 does without. */
 typedef struct tonemap_gl tonemap_gl;
 
 /* On an OpenGL error *out only answers tonemap_gl_message, and is to be destroyed; on the others it is NULL. */
@@ -2113,8 +2113,8 @@ static inline void tonemap__shift_red4(sat__f32x4 *v, sat__f32x4 luminance, sat_
    Yxy does */
 
 /* Eq A.3 and A.4 with burn-out: Ld = Lr (1 + Lr peak / white^2) / (1 + La / peak), and Lr = scale L; the thesis has a
-   peak of 1; white is then the peak. Where Lr is beyond the cap of
-   the sums, La grows with it, so that the brightest places keep their colour as with the global operator. */
+   peak of 1. Where Lr is beyond the cap of the sums, La grows with it, so that the brightest places keep their
+   colour as with the global operator. Made in units of the peak. */
 static inline void tonemap__gain_photographic(float *gain, const float *local, const float *luminance,
                                               const tonemap__frame *f, int end)
 {

@@ -45,7 +45,7 @@ TEST(readme_tonemap)
     fill(0, 1e4);
     {
         /* README: tonemap */
-        tonemap_options options = tonemap_defaults();                   /* local photographic operator */
+        tonemap_options options = tonemap_defaults();                   /* photographic curve, guided filter */
         options.mesopic = TONEMAP_MESOPIC_LOCAL;                        /* reds fade in the dark */
         options.cd_per_unit = 1;
         result = tonemap_once_u8(screen, pixels, width, height, 3, &options);

@@ -1782,6 +1782,39 @@ TEST(mesopic_vision_needs_no_units)
     free(pixels);
 }
 
+/* A lamp that flickers moves no code by more than 1 outside its window, in frames a sixtieth of a second apart. */
+TEST(a_flickering_lamp_stays_in_its_window)
+{
+    enum { W = 200, H = 120 };
+    float *pixels = room_pixels(W, H, 8);
+    sat_image view = sat_image_f32(pixels, W, H, 3);
+    tonemap_options o = tonemap_defaults();
+    unsigned char *out[2] = {(unsigned char *)malloc(W * H * 3), (unsigned char *)malloc(W * H * 3)};
+    tonemap *map = NULL;
+    int frames, i, x, y, worst = 0;
+    o.adapt_seconds = 0.5;
+    EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
+    for (frames = 0; frames < 40; ++frames) {
+        for (y = 90; y < 96; ++y)
+            for (x = 100; x < 106; ++x)
+                for (i = 0; i < 3; ++i) pixels[3 * (y * W + x) + i] = frames % 2 ? 2000 : 0.1f;
+        EXPECT_EQ(tonemap_apply_u8(map, out[frames % 2], W * 3, &view, 1 / 60.0, NULL), SAT_OK);
+        if (!frames) continue;
+        for (y = 0; y < H; ++y)
+            for (x = 0; x < W; ++x)
+                for (i = 0; i < 3 && !(x >= 80 && x < 126 && y >= 70 && y < 116); ++i) {
+                    int d = abs((int)out[0][3 * (y * W + x) + i] - (int)out[1][3 * (y * W + x) + i]);
+                    worst = d > worst ? d : worst;
+                }
+    }
+    REPORT("a flickering lamp, largest change elsewhere", worst, "codes");
+    EXPECT(worst <= 1);
+    tonemap_destroy(map);
+    free(out[0]);
+    free(out[1]);
+    free(pixels);
+}
+
 /* Light that wavers by less than a step moves no code, also where it crosses a step; a real change does. */
 TEST(metering_holds_while_light_wavers)
 {

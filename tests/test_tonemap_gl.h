@@ -256,6 +256,51 @@ TEST(gl_shaders_are_es)
     screen_close(&s);
 }
 
+/* A driver of OpenGL ES that does not blend into floats: it refuses to draw the histogram's points. */
+static int blend_refused;
+
+static void SAT__GL_CALL blend_draw(unsigned mode, int first, int count)
+{
+    void(SAT__GL_CALL * draw)(unsigned mode, int first, int count);
+    sat_gl_proc proc = gl_es_real("glDrawArrays");
+    memcpy(&draw, &proc, sizeof proc);
+    if (mode == SAT__GL_POINTS) blend_refused = 1;
+    else draw(mode, first, count);
+}
+
+static unsigned SAT__GL_CALL blend_error(void)
+{
+    unsigned(SAT__GL_CALL * get_error)(void);
+    sat_gl_proc proc = gl_es_real("glGetError");
+    memcpy(&get_error, &proc, sizeof proc);
+    if (!blend_refused) return get_error();
+    blend_refused = 0;
+    return 0x0502; /* GL_INVALID_OPERATION */
+}
+
+static sat_gl_proc blend_proc(const char *name)
+{
+    if (strcmp(name, "glDrawArrays") == 0) return (sat_gl_proc)blend_draw;
+    if (strcmp(name, "glGetError") == 0) return (sat_gl_proc)blend_error;
+    return gl_es_proc(name);
+}
+
+TEST(gl_says_that_blending_of_floats_is_missing)
+{
+    screen s;
+    tonemap_options o = tonemap_defaults();
+    tonemap_gl *gl = NULL;
+    if (!screen_open(&s)) return;
+    gl_es_pretend(s.context.get_proc);
+    EXPECT(tonemap_gl_create(&gl, blend_proc, 20, 20, &o) != SAT_OK);
+    EXPECT(strstr(tonemap_gl_message(gl), "EXT_float_blend") && strstr(tonemap_gl_message(gl), "LOG_AVERAGE"));
+    tonemap_gl_destroy(gl);
+    o.metering = TONEMAP_METERING_LOG_AVERAGE, o.white = 3;
+    EXPECT_EQ(tonemap_gl_create(&gl, blend_proc, 20, 20, &o), SAT_OK);
+    tonemap_gl_destroy(gl);
+    screen_close(&s);
+}
+
 TEST(gl_takes_thin_pictures)
 {
     int sizes[][2] = {{64, 40}, {40, 27}, {38, 130}, {257, 31}}, i;
