@@ -353,7 +353,7 @@ TONEMAP_DEF const char *tonemap_gl_glsl(void);
 #endif /* TONEMAP__GL_API */
 
 /* ------------------------------------------------------------------------------------------------
-   Stop here if you only want to use the library. >> options: their table, what is left out, sentences; the object
+   Stop here if you only want to use the library.
    ------------------------------------------------------------------------------------------------ */
 
 #if defined(TONEMAP_IMPLEMENTATION) && !defined(TONEMAP_IMPLEMENTED)
@@ -370,7 +370,9 @@ SAT__IEEE_BEGIN
 extern "C" {
 #endif
 
-/* What TONEMAP_NO_... leaves out: the conditions below become constants, and the code behind them goes. */
+/* ---- >> options: their table, what is left out, sentences; the object
+
+   What TONEMAP_NO_... leaves out: the conditions below become constants, and the code behind them goes. */
 #ifdef TONEMAP_NO_ASHIKHMIN
 enum { TONEMAP__HAS_ASHIKHMIN = 0 };
 #else
