@@ -4,7 +4,7 @@
 
 all: examples
 .PHONY: all examples demo web check-view test bench report size check check-strict check-house check-variants check-asan check-tsan \
-        check-analyze check-compilers check-report check-install format-check fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
+        check-analyze check-compilers check-report check-install check-glsl format-check fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
@@ -78,6 +78,8 @@ VIEW_SOURCES    := $(if $(GLFW_LIB),$(wildcard examples/*_view.c))
 EXAMPLES := $(EXAMPLE_SOURCES:examples/%.c=build/%) $(VIEW_SOURCES:examples/%.c=build/%)
 examples: $(EXAMPLES)
 
+build/gl_frame: examples/gl_frame.c
+	$(COMPILE_C) $(PICTURES) $(if $(GLFW_LIB),-DHAVE_GLFW) $(GLFW) $< -o $@ $(PICTURE_LIBS) $(GLFW_LIB) $(LDLIBS)
 build/%_view: examples/%_view.c
 	$(COMPILE_C) $(PICTURES) $(GLFW) $< -o $@ $(PICTURE_LIBS) $(GLFW_LIB) $(LDLIBS)
 build/%: examples/%.c
@@ -146,7 +148,7 @@ run-tests:
 # ---- checks ----------------------------------------------------------------------------------------------------
 # Each ends with the line "N passed, N failed, N skipped". TESTS_CXX= leaves the C++ twins out where they add nothing.
 
-check: check-strict check-house check-variants check-asan check-tsan check-analyze check-compilers
+check: check-strict check-house check-glsl check-variants check-asan check-tsan check-analyze check-compilers
 
 # warnings in all languages and compilers, linkage, names, macros, options, order of inclusion
 check-strict:
@@ -203,6 +205,10 @@ check-report:
 # what `make install` writes and docs/packaging.md says, by pkg-config, CMake and Meson where they are
 check-install:
 	@RUNNER='bash tests/check_install.sh' JOBS=1 tests/run.sh install
+
+# every shader of every combination of options through glslangValidator
+check-glsl:
+	@RUNNER='bash tests/check_glsl.sh' tests/run.sh $(LIBS)
 
 # columns, tabs and blanks of all sources
 format-check:
@@ -280,6 +286,7 @@ help:
 	@echo 'make check-analyze    gcc -fanalyzer, clang --analyze; check-compilers: aarch64, mingw-w64, tcc, 32 bit'
 	@echo 'make check-report     every bench once, with all packages and with none: the report is whole'
 	@echo 'make check-install    what make install writes, by pkg-config, CMake and Meson'
+	@echo 'make check-glsl       every shader, in every combination of options, through glslangValidator'
 	@echo 'make format-check     columns, tabs and blanks of all sources'
 	@echo 'make fuzz             libFuzzer on each header          [FUZZ_SECONDS=20]'
 	@echo 'make check            all of check-*; each takes LIB=sat'

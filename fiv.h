@@ -408,18 +408,31 @@ typedef struct fiv_gl fiv_gl;
    *out still is an object, for its message alone. */
 FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int width, int height,
                                  const fiv_gl_options *options);
+/* Other options: penumbra, from the next fiv_gl_set_scene on. max_instances and self are compiled in: SAT_ERR_MISMATCH
+   when one differs, and nothing changes. The allocator is not looked at. */
+FIV_DEF sat_result fiv_gl_set_options(fiv_gl *gl, const fiv_gl_options *options);
 /* After each fiv_occluder_light. Uploads the environment and those occluders that differ from the last scene; no
    allocation but, when tables grow, that of OpenGL. On an error the last scene stays as it was. */
 FIV_DEF sat_result fiv_gl_set_scene(fiv_gl *gl, const fiv_environment *environment, const fiv_instance *instances,
                                     size_t count);
 /* Only places and scales differ from the last fiv_gl_set_scene: what moving occluders cost a frame. */
 FIV_DEF sat_result fiv_gl_move(fiv_gl *gl, const fiv_instance *instances, size_t count);
-/* Irradiance of every pixel: `points` and `normals` are float textures of world coordinates; a normal of 0 gives 0.
-   With options.self the alpha of `points` says what a receiver lies on: 2 + i the surface of instance i, which shadows
-   itself as in fiv_self_irradiance; any other value, such as the 1 of RGB textures, nothing that casts shadows. State
-   that is touched is put back. */
-FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *gl, unsigned points, unsigned normals);
-/* The result, RGBA32F; belongs to the object. */
+/* How a renderer has its receivers: a depth buffer, and normals in the camera's axes or the world's. */
+typedef struct fiv_gl_view {
+    float world_from_clip[16];  /* column-major; inverse of what drew the depth buffer: perspective or not, reversed,
+                                   infinite, top-down: all is in it */
+    int clip_zero_to_one;       /* 0: the matrix takes depth in [-1,1] (OpenGL); 1: in [0,1] (glClipControl) */
+    float world_from_normal[9]; /* column-major; turns the normals into the world's axes */
+} fiv_gl_view;
+
+/* Irradiance of every pixel, in the target `to`, or, when NULL, in fiv_gl_texture() (RGBA32F). `points` and `normals`
+   are float textures of world coordinates, at least of the created size; a normal of 0 gives 0. With a view, `points`
+   is a depth texture without comparison instead. With options.self an alpha says what a receiver lies on, that of
+   `points`, with a view that of `normals`: 2 + i the surface of instance i, which shadows itself as in
+   fiv_self_irradiance; any other value, such as the 1 of RGB textures, nothing that casts shadows. */
+FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *gl, const sat_gl_target *to, unsigned points, unsigned normals,
+                                     const fiv_gl_view *view);
+
 FIV_DEF unsigned fiv_gl_texture(const fiv_gl *gl);
 /* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 FIV_DEF const char *fiv_gl_message(const fiv_gl *gl);
@@ -4545,12 +4558,22 @@ FIV_DEF const char *const *fiv_gl_glsl(void) { return fiv__glsl; }
 
 static const char fiv__glsl_main[] =
     "uniform highp sampler2D fiv_points, fiv_normals;\n"
+    "uniform vec4 fiv_world[4];\n"
+    "uniform vec3 fiv_turn[3], fiv_depth;\n" /* fiv_depth: 2 / size; 0 points, 1 depth in [-1,1], 2 in [0,1] */
     "out vec4 value;\n"
     "void main() {\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
-    "    vec4 point = texelFetch(fiv_points, p, 0);\n"
-    "    int self = FIV_SELF != 0 && point.w >= 2.0 && point.w < 66.0 ? int(point.w) - 2 : -1;\n"
-    "    value = vec4(fiv_receive(self, point.xyz, texelFetch(fiv_normals, p, 0).xyz), 1.0);\n"
+    "    ivec2 p = sat_pixel();\n"
+    "    vec4 point = texelFetch(fiv_points, p, 0), normal = texelFetch(fiv_normals, p, 0);\n"
+    "    float on = point.w;\n"
+    "    if (fiv_depth.z > 0.5) {\n"
+    "        vec3 clip = vec3((vec2(p) + 0.5) * fiv_depth.xy - 1.0, fiv_depth.z > 1.5 ? point.x : 2.0 * point.x - 1.0);\n"
+    "        point = fiv_world[0] * clip.x + fiv_world[1] * clip.y + fiv_world[2] * clip.z + fiv_world[3];\n"
+    "        point.xyz /= point.w;\n"
+    "        on = normal.w;\n"
+    "        normal.xyz = fiv_turn[0] * normal.x + fiv_turn[1] * normal.y + fiv_turn[2] * normal.z;\n"
+    "    }\n"
+    "    int self = FIV_SELF != 0 && on >= 2.0 && on < 66.0 ? int(on) - 2 : -1;\n"
+    "    value = vec4(fiv_receive(self, point.xyz, normal.xyz), 1.0);\n"
     "}\n";
 
 /* >> opengl   ---- objects, scenes, passes */
@@ -4646,23 +4669,29 @@ static void fiv__gl_filter(sat__gl *gl, unsigned kind)
     gl->TexParameteri(kind, SAT__GL_TEXTURE_MAX_LEVEL, 0);
 }
 
-static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
+static sat_result fiv__gl_program(fiv_gl *g)
 {
     sat__gl *gl = &g->gl;
-    sat__gl_state state;
     sat__gl_shaders shaders;
-    const char *body[2];
-    sat_result r = sat__gl_open(gl, get_proc);
-    if (r) return r;
-    body[0] = fiv__glsl_main;
-    body[1] = NULL;
+    const char *body[3];
+    body[0] = sat__gl_pixel();
+    body[1] = fiv__glsl_main;
+    body[2] = NULL;
     memset(&shaders, 0, sizeof shaders);
     shaders.name = "fiv: receivers";
     shaders.library = fiv__glsl;
     shaders.fragment = body;
     sat__gl_define(gl, "FIV_INSTANCES", g->max_instances);
     sat__gl_define(gl, "FIV_SELF", g->self);
-    r = sat__gl_build(gl, &g->program, &shaders);
+    return sat__gl_build(gl, &g->program, &shaders);
+}
+
+static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
+{
+    sat__gl *gl = &g->gl;
+    sat__gl_state state;
+    sat_result r = sat__gl_open(gl, get_proc);
+    if (!r) r = fiv__gl_program(g);
     if (r) return r;
     sat__gl_begin(gl, &state, 1);
     r = sat__gl_texture(gl, &g->out, SAT__GL_RGBA32F, g->width, g->height, NULL);
@@ -4697,6 +4726,16 @@ FIV_DEF sat_result fiv_gl_create(fiv_gl **out, sat_gl_get_proc *get_proc, int wi
     g->self = o.self != 0;
     g->penumbra = o.penumbra;
     return fiv__gl_start(g, get_proc);
+}
+
+FIV_DEF sat_result fiv_gl_set_options(fiv_gl *g, const fiv_gl_options *options)
+{
+    fiv_gl_options o = options ? *options : fiv_gl_defaults();
+    if (!g || !g->scene) return SAT_ERR_ARGUMENT;
+    if (*fiv_explain_gl(g->gl.message, sizeof g->gl.message, g->width, g->height, &o)) return SAT_ERR_ARGUMENT;
+    if (o.max_instances != g->max_instances || (o.self != 0) != g->self) return SAT_ERR_MISMATCH;
+    g->penumbra = o.penumbra;
+    return SAT_OK;
 }
 
 /* The four components of a field of fiv_shells; all samples that are not valid are 0. */
@@ -4983,18 +5022,39 @@ FIV_DEF sat_result fiv_gl_bind(fiv_gl *g, unsigned program, int first_unit)
     return SAT_OK;
 }
 
-FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *g, unsigned points, unsigned normals)
+static void fiv__gl_set_view(fiv_gl *g, const fiv_gl_view *view)
+{
+    sat__gl *gl = &g->gl;
+    float depth[3] = {0, 0, 0};
+    if (view) {
+        depth[0] = 2 / (float)g->width;
+        depth[1] = 2 / (float)g->height;
+        depth[2] = view->clip_zero_to_one ? 2.0f : 1.0f;
+        gl->Uniform4fv(gl->GetUniformLocation(g->program, "fiv_world"), 4, view->world_from_clip);
+        gl->Uniform3fv(gl->GetUniformLocation(g->program, "fiv_turn"), 3, view->world_from_normal);
+    }
+    sat__gl_set_float3(gl, g->program, "fiv_depth", depth);
+}
+
+FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *g, const sat_gl_target *to, unsigned points, unsigned normals,
+                                     const fiv_gl_view *view)
 {
     sat__gl_state state;
-    if (!g || !g->shells || !points || !normals) return SAT_ERR_ARGUMENT;
+    sat_result result;
+    if (!g || !g->shells || !points || !normals || !sat__gl_target_is_valid(to)) return SAT_ERR_ARGUMENT;
+    if (sat__gl_target_is(to, points) || sat__gl_target_is(to, normals)) return SAT_ERR_ARGUMENT;
     sat__gl_begin(&g->gl, &state, FIV__GL_UNITS);
-    sat__gl_pass(&g->gl, g->program, g->target, g->width, g->height);
-    fiv__gl_uniforms(g, g->program, 0);
-    sat__gl_set_texture(&g->gl, g->program, "fiv_points", 5, points);
-    sat__gl_set_texture(&g->gl, g->program, "fiv_normals", 6, normals);
-    sat__gl_draw(&g->gl);
+    result = sat__gl_pass_to(&g->gl, g->program, to, g->target, g->width, g->height);
+    if (result == SAT_OK) {
+        fiv__gl_uniforms(g, g->program, 0);
+        fiv__gl_set_view(g, view);
+        sat__gl_set_texture(&g->gl, g->program, "fiv_points", 5, points);
+        sat__gl_set_texture(&g->gl, g->program, "fiv_normals", 6, normals);
+        sat__gl_draw(&g->gl);
+    }
+    sat__gl_release_target(&g->gl, to);
     sat__gl_end(&g->gl, &state);
-    return SAT_OK;
+    return result;
 }
 
 #ifdef __cplusplus

@@ -445,6 +445,7 @@ typedef struct raindrop_gl_options {
     int half_map;            /* 1; 0..1; 1: half floats, 22 MB for a base of 1024; 0: floats */
     int quads;               /* 1; 0..1; 1: instanced quads; 0: point sprites, as published, which vanish when their
                                 centre leaves the picture and are cut at the context's largest point */
+    int compile_all;         /* 0; 0..1; 1: create compiles every program, so that no picture does */
     sat_allocator allocator; /* malloc; used by create, destroy and set_environment only */
 } raindrop_gl_options;
 RAINDROP_DEF raindrop_gl_options raindrop_gl_defaults(void);
@@ -471,11 +472,16 @@ RAINDROP_DEF sat_result raindrop_gl_set_wind(raindrop_gl *gl, const float wind[3
 /* The drops back from the GPU, which waits for it; count as in the rain. */
 RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *drops, int count);
 
-/* Blends the drops over the bound framebuffer's viewport (0, 0, width, height), which should hold floats: row 0 is the
-   bottom one, as OpenGL has it. Unsorted, as published; else as raindrop_render. The first picture with a
-   shutter or a lens, of flattened drops, or with internal reflections compiles a program that knows them; the others do
-   not pay. The depth buffer is tested against where camera.depth_far says so, and never written. */
-RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, int width, int height, const raindrop_camera *camera,
+/* Blends the drops over a picture of this size in the target `to`, which should hold floats; NULL: in the framebuffer
+   that is bound. Row 0 is the bottom one, as OpenGL has it. Unsorted, as published; else as raindrop_render. The first
+   picture with a shutter or a lens, of flattened drops, or with internal reflections compiles a program that knows
+   them, unless options.compile_all has them all; the others do not pay.
+
+   projection: the perspective matrix (column-major) that drew the framebuffer's depth buffer: the depth test is on,
+   depth is not written. It may be reversed, infinite, or made for glClipControl's [0,1]. NULL: no test, or where
+   camera.depth_far says so the usual perspective with depth_near and depth_far. */
+RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, const sat_gl_target *to, int width, int height,
+                                           const raindrop_camera *camera, const float projection[16],
                                            const raindrop_render_options *options);
 
 /* GLSL (3.30 or ES 3.00) for shaders of your own: raindrop_ray raindrop_trace(d, p, one_minus_b2, n) as on the CPU. */
@@ -3835,7 +3841,8 @@ static const char raindrop__glsl_draw_vertex[] =
     "layout(location = 1) in vec4 motion;\n"   /* velocity, axis ratio */
     "uniform vec3 eye, right, up, back;\n"
     "uniform vec4 view;\n"                     /* half width, half height, focal length in pixels, near distance */
-    "uniform vec4 limits;\n"                   /* far radius, coverage threshold, depth planes */
+    "uniform vec4 limits;\n"                   /* far radius, coverage threshold; depth is z + w / distance */
+    "uniform ivec3 sat_corner_of;\n"           /* as sat__gl_pixel has it: z > 0, upside down */
     "flat out vec4 place;\n"                   /* centre in pixels, half side (sprite) or radius, focal length in
                                                   radii; of a far drop: opacity */
     "flat out vec4 seen;\n"                    /* centre in radii, view space, z forward; axis ratio. Of a far drop
@@ -3926,12 +3933,12 @@ static const char raindrop__glsl_draw_place[] =
     "            }\n"
     "        }\n"
     "#endif\n"
-    "        float z = limits.z > 0.0 ? ((limits.w + limits.z) - 2.0 * limits.w * limits.z / v.z) / (limits.w - limits.z) : 0.0;\n"
-    "#ifdef QUADS\n"
+        "#ifdef QUADS\n"
     "        vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;\n"
     "        middle += corner.x * right_reach + corner.y * up_reach;\n"
     "#endif\n"
-    "        gl_Position = vec4(middle / view.xy - 1.0, z, 1.0);\n"
+    "        gl_Position = vec4(middle / view.xy - 1.0, limits.z + limits.w / v.z, 1.0);\n"
+    "        if (sat_corner_of.z > 0) gl_Position.y = -gl_Position.y;\n"
     "    }\n"
     "#ifndef QUADS\n"
     "    vec2 reach = abs(right_reach) + abs(up_reach);\n"
@@ -3953,6 +3960,13 @@ static const char raindrop__glsl_shade[] =
     "uniform vec4 view;\n"
     "uniform vec2 optics;\n" /* index, whether the exit has Fresnel factors */
     "layout(location = 0) out vec4 colour;\n"
+    "vec2 here() {\n" /* points reach beyond the viewport */
+    "    vec2 p = vec2(sat_pixel()) + 0.5;\n"
+    "#ifndef QUADS\n"
+    "    if (any(lessThan(p, vec2(0.0))) || any(greaterThan(p, 2.0 * view.xy))) discard;\n"
+    "#endif\n"
+    "    return p;\n"
+    "}\n"
     "float pixel_width() { return sqrt(dot(seen.xyz, seen.xyz) - 1.0) / view.z; }\n" /* in radii */
     "vec3 mirrored(raindrop_ray ray, float blur) {\n"
     "    return ray.fresnel * look(ray.reflected, blur * (2.0 * pixel_width() + 1.0 / view.z));\n"
@@ -3974,7 +3988,7 @@ static const char raindrop__glsl_draw_sprite[] =
     "    return v.x * (right - n.x * k * (back + to_eye)) + v.y * (up - n.y * k * (back + to_eye)) + v.z * to_eye;\n"
     "}\n"
     "void main() {\n"
-    "    vec2 st = (gl_FragCoord.xy - place.xy) / place.z;\n"
+    "    vec2 st = (here() - place.xy) / place.z;\n"
     "    if (max(abs(st.x), abs(st.y)) > 1.0) discard;\n"
     "    float d2 = dot(seen.xyz, seen.xyz);\n"
     "    vec3 n = vec3(-seen.xy, seen.z) / sqrt(d2);\n"
@@ -4079,7 +4093,7 @@ static const char raindrop__glsl_draw_trace[] =
     "struct fragment { raindrop_ray ray; vec3 d, p; float one_minus_b2, cover; };\n"
     "fragment trace(vec2 at) {\n"
     "    fragment f;\n"
-    "    vec3 d = vec3((gl_FragCoord.xy - view.xy) / view.z, 1.0), q = vec3(at * place.w, 0.0);\n"
+    "    vec3 d = vec3((here() - view.xy) / view.z, 1.0), q = vec3(at * place.w, 0.0);\n"
     "    float l2 = dot(d, d), t = dot(q, d) / l2;\n"
     "    vec3 p = q - t * d;\n"
     "    float b2 = dot(p, p), b = sqrt(max(b2, 1e-12)), slope = max(length(p.xy * (place.w - t / view.z)) / b, 1e-9);\n"
@@ -4147,7 +4161,7 @@ static const char raindrop__glsl_draw_soft[] =
 
 static const char raindrop__glsl_draw_ray[] =
     "void main() {\n"
-    "    vec2 at = gl_FragCoord.xy - place.xy;\n"
+    "    vec2 at = here() - place.xy;\n"
     "#ifdef SOFT\n"
     "    if (path.w > 0.0) {\n"
     "        draw_soft(at);\n"
@@ -4320,6 +4334,7 @@ struct raindrop_gl {
 static const sat__field raindrop__gl_fields[] = {
     SAT__FIELD(raindrop_gl_options, 'i', half_map, 1, 0, 1, ' '),
     SAT__FIELD(raindrop_gl_options, 'i', quads, 1, 0, 1, ' '),
+    SAT__FIELD(raindrop_gl_options, 'i', compile_all, 0, 0, 1, ' '),
     SAT__FIELD(raindrop_gl_options, 'a', allocator, 0, 0, 0, ' '),
 };
 
@@ -4345,7 +4360,7 @@ RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl)
 /* The program of a look and a kind, built when it is first asked for. */
 static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int kind)
 {
-    const char *library[4], *vertex[3], *fragment[7];
+    const char *library[4], *vertex[3], *fragment[8];
     sat__gl_shaders shaders;
     if (g->draw[look][kind]) return SAT_OK;
     memset(&shaders, 0, sizeof shaders);
@@ -4354,17 +4369,18 @@ static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int
     library[2] = raindrop__glsl_environment;
     vertex[0] = raindrop__glsl_draw_vertex;
     vertex[1] = raindrop__glsl_draw_place;
-    fragment[0] = raindrop__glsl_shade;
+    fragment[0] = sat__gl_pixel();
+    fragment[1] = raindrop__glsl_shade;
     if (look <= RAINDROP_LOOK_SPRITE) {
-        fragment[1] = raindrop__glsl_draw_sprite;
-        fragment[2] = NULL;
+        fragment[2] = raindrop__glsl_draw_sprite;
+        fragment[3] = NULL;
     } else {
-        fragment[1] = raindrop__glsl_orders;
-        fragment[2] = raindrop__glsl_flat;
-        fragment[3] = raindrop__glsl_draw_trace;
-        fragment[4] = raindrop__glsl_draw_soft;
-        fragment[5] = raindrop__glsl_draw_ray;
-        fragment[6] = NULL;
+        fragment[2] = raindrop__glsl_orders;
+        fragment[3] = raindrop__glsl_flat;
+        fragment[4] = raindrop__glsl_draw_trace;
+        fragment[5] = raindrop__glsl_draw_soft;
+        fragment[6] = raindrop__glsl_draw_ray;
+        fragment[7] = NULL;
     }
     library[3] = vertex[2] = NULL;
     shaders.name = "raindrop: drops";
@@ -4385,9 +4401,11 @@ static inline sat_result raindrop__gl_programs(raindrop_gl *g)
     const char *vertex[4];
     sat__gl_shaders shaders;
     sat_result result = SAT_OK;
-    int look;
-    for (look = g->options.map ? 0 : 1; look < 4 && result == SAT_OK; look++)
-        result = raindrop__gl_draw_program(g, look, 0);
+    int look, kind;
+    for (look = g->options.map ? 0 : 1; look < 4; look++)
+        for (kind = 0; kind < (g->options.compile_all ? RAINDROP__GL_KINDS : 1) && result == SAT_OK; kind++)
+            if (look > RAINDROP_LOOK_SPRITE || (kind & ~RAINDROP__GL_FLAT) == 0)
+                result = raindrop__gl_draw_program(g, look, kind);
     if (result != SAT_OK) return result;
     memset(&shaders, 0, sizeof shaders);
     vertex[0] = raindrop__glsl_constants;
@@ -4665,7 +4683,8 @@ RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt)
 
 /* ---- picture */
 
-static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const raindrop__frame *frame)
+static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const raindrop__frame *frame,
+                                         const float depth[2])
 {
     sat__gl *gl = &g->gl;
     const raindrop_camera *camera = &frame->camera;
@@ -4681,8 +4700,8 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
     sat__gl_set_float4(gl, program, "view", v);
     v[0] = frame->options.far_radius;
     v[1] = frame->options.coverage_threshold;
-    v[2] = camera->depth_far > 0 ? camera->depth_near : 0;
-    v[3] = camera->depth_far;
+    v[2] = depth[0];
+    v[3] = depth[1];
     sat__gl_set_float4(gl, program, "limits", v);
     memcpy(v, camera->velocity, sizeof camera->velocity);
     v[3] = camera->exposure;
@@ -4711,7 +4730,41 @@ static inline int raindrop__gl_frame_is_valid(raindrop_gl *g, const raindrop__fr
     return g->drops[0] ? 1 : raindrop__say(&t, "there was no raindrop_gl_set_rain");
 }
 
-RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height, const raindrop_camera *camera,
+/* Depth as OpenGL keeps it is v[0] + v[1] / distance; 0 for matrices that are no perspective. */
+static inline int raindrop__gl_depth(float v[2], const raindrop_camera *camera, const float *projection)
+{
+    float n = camera->depth_near, f = camera->depth_far, w;
+    v[0] = v[1] = 0;
+    if (projection) {
+        w = fabsf(projection[11]);
+        v[0] = projection[11] < 0 ? -projection[10] / w : projection[10] / w;
+        v[1] = projection[14] / w;
+        return w > 0 && sat__is_finite(v[0]) && sat__is_finite(v[1]) && !(fabsf(projection[15]) > 0);
+    }
+    if (f > 0) {
+        v[0] = (f + n) / (f - n);
+        v[1] = -2 * f * n / (f - n);
+    }
+    return 1;
+}
+
+/* Everything that a blended draw needs beside the program's uniforms. */
+static inline void raindrop__gl_blend(raindrop_gl *g, const float depth[2])
+{
+    sat__gl *gl = &g->gl;
+    gl->Enable(SAT__GL_BLEND);
+    gl->BlendEquationSeparate(0x8006, 0x8006); /* GL_FUNC_ADD */
+    gl->BlendFuncSeparate(SAT__GL_SRC_ALPHA, SAT__GL_ONE_MINUS_SRC_ALPHA, SAT__GL_ZERO, SAT__GL_ONE);
+    if (depth[0] < 0 || depth[0] > 0 || depth[1] < 0 || depth[1] > 0) {
+        gl->Enable(SAT__GL_DEPTH_TEST);
+        gl->DepthFunc(depth[1] > 0 ? 0x0206u : (unsigned)SAT__GL_LEQUAL); /* GL_GEQUAL: reversed */
+    }
+    gl->DepthMask(0);
+    if (!gl->is_es) gl->Enable(SAT__GL_PROGRAM_POINT_SIZE);
+}
+
+RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, const sat_gl_target *to, int width, int height,
+                                           const raindrop_camera *camera, const float projection[16],
                                            const raindrop_render_options *options)
 {
     raindrop__frame frame;
@@ -4719,6 +4772,7 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     sat__gl *gl;
     sat_result result;
     unsigned program;
+    float depth[2];
     int kind = g && g->flat ? RAINDROP__GL_FLAT : 0;
     memset(&frame, 0, sizeof frame);
     frame.camera = camera ? *camera : raindrop_camera_defaults();
@@ -4727,6 +4781,9 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     frame.height = height;
     if (!g || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
     if (!raindrop__gl_frame_is_valid(g, &frame)) return SAT_ERR_ARGUMENT;
+    if (!sat__gl_target_is_valid(to)) return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "the target is none", NULL);
+    if (!raindrop__gl_depth(depth, &frame.camera, projection))
+        return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "projection is no perspective", NULL);
     if (!g->count) return SAT_OK;
     if (!raindrop__is_sprite(&frame) && (frame.camera.exposure > 0 || frame.camera.aperture > 0))
         kind |= RAINDROP__GL_SOFT;
@@ -4737,26 +4794,22 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, int width, int height
     program = g->draw[frame.options.look][kind];
     raindrop__set_frame(&frame);
     sat__gl_begin(gl, &state, 4);
-    gl->UseProgram(program);
-    gl->Viewport(0, 0, width, height);
-    raindrop__gl_set_draw(g, program, &frame);
-    gl->Enable(SAT__GL_BLEND);
-    gl->BlendEquationSeparate(0x8006, 0x8006); /* GL_FUNC_ADD */
-    gl->BlendFuncSeparate(SAT__GL_SRC_ALPHA, SAT__GL_ONE_MINUS_SRC_ALPHA, SAT__GL_ZERO, SAT__GL_ONE);
-    if (frame.camera.depth_far > 0) {
-        gl->Enable(SAT__GL_DEPTH_TEST);
-        gl->DepthFunc(SAT__GL_LEQUAL);
+    result = sat__gl_pass_to(gl, program, to, (unsigned)state.draw_framebuffer, width, height);
+    if (result != SAT_OK) {
+        sat__gl_end(gl, &state);
+        return result;
     }
-    gl->DepthMask(0);
-    if (!gl->is_es) gl->Enable(SAT__GL_PROGRAM_POINT_SIZE);
+    raindrop__gl_set_draw(g, program, &frame, depth);
+    raindrop__gl_blend(g, depth);
     gl->BindVertexArray(g->arrays[g->front]);
     if (g->options.quads) {
         gl->VertexAttribDivisor(0, 1);
         gl->VertexAttribDivisor(1, 1);
         gl->DrawArraysInstanced(SAT__GL_TRIANGLE_STRIP, 0, 4, g->count);
     } else gl->DrawArrays(SAT__GL_POINTS, 0, g->count);
+    sat__gl_release_target(gl, to);
     sat__gl_end(gl, &state);
-    return SAT_OK;
+    return result;
 }
 
 #ifdef __cplusplus

@@ -466,6 +466,48 @@ __attribute__((used)) static int sat__hint(void) { return sat__define_SAT_IMPLEM
 extern "C" {
 #endif
 
+/* Where a call draws its picture; all headers take it. Zeroes (or NULL): the object's own texture. The OpenGL state is
+   put back. Blending is off and sRGB codes are written as they are, unless a call says otherwise. A framebuffer's first
+   draw buffer gets the picture. */
+typedef enum sat_gl_place {
+    SAT_GL_OWN,        /* the texture that X_gl_texture names */
+    SAT_GL_TEXTURE,    /* level 0 of a 2D texture */
+    SAT_GL_LAYER,      /* level 0 of one layer of a 2D array or 3D texture: one eye of two */
+    SAT_GL_FRAMEBUFFER /* a framebuffer of yours; 0 is the window's */
+} sat_gl_place;
+
+typedef struct sat_gl_target {
+    sat_gl_place place; /* SAT_GL_OWN */
+    unsigned name;      /* of the texture or framebuffer */
+    int layer;
+    int x, y;           /* where the picture's corner (0, 0) lies in it: two views side by side, a part of the window */
+    int flip;           /* 0; 1: rows in the reverse order, from top-down to bottom-up and back */
+} sat_gl_target;
+
+static inline sat_gl_target sat_gl_to(sat_gl_place place, unsigned name, int layer, int x, int y, int flip)
+{
+    sat_gl_target target;
+    target.place = place;
+    target.name = name;
+    target.layer = layer;
+    target.x = x;
+    target.y = y;
+    target.flip = flip;
+    return target;
+}
+static inline sat_gl_target sat_gl_to_texture(unsigned texture)
+{
+    return sat_gl_to(SAT_GL_TEXTURE, texture, 0, 0, 0, 0);
+}
+static inline sat_gl_target sat_gl_to_layer(unsigned texture, int layer)
+{
+    return sat_gl_to(SAT_GL_LAYER, texture, layer, 0, 0, 0);
+}
+static inline sat_gl_target sat_gl_to_framebuffer(unsigned framebuffer, int x, int y)
+{
+    return sat_gl_to(SAT_GL_FRAMEBUFFER, framebuffer, 0, x, y, 0);
+}
+
 /* How sums are stored. ES 3.0 and WebGL 2 need EXT_color_buffer_float for the first two. */
 typedef enum sat_gl_format {
     SAT_GL_TWO_FLOAT, /* RG32F: the sum of two floats, about 48 bits */
@@ -492,18 +534,25 @@ typedef struct sat_gl_options {
     double max_value;             /* 1e30; 1e-300..1e300; pixels beyond +-max_value are clamped to it; NaN counts as 0.
                                      Lower it for FIXED32: the quantum is proportional to it */
     double max_box_area;          /* 0; 0..1e300; 0: the whole table; FIXED32: no larger box is ever asked for */
+    int width;                    /* 0; 0..32768; with height: create makes all textures, and no other size is taken */
+    int height;                   /* 0; 0..32768 */
     sat_allocator allocator;      /* malloc; used by create and destroy only */
 } sat_gl_options;
 SAT_DEF sat_gl_options sat_gl_defaults(void);
 SAT_DEF const char *sat_explain_gl(char *text, size_t size, const sat_gl_options *options); /* as sat_explain_image */
 
 /* Belongs to the context that is current in create: it must be current in every call. Textures are made by the
-   first build of a size. Every call leaves the OpenGL state as it was (but for pending errors, which are lost). */
+   first build of a size, unless options.width and height name it. Every call leaves the OpenGL state as it was (but for
+   pending errors, which are lost). */
 typedef struct sat_gl sat_gl;
 
 /* On an OpenGL error *out only answers sat_gl_message, and is to be destroyed; on the others it is NULL. */
 SAT_DEF sat_result sat_gl_create(sat_gl **out, sat_gl_get_proc *get_proc, const sat_gl_options *options);
 SAT_DEF void sat_gl_destroy(sat_gl *gl); /* NULL is fine */
+/* Other options from the next call on. quantum, max_value and max_box_area are uniforms and free; SAT_ERR_MISMATCH when
+   another one differs, which shaders and textures are made for: nothing changes then. The allocator is not looked
+   at. */
+SAT_DEF sat_result sat_gl_set_options(sat_gl *gl, const sat_gl_options *options);
 /* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
 SAT_DEF const char *sat_gl_message(const sat_gl *gl);
 
@@ -1281,16 +1330,13 @@ SAT__IEEE_END
 enum {
     SAT__GL_NO_ERROR = 0,
     SAT__GL_POINTS = 0x0000,
-    SAT__GL_LINES = 0x0001,
     SAT__GL_TRIANGLES = 0x0004,
     SAT__GL_TRIANGLE_STRIP = 0x0005,
     SAT__GL_ZERO = 0,
     SAT__GL_ONE = 1,
     SAT__GL_SRC_ALPHA = 0x0302,
     SAT__GL_ONE_MINUS_SRC_ALPHA = 0x0303,
-    SAT__GL_LESS = 0x0201,
     SAT__GL_LEQUAL = 0x0203,
-    SAT__GL_ALWAYS = 0x0207,
     SAT__GL_FILL = 0x1B02,
     SAT__GL_BLEND_DST_RGB = 0x80C8,
     SAT__GL_BLEND_SRC_RGB = 0x80C9,
@@ -1343,14 +1389,12 @@ enum {
     SAT__GL_TEXTURE_MAX_LEVEL = 0x813D,
     SAT__GL_NEAREST = 0x2600,
     SAT__GL_LINEAR = 0x2601,
-    SAT__GL_REPEAT = 0x2901,
     SAT__GL_CLAMP_TO_EDGE = 0x812F,
     SAT__GL_UNSIGNED_BYTE = 0x1401,
     SAT__GL_UNSIGNED_SHORT = 0x1403,
     SAT__GL_INT = 0x1404,
     SAT__GL_UNSIGNED_INT = 0x1405,
     SAT__GL_FLOAT = 0x1406,
-    SAT__GL_HALF_FLOAT = 0x140B,
     SAT__GL_DEPTH_COMPONENT = 0x1902,
     SAT__GL_RED = 0x1903,
     SAT__GL_RGB = 0x1907,
@@ -1379,7 +1423,6 @@ enum {
     SAT__GL_R16UI = 0x8234,
     SAT__GL_DEPTH_COMPONENT24 = 0x81A6,
     SAT__GL_DEPTH_COMPONENT32F = 0x8CAC,
-    SAT__GL_RENDERER = 0x1F01,
     SAT__GL_VERSION = 0x1F02,
     SAT__GL_FRAGMENT_SHADER = 0x8B30,
     SAT__GL_VERTEX_SHADER = 0x8B31,
@@ -1391,8 +1434,6 @@ enum {
     SAT__GL_VERTEX_ARRAY_BINDING = 0x85B5,
     SAT__GL_ARRAY_BUFFER = 0x8892,
     SAT__GL_ARRAY_BUFFER_BINDING = 0x8894,
-    SAT__GL_STREAM_DRAW = 0x88E0,
-    SAT__GL_STATIC_DRAW = 0x88E4,
     SAT__GL_DYNAMIC_COPY = 0x88EA,
     SAT__GL_MAP_READ_BIT = 0x0001,
     SAT__GL_PIXEL_PACK_BUFFER = 0x88EB,
@@ -1412,13 +1453,7 @@ enum {
     SAT__GL_COLOR_ATTACHMENT0 = 0x8CE0,
     SAT__GL_DEPTH_ATTACHMENT = 0x8D00,
     SAT__GL_COLOR = 0x1800,
-    SAT__GL_DEPTH = 0x1801,
-    SAT__GL_TIME_ELAPSED = 0x88BF,
-    SAT__GL_QUERY_RESULT = 0x8866,
-    SAT__GL_QUERY_RESULT_AVAILABLE = 0x8867,
-    SAT__GL_READ_ONLY = 0x88B8,
     SAT__GL_WRITE_ONLY = 0x88B9,
-    SAT__GL_READ_WRITE = 0x88BA,
     SAT__GL_IMAGE_BINDING_NAME = 0x8F3A,
     SAT__GL_IMAGE_BINDING_LEVEL = 0x8F3B,
     SAT__GL_IMAGE_BINDING_LAYERED = 0x8F3C,
@@ -1446,10 +1481,8 @@ enum {
     X(void, BlendEquationSeparate, (unsigned rgb, unsigned alpha))                                                     \
     X(void, BlendFuncSeparate, (unsigned src_rgb, unsigned dst_rgb, unsigned src_alpha, unsigned dst_alpha))           \
     X(void, BufferData, (unsigned target, ptrdiff_t size, const void *data, unsigned usage))                           \
-    X(void, BufferSubData, (unsigned target, ptrdiff_t offset, ptrdiff_t size, const void *data))                      \
     X(unsigned, CheckFramebufferStatus, (unsigned target))                                                             \
     X(void, ClearBufferfv, (unsigned buffer, int index, const float *value))                                           \
-    X(void, ClearBufferuiv, (unsigned buffer, int index, const unsigned *value))                                       \
     X(void, ColorMask, (unsigned char r, unsigned char g, unsigned char b, unsigned char a))                           \
     X(void, CompileShader, (unsigned shader))                                                                          \
     X(unsigned, CreateProgram, (void))                                                                                 \
@@ -1463,14 +1496,12 @@ enum {
     X(void, DepthFunc, (unsigned function))                                                                            \
     X(void, DepthMask, (unsigned char on))                                                                             \
     X(void, Disable, (unsigned capability))                                                                            \
-    X(void, DisableVertexAttribArray, (unsigned index))                                                                \
     X(void, DrawArrays, (unsigned mode, int first, int count))                                                         \
     X(void, DrawArraysInstanced, (unsigned mode, int first, int count, int instances))                                 \
     X(void, DrawBuffers, (int count, const unsigned *buffers))                                                         \
     X(void, Enable, (unsigned capability))                                                                             \
     X(void, EnableVertexAttribArray, (unsigned index))                                                                 \
     X(void, EndTransformFeedback, (void))                                                                              \
-    X(void, Finish, (void))                                                                                            \
     X(void, FramebufferTexture2D, (unsigned target, unsigned attachment, unsigned kind, unsigned texture, int level))  \
     X(void, FramebufferTextureLayer, (unsigned target, unsigned attachment, unsigned texture, int level, int layer))   \
     X(void, GenBuffers, (int count, unsigned *buffers))                                                                \
@@ -1493,7 +1524,6 @@ enum {
     X(void, PixelStorei, (unsigned name, int value))                                                                   \
     X(void, ReadBuffer, (unsigned source))                                                                             \
     X(void, ReadPixels, (int x, int y, int width, int height, unsigned format, unsigned type, void *pixels))           \
-    X(void, Scissor, (int x, int y, int width, int height))                                                            \
     X(void, ShaderSource, (unsigned shader, int count, const char *const *parts, const int *lengths))                  \
     X(void, TexImage2D, (unsigned target, int level, int internal, int width, int height, int border, unsigned format, \
                          unsigned type, const void *pixels))                                                           \
@@ -1507,13 +1537,11 @@ enum {
     X(void, TransformFeedbackVaryings, (unsigned program, int count, const char *const *names, unsigned mode))         \
     X(void, Uniform1f, (int location, float x))                                                                        \
     X(void, Uniform2f, (int location, float x, float y))                                                               \
-    X(void, Uniform3f, (int location, float x, float y, float z))                                                      \
-    X(void, Uniform4f, (int location, float x, float y, float z, float w))                                             \
     X(void, Uniform1i, (int location, int x))                                                                          \
     X(void, Uniform2i, (int location, int x, int y))                                                                   \
+    X(void, Uniform3i, (int location, int x, int y, int z))                                                            \
     X(void, Uniform4i, (int location, int x, int y, int z, int w))                                                     \
     X(void, Uniform1ui, (int location, unsigned x))                                                                    \
-    X(void, Uniform1fv, (int location, int count, const float *values))                                                \
     X(void, Uniform3fv, (int location, int count, const float *values))                                                \
     X(void, Uniform4fv, (int location, int count, const float *values))                                                \
     X(void, UseProgram, (unsigned program))                                                                            \
@@ -1522,16 +1550,11 @@ enum {
                                   const void *offset))                                                                 \
     X(void, Viewport, (int x, int y, int width, int height))
 
-/* ... and these may be NULL: the first three in WebGL, the others where has_timer and has_compute are 0. */
+/* ... and these may be NULL: the first three in WebGL, the others where has_compute is 0. */
 #define SAT__GL_OPTIONAL_FUNCTIONS(X)                                                                                  \
     X(void *, MapBufferRange, (unsigned target, ptrdiff_t offset, ptrdiff_t size, unsigned access))                    \
     X(unsigned char, UnmapBuffer, (unsigned target))                                                                   \
     X(void, PolygonMode, (unsigned face, unsigned mode))                                                               \
-    X(void, GenQueries, (int count, unsigned *queries))                                                                \
-    X(void, DeleteQueries, (int count, const unsigned *queries))                                                       \
-    X(void, BeginQuery, (unsigned target, unsigned query))                                                             \
-    X(void, EndQuery, (unsigned target))                                                                               \
-    X(void, GetQueryObjectui64v, (unsigned query, unsigned name, uint64_t *value))                                     \
     X(void, BindImageTexture, (unsigned unit, unsigned texture, int level, unsigned char layered, int layer,           \
                                unsigned access, unsigned format))                                                      \
     X(void, DispatchCompute, (unsigned x, unsigned y, unsigned z))                                                     \
@@ -1549,7 +1572,7 @@ typedef struct sat__gl {
     SAT__GL_FUNCTIONS(SAT__GL_MEMBER)
     SAT__GL_OPTIONAL_FUNCTIONS(SAT__GL_MEMBER)
     int is_es, version;         /* OpenGL ES; 10 major + minor, as 33, 43, 30 */
-    int has_timer, has_compute; /* GL 3.3 timer queries; GL 4.3 compute shaders */
+    int has_compute;            /* GL 4.3 compute shaders */
     int max_size;               /* largest width and height of a texture */
     unsigned vertex_array;      /* without any attribute: what full-screen passes draw with */
     unsigned framebuffer;       /* for sat__gl_read and sat__gl_attach */
@@ -1599,7 +1622,7 @@ static inline int sat__gl_parse_version(const char *text, int *is_es)
 /* Fills the table for the current context. On an error nothing is left behind but the message. */
 static inline sat_result sat__gl_open(sat__gl *gl, sat_gl_get_proc *get_proc)
 {
-    const char *missing = NULL, *version, *renderer;
+    const char *missing = NULL, *version;
     memset(gl, 0, sizeof *gl);
     if (!get_proc) return sat__gl_fail(gl, SAT_ERR_ARGUMENT, "get_proc is NULL", NULL);
     SAT__GL_FUNCTIONS(SAT__GL_LOAD)
@@ -1610,9 +1633,6 @@ static inline sat_result sat__gl_open(sat__gl *gl, sat_gl_get_proc *get_proc)
     gl->version = sat__gl_parse_version(version, &gl->is_es);
     if (gl->version < (gl->is_es ? 30 : 33))
         return sat__gl_fail(gl, SAT_ERR_GL_STATE, "OpenGL 3.3 or OpenGL ES 3.0 is needed", version);
-    renderer = (const char *)gl->GetString(SAT__GL_RENDERER); /* llvmpipe's timer is wrong at times */
-    gl->has_timer = !gl->is_es && !(renderer && strstr(renderer, "llvmpipe")) && gl->GenQueries && gl->DeleteQueries &&
-                    gl->BeginQuery && gl->EndQuery && gl->GetQueryObjectui64v;
     gl->has_compute =
         !gl->is_es && gl->version >= 43 && gl->BindImageTexture && gl->DispatchCompute && gl->MemoryBarrier;
     gl->GetIntegerv(SAT__GL_MAX_TEXTURE_SIZE, &gl->max_size);
@@ -1915,6 +1935,69 @@ static inline void sat__gl_pass(sat__gl *gl, unsigned program, unsigned framebuf
     gl->Viewport(0, 0, width, height);
 }
 
+/* What a shader that draws to a sat_gl_target has instead of gl_FragCoord: the pixel of the picture. */
+static inline const char *sat__gl_pixel(void)
+{
+    return "uniform ivec3 sat_corner_of;\n" /* x, y; with flip the height, else 0 */
+           "ivec2 sat_pixel() {\n"
+           "    ivec2 p = ivec2(gl_FragCoord.xy) - sat_corner_of.xy;\n"
+           "    return sat_corner_of.z > 0 ? ivec2(p.x, sat_corner_of.z - 1 - p.y) : p;\n"
+           "}\n";
+}
+
+static inline int sat__gl_target_is_valid(const sat_gl_target *target)
+{
+    if (!target || target->place == SAT_GL_OWN) return 1;
+    return (unsigned)target->place <= (unsigned)SAT_GL_FRAMEBUFFER && target->layer >= 0 &&
+           (target->name != 0 || target->place == SAT_GL_FRAMEBUFFER);
+}
+
+/* Whether the target is this texture, which the pass reads. */
+static inline int sat__gl_target_is(const sat_gl_target *target, unsigned texture)
+{
+    return target && texture && target->name == texture && target->place != SAT_GL_OWN &&
+           target->place != SAT_GL_FRAMEBUFFER;
+}
+
+/* Binds the framebuffer of a target, `own` for the object's own texture. Afterwards sat__gl_release_target. */
+static inline sat_result sat__gl_bind_target(sat__gl *gl, const sat_gl_target *target, unsigned own)
+{
+    static const unsigned buffer = SAT__GL_COLOR_ATTACHMENT0;
+    sat_gl_place place = target ? target->place : SAT_GL_OWN;
+    unsigned status;
+    char number[24];
+    if (place == SAT_GL_OWN || place == SAT_GL_FRAMEBUFFER) own = place == SAT_GL_OWN ? own : target->name;
+    else own = gl->framebuffer;
+    gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, own);
+    if (place == SAT_GL_OWN) return SAT_OK;
+    if (place == SAT_GL_TEXTURE)
+        gl->FramebufferTexture2D(SAT__GL_FRAMEBUFFER, buffer, SAT__GL_TEXTURE_2D, target->name, 0);
+    if (place == SAT_GL_LAYER) gl->FramebufferTextureLayer(SAT__GL_FRAMEBUFFER, buffer, target->name, 0, target->layer);
+    if (place != SAT_GL_FRAMEBUFFER) gl->DrawBuffers(1, &buffer);
+    status = gl->CheckFramebufferStatus(SAT__GL_FRAMEBUFFER);
+    if (status == SAT__GL_FRAMEBUFFER_COMPLETE) return SAT_OK;
+    snprintf(number, sizeof number, "status 0x%04x", status);
+    return sat__gl_fail(gl, SAT_ERR_GL_STATE, "OpenGL refused to draw into the target", number);
+}
+
+static inline void sat__gl_release_target(sat__gl *gl, const sat_gl_target *target)
+{
+    if (!target || target->place == SAT_GL_OWN || target->place == SAT_GL_FRAMEBUFFER) return;
+    gl->FramebufferTexture2D(SAT__GL_FRAMEBUFFER, SAT__GL_COLOR_ATTACHMENT0, SAT__GL_TEXTURE_2D, 0, 0);
+}
+
+/* Starts the pass that draws a picture of this size to a target; its shader has sat__gl_pixel(). */
+static inline sat_result sat__gl_pass_to(sat__gl *gl, unsigned program, const sat_gl_target *target, unsigned own,
+                                         int width, int height)
+{
+    int x = target ? target->x : 0, y = target ? target->y : 0;
+    sat_result result = sat__gl_bind_target(gl, target, own);
+    gl->UseProgram(program);
+    gl->Uniform3i(gl->GetUniformLocation(program, "sat_corner_of"), x, y, target && target->flip ? height : 0);
+    gl->Viewport(x, y, width, height);
+    return result;
+}
+
 /* Every pixel of the viewport once. */
 static inline void sat__gl_draw(sat__gl *gl)
 {
@@ -2166,30 +2249,6 @@ static inline void sat__gl_end(sat__gl *gl, const sat__gl_state *state)
     sat__gl_restore_textures(gl, state);
     sat__gl_restore_buffers(gl, state);
     sat__gl_restore_pipeline(gl, state);
-}
-
-/* ---- time on the GPU between begin and end. Only one timer may run at a time. */
-
-typedef struct sat__gl_timer { unsigned query; } sat__gl_timer;
-
-static inline void sat__gl_timer_begin(sat__gl *gl, sat__gl_timer *timer)
-{
-    timer->query = 0;
-    if (!gl->has_timer) return;
-    gl->GenQueries(1, &timer->query);
-    gl->BeginQuery(SAT__GL_TIME_ELAPSED, timer->query);
-}
-
-/* Waits for the GPU. Seconds; below 0 where there is no timer: then time it between two calls of gl->Finish. */
-static inline double sat__gl_timer_end(sat__gl *gl, sat__gl_timer *timer)
-{
-    uint64_t nanoseconds = 0;
-    if (!timer->query) return -1;
-    gl->EndQuery(SAT__GL_TIME_ELAPSED);
-    gl->GetQueryObjectui64v(timer->query, SAT__GL_QUERY_RESULT, &nanoseconds);
-    gl->DeleteQueries(1, &timer->query);
-    timer->query = 0;
-    return 1e-9 * (double)nanoseconds;
 }
 
 #endif /* SAT__SHARED_GL */
@@ -6329,6 +6388,8 @@ static const sat__field sat__gl_fields[] = {
     SAT__FIELD(sat_gl_options, 'd', quantum, 0, 1e-35, 1e35, '0'),
     SAT__FIELD(sat_gl_options, 'd', max_value, 1e30, 1e-300, 1e300, ' '),
     SAT__FIELD(sat_gl_options, 'd', max_box_area, 0, 0, 1e300, ' '),
+    SAT__FIELD(sat_gl_options, 'i', width, 0, 0, 32768, ' '),
+    SAT__FIELD(sat_gl_options, 'i', height, 0, 0, 32768, ' '),
     SAT__FIELD(sat_gl_options, 'a', allocator, 0, 0, 0, ' '),
 };
 
@@ -6354,6 +6415,7 @@ static int sat__explain_gl_options(sat__text *t, const sat_gl_options *o)
         sat__text_range(t, "channel + channels", o->channel + o->channels, 1, 4, ' ');
     else if (o->moments && o->channels > 2)
         sat__text_range(t, "channels with moments", o->channels, 1, 2, ' ');
+    else if ((o->width > 0) != (o->height > 0)) sat__text_add(t, "only one of width and height is 0");
     else return 1;
     return 0;
 }
@@ -6932,12 +6994,19 @@ static void sat__gl_scan_axes(sat_gl *g, int axes, sat__gl_target target, unsign
     }
 }
 
+/* Whether create left this size open, or has it. */
+static int sat__gl_size_fits(const sat_gl *g, int width, int height)
+{
+    return g->options.width == 0 || (g->options.width == width && g->options.height == height);
+}
+
 static sat_result sat__gl_run(sat_gl *g, int axes, unsigned table, unsigned texture, int width, int height)
 {
     sat__gl_state state;
     sat__gl_target target;
     sat_result result;
     if (!g || !g->ready || !texture || texture == table || width < 1 || height < 1) return SAT_ERR_ARGUMENT;
+    if (!sat__gl_size_fits(g, width, height)) return SAT_ERR_SIZE;
     if (g->options.format == SAT_GL_TILED)
         return table || axes == 1 ? SAT_ERR_ARGUMENT : sat__gl_build_tiles(g, texture, width, height);
     sat__gl_begin(&g->gl, &state, 2);
@@ -7014,6 +7083,7 @@ SAT_DEF sat_result sat_gl_mean(sat_gl *gl, float *mean, unsigned texture, int wi
     sat_result result;
     float texel[2] = {0, 0};
     if (!gl || !gl->ready || !texture || width < 1 || height < 1 || gl->options.unsigned_input) return SAT_ERR_ARGUMENT;
+    if (!sat__gl_size_fits(gl, width, height)) return SAT_ERR_SIZE;
     sat__gl_begin(&gl->gl, &state, 2);
     result = sat__gl_fit_means(gl, width, height);
     if (result == SAT_OK) {
@@ -7058,9 +7128,29 @@ SAT_DEF sat_result sat_gl_create(sat_gl **out, sat_gl_get_proc *get_proc, const 
     sat__gl_begin(&g->gl, &state, 2);
     g->gl.GenFramebuffers(1, &g->borrowed);
     result = sat__gl_make_kernels(g);
+    if (result == SAT_OK && chosen.width) {
+        if (chosen.format == SAT_GL_TILED) result = sat__gl_fit_tiles(g, chosen.width, chosen.height);
+        else result = sat__gl_fit(g, chosen.width, chosen.height, 1);
+        if (result == SAT_OK && !chosen.unsigned_input) result = sat__gl_fit_means(g, chosen.width, chosen.height);
+    }
     g->ready = result == SAT_OK;
     sat__gl_end(&g->gl, &state);
     return result;
+}
+
+SAT_DEF sat_result sat_gl_set_options(sat_gl *gl, const sat_gl_options *options)
+{
+    sat_gl_options o = options ? *options : sat_gl_defaults(), old;
+    if (!gl || !gl->ready || !sat__gl_options_are_valid(&o)) return SAT_ERR_ARGUMENT;
+    old = gl->options;
+    if (o.format != old.format || o.algorithm != old.algorithm || o.k != old.k || o.compute != old.compute ||
+        o.channel != old.channel || o.channels != old.channels || o.moments != old.moments ||
+        o.unsigned_input != old.unsigned_input || o.width != old.width || o.height != old.height)
+        return SAT_ERR_MISMATCH;
+    o.allocator = old.allocator;
+    gl->options = o;
+    if (gl->width) sat__gl_settle(gl, gl->width, gl->height);
+    return SAT_OK;
 }
 
 SAT_DEF void sat_gl_destroy(sat_gl *gl)

@@ -383,6 +383,9 @@ typedef struct softassign_gl softassign_gl;
 SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc,
                                                const softassign_options *options);
 SOFTASSIGN_DEF void softassign_gl_destroy(softassign_gl *gl); /* NULL is fine */
+/* Other options from the next call on, free but for gather, which the shaders are compiled for: SAT_ERR_MISMATCH when
+   it differs, and nothing changes. The allocator is not looked at. */
+SOFTASSIGN_DEF sat_result softassign_gl_set_options(softassign_gl *gl, const softassign_options *options);
 /* What the last SAT_ERR_GL_... or SAT_ERR_ARGUMENT of set_costs was about; never NULL, and NULL is fine. */
 SOFTASSIGN_DEF const char *softassign_gl_message(const softassign_gl *gl);
 
@@ -4441,6 +4444,8 @@ struct softassign_gl {
     softassign__gl_program programs[SOFTASSIGN__PROGRAMS];
     unsigned texture[SOFTASSIGN__TEXTURES], framebuffer[SOFTASSIGN__TEXTURES];
     int rows, columns;
+    float *scratch;  /* a row of costs or prices, or two floats a row: from softassign_gl_set_costs on */
+    size_t scratch_bytes;
     float largest; /* cost */
     double rounding; /* of a cost, relative */
 };
@@ -4453,6 +4458,8 @@ static void softassign__gl_delete_textures(softassign_gl *g)
         if (g->texture[i]) g->gl.DeleteTextures(1, &g->texture[i]);
         g->framebuffer[i] = g->texture[i] = 0;
     }
+    sat__release(&g->allocator, g->scratch, g->scratch_bytes);
+    g->scratch = NULL;
     g->rows = g->columns = 0;
 }
 
@@ -4552,10 +4559,20 @@ SOFTASSIGN_DEF void softassign_gl_destroy(softassign_gl *gl)
     if (!gl) return;
     for (i = 0; i < SOFTASSIGN__PROGRAMS; i++)
         if (gl->programs[i].program) gl->gl.DeleteProgram(gl->programs[i].program);
-    if (gl->texture[0] || gl->framebuffer[0] || gl->rows) softassign__gl_delete_textures(gl);
+    if (gl->texture[0] || gl->framebuffer[0] || gl->scratch) softassign__gl_delete_textures(gl);
     sat__gl_close(&gl->gl);
     allocator = gl->allocator;
     sat__release(&allocator, gl, sizeof *gl);
+}
+
+SOFTASSIGN_DEF sat_result softassign_gl_set_options(softassign_gl *gl, const softassign_options *options)
+{
+    softassign_options o = options ? *options : softassign_defaults();
+    if (!gl || !gl->programs[SOFTASSIGN__PROGRAMS - 1].program || !softassign__options_are_valid(&o))
+        return SAT_ERR_ARGUMENT;
+    if (o.gather != gl->options.gather) return SAT_ERR_MISMATCH;
+    gl->options = o;
+    return SAT_OK;
 }
 
 SOFTASSIGN_DEF const char *softassign_gl_message(const softassign_gl *gl) { return gl ? gl->gl.message : ""; }
@@ -4566,6 +4583,9 @@ static sat_result softassign__gl_make_textures(softassign_gl *g, int rows, int c
 {
     int i, k = g->options.gather;
     softassign__gl_delete_textures(g);
+    g->scratch_bytes = (size_t)sat__max_int(columns, 2 * rows) * sizeof(float);
+    g->scratch = (float *)sat__alloc(&g->allocator, g->scratch_bytes);
+    if (!g->scratch) return SAT_ERR_MEMORY;
     for (i = 0; i < SOFTASSIGN__TEXTURES; i++) {
         int width = columns, height = rows;
         unsigned internal = SAT__GL_R32F;
@@ -4753,7 +4773,6 @@ SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softa
 {
     sat__gl_state state;
     sat_result result = SAT_OK;
-    float *row;
     if (!gl) return SAT_ERR_ARGUMENT;
     if (!softassign__gl_explain(gl, problem)) return SAT_ERR_ARGUMENT;
     result = softassign__gl_check_costs(problem);
@@ -4762,12 +4781,7 @@ SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softa
     if (gl->rows != problem->rows || gl->columns != problem->columns)
         result = softassign__gl_make_textures(gl, problem->rows, problem->columns);
     if (result == SAT_OK && !problem->cost && !problem->cost_fn) result = softassign__gl_distances(gl, problem);
-    else if (result == SAT_OK) {
-        size_t size = (size_t)problem->columns * sizeof(float);
-        row = (float *)sat__alloc(&gl->allocator, size);
-        result = row ? softassign__gl_upload_costs(gl, problem, row) : SAT_ERR_MEMORY;
-        sat__release(&gl->allocator, row, size);
-    }
+    else if (result == SAT_OK) result = softassign__gl_upload_costs(gl, problem, gl->scratch);
     gl->rounding = problem->cost || problem->cost_fn ? 1e-6 : 1e-6 + 6e-8 * problem->feature_count;
     if (result == SAT_OK) result = softassign__gl_find_largest(gl);
     if (result == SAT_OK) result = sat__gl_check(&gl->gl, "OpenGL refused the costs");
@@ -4778,13 +4792,11 @@ SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softa
 /* ---- the published method */
 
 /* M starts as on the CPU. */
-static sat_result softassign__gl_start_matrix(softassign_gl *g)
+static void softassign__gl_start_matrix(softassign_gl *g)
 {
-    size_t size = (size_t)g->columns * sizeof(float);
-    float *row = (float *)sat__alloc(&g->allocator, size);
+    float *row = g->scratch;
     uint64_t seed = g->options.seed;
     int i, j;
-    if (!row) return SAT_ERR_MEMORY;
     for (i = 0; i < g->rows; i++) {
         for (j = 0; j < g->columns; j++) row[j] = (float)(1e-6 + 1e-3 * softassign__uniform(&seed));
         g->gl.ActiveTexture(SAT__GL_TEXTURE0);
@@ -4793,8 +4805,6 @@ static sat_result softassign__gl_start_matrix(softassign_gl *g)
     }
     for (j = 0; j < g->columns; j++) row[j] = (float)g->options.outlier;
     sat__gl_upload(&g->gl, g->texture[SOFTASSIGN__OUTLIERS], SAT__GL_R32F, g->columns, 1, row);
-    sat__release(&g->allocator, row, size);
-    return SAT_OK;
 }
 
 /* One Sinkhorn iteration, A to A by way of M. */
@@ -4846,13 +4856,13 @@ SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft
 {
     softassign_gl *g = gl;
     sat__gl_state state;
-    sat_result result;
+    sat_result result = SAT_OK;
     double t, lowest = (double)SOFTASSIGN__INFINITY;
     int i;
     if (!g || !g->rows || (soft && !sat__rows_are_valid(soft, &soft_stride, g->columns, g->rows, 1, 1)))
         return SAT_ERR_ARGUMENT; /* a stride in floats: as if they were bytes */
     sat__gl_begin(&g->gl, &state, 3);
-    result = softassign__gl_start_matrix(g);
+    softassign__gl_start_matrix(g);
     softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows, g->texture[SOFTASSIGN__M], 0, 0,
                        g->columns, g->rows);
     for (t = g->options.temperature, i = 0; result == SAT_OK && i < g->options.iterations[0];
@@ -4895,13 +4905,11 @@ static int softassign__gl_rows(softassign_gl *g, int price)
 /* The bound at the prices of the sweep, lowered by what float sums may have lost. */
 static sat_result softassign__gl_bound(softassign_gl *g, int rows, const float *price, double *bound)
 {
-    size_t size = (size_t)g->rows * 2 * sizeof(float);
-    float *least = (float *)sat__alloc(&g->allocator, size);
+    float *least = g->scratch;
     softassign__sum sum = {0, 0, 0};
     double dearest = 0, lost = 0;
     sat_result result;
     int i;
-    if (!least) return SAT_ERR_MEMORY;
     result = sat__gl_read(&g->gl, least, g->texture[rows], SAT__GL_RG32F, 1, g->rows);
     for (i = 0; i < g->columns; i++) {
         softassign__add(&sum, (double)price[i]);
@@ -4912,7 +4920,6 @@ static sat_result softassign__gl_bound(softassign_gl *g, int rows, const float *
         lost += fabs((double)least[2 * i]) + 2 * dearest;
     }
     *bound = softassign__total_below(&sum) - lost * g->rounding;
-    sat__release(&g->allocator, least, size);
     return result;
 }
 

@@ -347,10 +347,10 @@ typedef struct ssao_sat_gl ssao_sat_gl;
 SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *get_proc, int width, int height,
                                            const ssao_sat_options *options);
 /* depth: a 2D texture whose red is the depth (R32F, R16F, or a depth format without comparison). normals: its red,
-   green, blue are the view-space normal, signed; 0: from depth. out: a colour-renderable texture of the caller whose
-   red gets the accessibility, or 0 for the object's own R32F, ssao_sat_gl_texture(). Of `input` only width, height,
+   green, blue are the view-space normal, signed; 0: from depth. to: its red gets the accessibility; NULL: the
+   object's own R32F, ssao_sat_gl_texture(). Of `input` only width, height,
    depth_kind, projection, clip_zero_to_one and sky count. */
-SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigned depth, unsigned normals,
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth, unsigned normals,
                                           const ssao_sat_input *input);
 /* Other options from the next frame on. Those that shaders and textures are made for stay: method, half_resolution,
    slabs, scales, plane_boxes, refine_levels, as_printed, inverted_depth: SAT_ERR_MISMATCH when one differs. The rest
@@ -2995,7 +2995,7 @@ static const char ssao_sat__gl_upsample[] =
     "uniform sampler2D coarse;\n"
     "out vec4 result;\n"
     "void main() {\n"
-    "    ivec2 at = ivec2(gl_FragCoord.xy);\n"
+    "    ivec2 at = sat_pixel();\n"
     "    float z = distance_at(at), sum = 0.0, total = 0.0;\n"
     "    result = vec4(1.0);\n"
     "    if (!(z > 0.0)) return;\n"
@@ -3125,7 +3125,7 @@ static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g)
         {ssao_sat__gl_common, ssao_sat__gl_shares, NULL}, {ssao_sat__gl_common, ssao_sat__gl_edges, NULL},
         {ssao_sat__gl_common, ssao_sat__gl_words, NULL},
         {ssao_sat__gl_scan, NULL}, {ssao_sat__gl_common, ssao_sat__gl_tone, ssao_sat__gl_slabs, NULL},
-        {ssao_sat__gl_common, ssao_sat__gl_upsample, NULL}};
+        {ssao_sat__gl_common, sat__gl_pixel(), ssao_sat__gl_upsample, NULL}};
     sat_result result = SAT_OK;
     int i, normals;
     for (normals = 0; normals < 2; normals++)
@@ -3342,18 +3342,12 @@ static void ssao_sat__gl_estimate(ssao_sat_gl *g, unsigned depth, unsigned norma
     sat__gl_draw(gl);
 }
 
-static sat_result ssao_sat__gl_run(ssao_sat_gl *g, unsigned out, unsigned depth, unsigned normals)
+static sat_result ssao_sat__gl_run(ssao_sat_gl *g, const sat_gl_target *to, unsigned depth, unsigned normals)
 {
     sat__gl *gl = &g->gl;
-    ssao_sat__gl_target target = g->out;
-    sat_result result = SAT_OK;
+    sat_result result;
     unsigned program;
     int table;
-    if (out) {
-        result = sat__gl_attach(gl, gl->framebuffer, &out, 1, 0);
-        target.framebuffer = gl->framebuffer;
-    }
-    if (result != SAT_OK) return result;
     if (g->options.radius > 0 && g->fit.gain > 0) {
         ssao_sat__gl_find_edges(g, depth);
         table = ssao_sat__gl_sum(g, depth);
@@ -3363,20 +3357,23 @@ static sat_result ssao_sat__gl_run(ssao_sat_gl *g, unsigned out, unsigned depth,
         gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, g->open.framebuffer);
         gl->ClearBufferfv(SAT__GL_COLOR, 0, open);
     }
-    program = ssao_sat__gl_pass(g, SSAO_SAT__GL_UPSAMPLE, &target, depth, normals);
+    program = ssao_sat__gl_pass(g, SSAO_SAT__GL_UPSAMPLE, &g->out, depth, normals);
+    result = sat__gl_pass_to(gl, program, to, g->out.framebuffer, g->width, g->height);
+    if (result != SAT_OK) return result;
     sat__gl_set_texture(gl, program, "coarse", 3, g->open.texture);
     sat__gl_draw(gl);
-    if (out) gl->FramebufferTexture2D(SAT__GL_FRAMEBUFFER, SAT__GL_COLOR_ATTACHMENT0, SAT__GL_TEXTURE_2D, 0, 0);
+    sat__gl_release_target(gl, to);
     return SAT_OK;
 }
 
-SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigned depth, unsigned normals,
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth, unsigned normals,
                                           const ssao_sat_input *input)
 {
     sat__gl_state state;
     sat_result result;
     double side;
-    if (!gl || !input || !depth || out == depth || (out && out == normals) || !gl->is_built) return SAT_ERR_ARGUMENT;
+    if (!gl || !input || !depth || !gl->is_built || !sat__gl_target_is_valid(to)) return SAT_ERR_ARGUMENT;
+    if (sat__gl_target_is(to, depth) || sat__gl_target_is(to, normals)) return SAT_ERR_ARGUMENT;
     if (input->width != gl->width || input->height != gl->height) return SAT_ERR_MISMATCH;
     if ((unsigned)input->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED || !(input->sky >= 0)) return SAT_ERR_ARGUMENT;
     if (!ssao_sat__read_camera(&gl->camera, input, gl->step, gl->options.bottom_up)) return SAT_ERR_ARGUMENT;
@@ -3386,7 +3383,7 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, unsigned out, unsigne
     gl->limit = (float)(gl->options.max_pixels < side ? gl->options.max_pixels : side);
     if (gl->camera.aspect > 1) gl->limit /= gl->camera.aspect;
     sat__gl_begin(&gl->gl, &state, 5);
-    result = ssao_sat__gl_run(gl, out, depth, normals);
+    result = ssao_sat__gl_run(gl, to, depth, normals);
     sat__gl_end(&gl->gl, &state);
     return result;
 }

@@ -321,9 +321,10 @@ typedef struct tonemap_gl tonemap_gl;
 /* On an OpenGL error *out only answers tonemap_gl_message, and is to be destroyed; on the others it is NULL. */
 TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_proc, int width, int height,
                                          const tonemap_options *options);
-/* Maps the 2D texture hdr (float RGB or RGBA, of the created size, level 0) to sRGB codes and alpha 1 in the texture
-   ldr (RGBA8, of that size), or, when ldr is 0, in tonemap_gl_texture(). */
-TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned hdr, double dt);
+/* Maps the first texels of the 2D texture hdr (float RGB or RGBA, at least of the created size, level 0) to sRGB codes
+   and alpha 1: in the target `to` (8 bits a channel; the window's framebuffer: sat_gl_to_framebuffer(0, 0, 0)), or,
+   when NULL, in tonemap_gl_texture(). */
+TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, const sat_gl_target *to, unsigned hdr, double dt);
 TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl);
 /* Other options from the next picture on; the adaptation goes on. Costs nothing: key, white, exposure, the seconds, the
    limits of adaptation, units, primaries, white balance and peak are uniforms. What the shaders are compiled for is
@@ -3306,7 +3307,7 @@ static const char tonemap__glsl_map[] =
     "    return tonemap_encode(tonemap_gamut(rgb * gain, y * gain));\n"
     "}\n"
     "void main() {\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy), high = textureSize(luminance, 0) - 1;\n"
+    "    ivec2 p = sat_pixel(), high = textureSize(luminance, 0) - 1;\n"
     "    vec4 sum = vec4(0.0);\n"
     "    int radius = texelFetch(luminance, p, 0).x < 0.0 ? 1 : 0;\n" /* an unusable pixel shows those around it */
     "    for (int last = radius * 3; radius <= last && sum.a == 0.0; radius++)\n"
@@ -3378,7 +3379,7 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
 static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, const char *name, const char *vertex,
                                              const char *frame, const char *search, const char *body)
 {
-    const char *library[3], *fragment[6], *points[2];
+    const char *library[3], *fragment[8], *points[2];
     sat__gl_shaders shaders;
     int n = 0;
     memset(&shaders, 0, sizeof shaders);
@@ -3386,6 +3387,7 @@ static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, c
     library[1] = tonemap_gl_glsl();
     library[2] = NULL;
     if (frame) fragment[n++] = frame;
+    if (body == tonemap__glsl_map) fragment[n++] = sat__gl_pixel();
     if (search && *search) fragment[n++] = tonemap__glsl_down;
     if (search) fragment[n++] = search;
     if (search) fragment[n++] = tonemap__glsl_curves;
@@ -3509,6 +3511,8 @@ static inline sat_result tonemap__gl_make(tonemap_gl *g, sat_gl_get_proc *get_pr
     if (o->operation == TONEMAP_ASHIKHMIN || (o->operation == TONEMAP_PHOTOGRAPHIC_LOCAL && o->scales > 1)) {
         table.format = SAT_GL_FIXED32;
         table.unsigned_input = 1;
+        table.width = g->width;
+        table.height = g->height;
         table.allocator = g->allocator;
         r = sat_gl_create(&g->sat, get_proc, &table);
         if (r != SAT_OK) return r;
@@ -3691,7 +3695,7 @@ static inline void tonemap__gl_guide(tonemap_gl *g)
     }
 }
 
-static inline sat_result tonemap__gl_map(tonemap_gl *g, unsigned ldr, unsigned hdr)
+static inline sat_result tonemap__gl_map(tonemap_gl *g, const sat_gl_target *to, unsigned hdr)
 {
     sat__gl *gl = &g->gl;
     unsigned program = g->map_program;
@@ -3704,9 +3708,8 @@ static inline sat_result tonemap__gl_map(tonemap_gl *g, unsigned ldr, unsigned h
         result = sat_gl_build(g->sat, 0, g->quanta, g->width, g->height);
     }
     if (g->steps) tonemap__gl_guide(g);
-    if (result == SAT_OK && ldr) result = sat__gl_attach(gl, gl->framebuffer, &ldr, 1, 0);
+    if (result == SAT_OK) result = sat__gl_pass_to(gl, program, to, g->out_target, g->width, g->height);
     if (result != SAT_OK) return result;
-    sat__gl_pass(gl, program, ldr ? gl->framebuffer : g->out_target, g->width, g->height);
     sat__gl_set_texture(gl, program, "hdr", 0, hdr);
     sat__gl_set_texture(gl, program, "luminance", 1, g->luminance);
     sat__gl_set_texture(gl, program, "state", 2, g->state[g->current]);
@@ -3725,21 +3728,22 @@ static inline sat_result tonemap__gl_map(tonemap_gl *g, unsigned ldr, unsigned h
     sat__gl_set_float3(gl, program, "red_step", g->colours.red_step);
     sat__gl_set_float3(gl, program, "display_luma", g->colours.display_luma);
     sat__gl_draw(gl);
-    if (ldr) gl->FramebufferTexture2D(SAT__GL_FRAMEBUFFER, SAT__GL_COLOR_ATTACHMENT0, SAT__GL_TEXTURE_2D, 0, 0);
+    sat__gl_release_target(gl, to);
     return SAT_OK;
 }
 
-TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, unsigned ldr, unsigned hdr, double dt)
+TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, const sat_gl_target *to, unsigned hdr, double dt)
 {
     sat__gl_state state;
     sat_result result;
-    if (!gl || !gl->map_program || !hdr) return SAT_ERR_ARGUMENT;
+    if (!gl || !gl->map_program || !hdr || !sat__gl_target_is_valid(to) || sat__gl_target_is(to, hdr))
+        return SAT_ERR_ARGUMENT;
     if (!tonemap__in_range(dt, 0, 1e300) && !tonemap__is_infinite(dt)) return SAT_ERR_ARGUMENT;
     sat__gl_begin(&gl->gl, &state, TONEMAP__GL_UNITS);
     tonemap__gl_measure(gl, hdr);
     if (gl->histogram) tonemap__gl_count(gl);
     tonemap__gl_adapt(gl, dt);
-    result = tonemap__gl_map(gl, ldr, hdr);
+    result = tonemap__gl_map(gl, to, hdr);
     sat__gl_end(&gl->gl, &state);
     return result;
 }

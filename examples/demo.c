@@ -101,7 +101,7 @@ static int save_mosaic(pipeline *p, const common_settings *common, const char *p
 static int save(pipeline *p, const common_settings *common, const char *path)
 {
     if (image_ends_with(path, ".png")) return common_save_u8(common, path, p->pixels, p->options.width, p->options.height, 3);
-    return common_save(common, path, &p->hdr);
+    return common_save(common, path, pipeline_hdr(p));
 }
 
 static int run(pipeline *p, const gl_context *context, int frames, const common_settings *common, int mosaic)

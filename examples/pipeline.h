@@ -433,6 +433,9 @@ static inline raindrop_camera pipeline_rain_camera(const pipeline *p)
 static inline int pipeline_rain(pipeline *p, double dt)
 {
     raindrop_camera camera = pipeline_rain_camera(p);
+#ifdef PIPELINE_GL
+    if (p->options.get_proc) pipeline_gl_picture(p->gl, p->dry.pixels, p->depth, !p->settled);
+#endif
     memcpy(p->hdr.pixels, p->dry.pixels, (size_t)p->hdr.width * (size_t)p->hdr.height * 3 * sizeof(float));
     if (!p->options.rain) return 1;
     if (!p->rain) {
@@ -446,7 +449,7 @@ static inline int pipeline_rain(pipeline *p, double dt)
         ro.threads = p->options.threads;
         if (!pipeline_check(p, "raindrop_rain_create", raindrop_rain_create(&p->rain, &ro))) return 0;
     }
-    PIPELINE_ON_GL(p, pipeline_gl_rain(p->gl, p->hdr.pixels, p->depth, &camera, p->mirror, p->rain, dt));
+    PIPELINE_ON_GL(p, pipeline_gl_rain(p->gl, &camera, p->mirror, p->rain, dt));
     return pipeline_check(p, "raindrop_rain_advance", raindrop_rain_advance(p->rain, dt)) &&
            pipeline_check(p, "raindrop_render",
                           raindrop_render(p->hdr.pixels, (ptrdiff_t)p->hdr.width * 3 * (ptrdiff_t)sizeof(float),
@@ -470,7 +473,7 @@ static inline int pipeline_tone(pipeline *p, double dt)
     to.cd_per_unit = 1;
     to.white = 0;
     to.threads = p->options.threads;
-    PIPELINE_ON_GL(p, pipeline_gl_tone(p->gl, p->pixels, p->hdr.pixels, &to, dt));
+    PIPELINE_ON_GL(p, pipeline_gl_tone(p->gl, p->pixels, &to, dt));
     if (!p->map ? !pipeline_check(p, "tonemap_create", tonemap_create(&p->map, p->hdr.width, p->hdr.height, &to))
                 : !pipeline_check(p, "tonemap_set_options", tonemap_set_options(p->map, &to))) return 0;
     return pipeline_check(p, "tonemap_apply_u8", tonemap_apply_u8(p->map, p->pixels, (ptrdiff_t)p->hdr.width * 3, &hdr, dt, &p->tone_stats));
@@ -635,6 +638,15 @@ static inline int pipeline_frame(pipeline *p, double dt)
     }
     p->settled = ok;
     return ok;
+}
+
+/* What the last frame had before tone mapping: p->hdr, which OpenGL keeps to itself. */
+static inline image *pipeline_hdr(pipeline *p)
+{
+#ifdef PIPELINE_GL
+    if (p->options.get_proc) pipeline_gl_read(p->gl, p->hdr.pixels);
+#endif
+    return &p->hdr;
 }
 
 static inline void pipeline_destroy(pipeline *p)

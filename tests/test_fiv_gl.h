@@ -157,7 +157,7 @@ static void test_difference(double *worst, double *rms, size_t count)
     double largest = 0;
     int i, k;
     for (i = 0; i < COUNT; i++) test_cpu(cpu + 3 * i, i, count);
-    EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
+    EXPECT_EQ(fiv_gl_irradiance(scene.gl, NULL, scene.point_texture, scene.normal_texture, NULL), SAT_OK);
     sat__gl_begin(&scene.gl->gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&scene.gl->gl, gpu, fiv_gl_texture(scene.gl), SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
     sat__gl_end(&scene.gl->gl, &state);
@@ -362,7 +362,7 @@ TEST(scenes_cost_what_changed)
     test_image_3d = scene.gl->gl.TexImage3D;
     scene.gl->gl.TexImage2D = test_tex_image_2d;
     scene.gl->gl.TexImage3D = test_tex_image_3d;
-    EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
+    EXPECT_EQ(fiv_gl_irradiance(scene.gl, NULL, scene.point_texture, scene.normal_texture, NULL), SAT_OK);
     sat__gl_begin(&scene.gl->gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&scene.gl->gl, before, fiv_gl_texture(scene.gl), SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
     sat__gl_end(&scene.gl->gl, &state);
@@ -375,7 +375,7 @@ TEST(scenes_cost_what_changed)
         if (r == SAT_OK) break;
         EXPECT(strlen(fiv_gl_message(scene.gl)) > 3);
         EXPECT_EQ(scene.gl->uploads, sent);
-        EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
+        EXPECT_EQ(fiv_gl_irradiance(scene.gl, NULL, scene.point_texture, scene.normal_texture, NULL), SAT_OK);
         sat__gl_begin(&scene.gl->gl, &state, 1);
         EXPECT_EQ(sat__gl_read(&scene.gl->gl, after, fiv_gl_texture(scene.gl), SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
         sat__gl_end(&scene.gl->gl, &state);
@@ -463,7 +463,7 @@ TEST(state_is_put_back)
     memset(after, 0, sizeof after);
     for (i = 0; i < 6; i++) scene.gl->gl.GetIntegerv(names[i], before[i]);
     EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
-    EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
+    EXPECT_EQ(fiv_gl_irradiance(scene.gl, NULL, scene.point_texture, scene.normal_texture, NULL), SAT_OK);
     for (i = 0; i < 6; i++) scene.gl->gl.GetIntegerv(names[i], after[i]);
     EXPECT(memcmp(before, after, sizeof before) == 0);
     EXPECT_EQ(scene.gl->gl.GetError(), 0);
@@ -487,7 +487,7 @@ static void test_shader(const char *call, int self)
     if (self) test_receivers_on_knots();
 #endif
     EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 3), SAT_OK);
-    EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_OK);
+    EXPECT_EQ(fiv_gl_irradiance(scene.gl, NULL, scene.point_texture, scene.normal_texture, NULL), SAT_OK);
     memset(&shaders, 0, sizeof shaders);
     shaders.name = "own";
     shaders.library = fiv_gl_glsl();
@@ -535,7 +535,7 @@ TEST(bad_arguments)
     EXPECT_EQ(o.max_instances, 8);
     EXPECT_EQ(fiv_gl_create(&gl, test_nothing, 4, 4, NULL), SAT_ERR_GL_FUNCTION);
     EXPECT(strlen(fiv_gl_message(gl)) > 3);
-    EXPECT_EQ(fiv_gl_irradiance(gl, 1, 2), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_gl_irradiance(gl, NULL, 1, 2, NULL), SAT_ERR_ARGUMENT);
     fiv_gl_destroy(gl);
     fiv_gl_destroy(NULL);
     EXPECT_EQ(fiv_gl_create(NULL, test_nothing, 4, 4, NULL), SAT_ERR_ARGUMENT);
@@ -564,7 +564,8 @@ TEST(bad_arguments)
         fiv_gl_destroy(gl);
     }
     if (!test_open(FIV_STORAGE_FLOAT, 0)) SKIP(scene.context.message);
-    EXPECT_EQ(fiv_gl_irradiance(scene.gl, scene.point_texture, scene.normal_texture), SAT_ERR_ARGUMENT); /* no scene */
+    EXPECT_EQ(fiv_gl_irradiance(scene.gl, NULL, scene.point_texture, scene.normal_texture, NULL),
+              SAT_ERR_ARGUMENT); /* no scene */
     for (i = 0; i < 9; i++) many[i] = scene.instances[0];
     EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, many, 9), SAT_ERR_LIMIT);
     many[0].scale = -1;

@@ -87,7 +87,7 @@ static double rg_compare(rg_scene *s, raindrop_gl *g, const raindrop_rain *rain,
     sat__gl_end(&s->gl, &state);
     s->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s->framebuffer);
     EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s->camera, options), SAT_OK);
+    EXPECT_EQ(raindrop_gl_render(g, NULL, RG_W, RG_H, &s->camera, NULL, options), SAT_OK);
     sat__gl_begin(&s->gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&s->gl, s->gpu, s->texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
     sat__gl_end(&s->gl, &state);
@@ -222,7 +222,7 @@ static void rg_draw_on_black(rg_scene *s, raindrop_gl *g, const raindrop_render_
     sat__gl_upload(&s->gl, s->texture, SAT__GL_RGBA32F, RG_W, RG_H, s->gpu);
     sat__gl_end(&s->gl, &state);
     s->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s->framebuffer);
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s->camera, options), SAT_OK);
+    EXPECT_EQ(raindrop_gl_render(g, NULL, RG_W, RG_H, &s->camera, NULL, options), SAT_OK);
     sat__gl_begin(&s->gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&s->gl, s->gpu, s->texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
     sat__gl_end(&s->gl, &state);
@@ -373,7 +373,7 @@ TEST(raindrop_gl_reflects_inside_as_the_cpu)
         }
     o.look = RAINDROP_LOOK_RAY; /* out of range: an error, as on the CPU */
     o.orders = 4;
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, &o), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_render(g, NULL, RG_W, RG_H, &s.camera, NULL, &o), SAT_ERR_ARGUMENT);
     raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
     rg_close(&s);
@@ -435,10 +435,10 @@ TEST(raindrop_gl_respects_the_depth_buffer)
     s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s.framebuffer);
     s.gl.ClearBufferfv(SAT__GL_COLOR, 0, black);
     depth = ((far + near) - 2 * far * near / 2.0f) / (far - near) * 0.5f + 0.5f; /* a wall at 2 m */
-    s.gl.ClearBufferfv(SAT__GL_DEPTH, 0, &depth);
+    s.gl.ClearBufferfv(0x1801, 0, &depth);
     s.camera.depth_near = near;
     s.camera.depth_far = far;
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_gl_render(g, NULL, RG_W, RG_H, &s.camera, NULL, NULL), SAT_OK);
     sat__gl_begin(&s.gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&s.gl, s.gpu, s.texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
     sat__gl_end(&s.gl, &state);
@@ -451,7 +451,7 @@ TEST(raindrop_gl_respects_the_depth_buffer)
     EXPECT(right[1] == 0); /* behind it */
     s.camera.depth_near = 1;
     s.camera.depth_far = 0.5f;
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_render(g, NULL, RG_W, RG_H, &s.camera, NULL, NULL), SAT_ERR_ARGUMENT);
     raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
     rg_close(&s);
@@ -573,7 +573,7 @@ TEST(raindrop_gl_restores_the_state)
     s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s.framebuffer);
     s.gl.Enable(SAT__GL_CULL_FACE);
     s.gl.Enable(SAT__GL_DEPTH_TEST);
-    s.gl.DepthFunc(SAT__GL_ALWAYS);
+    s.gl.DepthFunc(0x0207);
     s.gl.BlendFuncSeparate(SAT__GL_ONE, SAT__GL_ZERO, SAT__GL_ONE, SAT__GL_ONE);
     s.gl.Viewport(3, 4, 50, 60);
     s.gl.PixelStorei(SAT__GL_UNPACK_ALIGNMENT, 8);
@@ -585,7 +585,7 @@ TEST(raindrop_gl_restores_the_state)
     EXPECT_EQ(raindrop_gl_advance(g, 0.01), SAT_OK);
     s.camera.depth_near = 0.1f;
     s.camera.depth_far = 10;
-    EXPECT_EQ(raindrop_gl_render(g, RG_W, RG_H, &s.camera, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_gl_render(g, NULL, RG_W, RG_H, &s.camera, NULL, NULL), SAT_OK);
     {
         raindrop_drop drop;
         EXPECT_EQ(raindrop_gl_read_drops(g, &drop, 1), SAT_OK);
@@ -742,7 +742,7 @@ TEST(raindrop_gl_says_what_is_wrong)
     EXPECT_EQ(raindrop_gl_create(&g, rg_no_procs, &wrong), SAT_ERR_ARGUMENT);
     EXPECT_EQ(raindrop_gl_create(&g, rg_no_procs, NULL), SAT_ERR_GL_FUNCTION);
     EXPECT(g && strstr(raindrop_gl_message(g), "gl") != NULL);
-    EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_render(g, NULL, 10, 10, NULL, NULL, NULL), SAT_ERR_ARGUMENT);
     raindrop_gl_destroy(g);
     EXPECT_EQ(raindrop_gl_create(&g, NULL, NULL), SAT_ERR_ARGUMENT);
     EXPECT(g == NULL && raindrop_gl_message(NULL) != NULL);
@@ -750,7 +750,7 @@ TEST(raindrop_gl_says_what_is_wrong)
     if (!rg_open(&s)) return;
     EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
     EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
-    EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, NULL), SAT_ERR_ARGUMENT); /* no rain yet */
+    EXPECT_EQ(raindrop_gl_render(g, NULL, 10, 10, NULL, NULL, NULL), SAT_ERR_ARGUMENT); /* no rain yet */
     EXPECT(strcmp(raindrop_gl_message(g), "there was no raindrop_gl_set_rain") == 0);
     EXPECT_EQ(raindrop_gl_advance(g, 1), SAT_ERR_ARGUMENT);
     {
@@ -758,9 +758,9 @@ TEST(raindrop_gl_says_what_is_wrong)
         raindrop_rain *rain = rg_rain(10, 1, 2);
         EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
         o.look = RAINDROP_LOOK_MAP; /* without a map */
-        EXPECT_EQ(raindrop_gl_render(g, 10, 10, NULL, &o), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(raindrop_gl_render(g, NULL, 10, 10, NULL, NULL, &o), SAT_ERR_ARGUMENT);
         EXPECT(strcmp(raindrop_explain_render(text, sizeof text, 0, 10, 10, NULL, &o), raindrop_gl_message(g)) == 0);
-        EXPECT_EQ(raindrop_gl_render(g, 10, 0, NULL, NULL), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(raindrop_gl_render(g, NULL, 10, 0, NULL, NULL, NULL), SAT_ERR_ARGUMENT);
         EXPECT(strcmp(raindrop_gl_message(g), "height is 0; 1..32768") == 0);
         raindrop_rain_destroy(rain);
     }

@@ -180,7 +180,8 @@ TEST(gpu_state_is_restored)
     test_f.GetIntegerv(SAT__GL_VIEWPORT, viewport[0]);
     EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, NULL), SAT_OK);
     for (k = 0; k < 2; k++) {
-        EXPECT_EQ(ssao_sat_gl_apply(gl, k ? textures[1] : 0, textures[0], 0, &in), SAT_OK);
+        sat_gl_target to = sat_gl_to_texture(textures[1]);
+        EXPECT_EQ(ssao_sat_gl_apply(gl, k ? &to : NULL, textures[0], 0, &in), SAT_OK);
         for (i = 0; i < 8; i++) {
             test_f.GetIntegerv(names[i], &after[i]);
             EXPECT_EQ(before[i], after[i]);
@@ -213,6 +214,7 @@ TEST(gpu_errors_have_names)
     ssao_sat_gl *gl = NULL;
     float view[12];
     unsigned texture;
+    sat_gl_target to;
     if (!open_gl()) SKIP(test_gl.message);
     support_fill(z, 64, 1, 2, 1);
     texture = upload(SAT__GL_R32F, 8, 8, z);
@@ -229,7 +231,8 @@ TEST(gpu_errors_have_names)
     EXPECT(gl == NULL);
     if (!EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, 8, 8, NULL), SAT_OK)) return;
     EXPECT_EQ(ssao_sat_gl_apply(gl, 0, 0, 0, &in), SAT_ERR_ARGUMENT);
-    EXPECT_EQ(ssao_sat_gl_apply(gl, texture, texture, 0, &in), SAT_ERR_ARGUMENT);
+    to = sat_gl_to_texture(texture);
+    EXPECT_EQ(ssao_sat_gl_apply(gl, &to, texture, 0, &in), SAT_ERR_ARGUMENT);
     bad = in;
     bad.width = 9;
     EXPECT_EQ(ssao_sat_gl_apply(gl, 0, texture, 0, &bad), SAT_ERR_MISMATCH);

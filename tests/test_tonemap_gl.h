@@ -84,6 +84,7 @@ static void compare(screen *s, const tonemap_options *options, int width, int he
     unsigned char *cpu = (unsigned char *)malloc(n), *gpu = (unsigned char *)malloc(n);
     unsigned hdr = screen_texture(s, SAT__GL_RGBA32F, width, height, pixels),
              ldr = screen_texture(s, SAT__GL_RGBA8, width, height, NULL);
+    sat_gl_target to;
     tonemap *map = NULL;
     tonemap_gl *gl = NULL;
     size_t over = 0, alpha = 0, any = 0;
@@ -98,7 +99,8 @@ static void compare(screen *s, const tonemap_options *options, int width, int he
     }
     if (!EXPECT_EQ(tonemap_gl_create(&gl, s->context.get_proc, width, height, options), SAT_OK))
         puts(tonemap_gl_message(gl));
-    EXPECT_EQ(tonemap_gl_apply(gl, ldr, hdr, 0), SAT_OK);
+    to = sat_gl_to_texture(ldr);
+    EXPECT_EQ(tonemap_gl_apply(gl, &to, hdr, 0), SAT_OK);
     screen_read(s, gpu, ldr, width, height);
     for (i = 0; i < n; ++i) {
         int d = abs((int)cpu[i] - (int)gpu[i]);
@@ -357,6 +359,7 @@ TEST(gl_sums_are_the_cpus_integers)
 TEST(gl_state_comes_back)
 {
     enum { W = 33, H = 20 };
+    sat_gl_target to;
     screen s;
     float *pixels = lit_pixels(W, H, 0);
     tonemap_options o = local_options();
@@ -383,7 +386,8 @@ TEST(gl_state_comes_back)
     sat__gl_end(&s.gl, &before);
     EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
     EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, 0), SAT_OK);
-    EXPECT_EQ(tonemap_gl_apply(gl, other, hdr, 1), SAT_OK);
+    to = sat_gl_to_texture(other);
+    EXPECT_EQ(tonemap_gl_apply(gl, &to, hdr, 1), SAT_OK);
     EXPECT_EQ(s.gl.GetError(), SAT__GL_NO_ERROR);
     sat__gl_begin(&s.gl, &after, 8);
     sat__gl_end(&s.gl, &after);

@@ -9,12 +9,13 @@
 #include "raindrop.h"
 #include "tonemap.h"
 #include "bench.h"
-#include "gl_context.h"
+#include "gpu.h"
 #include "image.h"
 #include "reference_raindrop.h"
 
 static gl_context context;
 static sat__gl gpu;
+static gpu_clock timer;
 static int software, size;
 
 static struct {
@@ -76,7 +77,7 @@ static void draw(raindrop_gl *g, const raindrop_render_options *o)
     static const float grey[4] = {0.2f, 0.25f, 0.3f, 1};
     gpu.BindFramebuffer(SAT__GL_FRAMEBUFFER, the.framebuffer);
     gpu.ClearBufferfv(SAT__GL_COLOR, 0, grey);
-    raindrop_gl_render(g, size, size, &the.camera, o);
+    raindrop_gl_render(g, NULL, size, size, &the.camera, NULL, o);
 }
 
 static void frame(raindrop_gl *g, const raindrop_render_options *o, int tone)
@@ -95,16 +96,16 @@ static double frames_per_second(raindrop_gl *g, raindrop_look look, int tone)
     o.look = look;
     o.map = the.map;
     frame(g, &o, tone);
-    gpu.Finish();
+    timer.finish();
     start = support_clock();
     frame(g, &o, tone);
-    gpu.Finish();
+    timer.finish();
     start = support_clock() - start;
     if (!software && start < 0.02) frames = 1 + (int)(0.02 / (start + 1e-6));
     for (i = 0; i < runs; i++) {
         start = support_clock();
         for (k = 0; k < frames; k++) frame(g, &o, tone);
-        gpu.Finish();
+        timer.finish();
         t[i] = (support_clock() - start) / frames;
     }
     return 1 / support_median(t, runs);
@@ -172,10 +173,10 @@ static double time_of(raindrop_gl *g, raindrop_rain *rain, int kind, raindrop_lo
         for (m = 0; m < 2; m++) {
             raindrop_render_options o = set_kind(g, rain, m ? kind : PLAIN);
             o.look = look;
-            gpu.Finish();
+            timer.finish();
             seconds[m] = support_clock();
             for (k = 0; k < frames; k++) draw(g, &o);
-            gpu.Finish();
+            timer.finish();
             seconds[m] = support_clock() - seconds[m];
         }
         if (i >= 0) ratio[i] = seconds[1] / seconds[0];
@@ -239,7 +240,8 @@ int main(void)
         return 0;
     }
     printf("# machine: %s\n", gl_context_renderer(&context));
-    software = strstr(gl_context_renderer(&context), "llvmpipe") || strstr(gl_context_renderer(&context), "softpipe");
+    timer = gpu_clock_of(&context);
+    software = gpu_is_software(&context);
     size = software || bench_quick() ? 512 : 1024;
     if (!succeeded(sat__gl_open(&gpu, context.get_proc), gpu.message) || !open_scene()) return 1;
     table_2_2();

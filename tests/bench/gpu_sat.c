@@ -5,10 +5,11 @@
 #define SAT_GL
 #include "sat.h"
 #include "bench.h"
-#include "gl_context.h"
+#include "gpu.h"
 
 static gl_context context;
 static sat__gl gpu;
+static gpu_clock timer;
 static int software;
 
 /* ---- pictures and exact sums ---- */
@@ -77,22 +78,14 @@ static void run_work(const work *w)
 /* Milliseconds of one call: median of several measurements of several calls each. */
 static double milliseconds(const work *w)
 {
-    double t[9], start, seconds;
+    double t[9];
     int i, j, rounds = software ? 3 : 9, repeat = software ? 1 : 10;
     run_work(w);
     run_work(w);
-    gpu.Finish();
     for (i = 0; i < rounds; i++) {
-        sat__gl_timer timer;
-        start = support_clock();
-        sat__gl_timer_begin(&gpu, &timer);
+        gpu_begin(&timer);
         for (j = 0; j < repeat; j++) run_work(w);
-        seconds = sat__gl_timer_end(&gpu, &timer);
-        if (seconds < 0) {
-            gpu.Finish();
-            seconds = support_clock() - start;
-        }
-        t[i] = 1e3 * seconds / repeat;
+        t[i] = 1e3 * gpu_end(&timer) / repeat;
     }
     return support_median(t, rounds);
 }
@@ -340,10 +333,11 @@ int main(void)
         printf("skip: %s\n", gpu.message);
         return 0;
     }
+    timer = gpu_clock_of(&context);
+    software = gpu_is_software(&context);
     bench_start("sat.h on the GPU");
     printf("# renderer: %s\n# time: %s\n", gl_context_renderer(&context),
-           gpu.has_timer ? "timer queries" : "clock between two glFinish");
-    software = !gpu.has_timer || strstr(context.message, "softpipe") || strstr(context.message, "llvmpipe");
+           timer.has_queries ? "timer queries" : "clock between two glFinish");
     published_table(bench_quick() ? 2 : software ? 4 : 15);
     compute_table(software || bench_quick() ? 512 : 2048);
     format_table(software || bench_quick() ? 512 : 2048);

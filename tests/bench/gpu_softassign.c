@@ -6,12 +6,13 @@
 #define SOFTASSIGN_GL
 #include "softassign.h"
 #include "bench.h"
-#include "gl_context.h"
+#include "gpu.h"
 
 enum { FEATURES = 48 };
 
 static gl_context context;
 static sat__gl gpu;
+static gpu_clock timer;
 static int software;
 
 /* Patches of few levels, tiles of all: the kind of photographs, and the same everywhere. */
@@ -52,10 +53,10 @@ static double seconds_of(void (*work)(const run *r), const run *r, int rounds)
     int i;
     work(r);
     for (i = 0; i < rounds; i++) {
-        gpu.Finish();
+        timer.finish();
         start = support_clock();
         work(r);
-        gpu.Finish();
+        timer.finish();
         t[i] = support_clock() - start;
     }
     return support_median(t, rounds);
@@ -76,7 +77,8 @@ int main(void)
         return 0;
     }
     if (sat__gl_open(&gpu, context.get_proc) != SAT_OK) return 1;
-    software = strstr(gl_context_renderer(&context), "llvmpipe") || strstr(gl_context_renderer(&context), "softpipe") ||
+    timer = gpu_clock_of(&context);
+    software = gpu_is_software(&context) ||
                bench_quick();
     bench_start("softassign.h on the GPU");
     printf("# renderer: %s\n", gl_context_renderer(&context));
@@ -102,7 +104,7 @@ int main(void)
             check(&r, softassign_gl_create(&r.gl, context.get_proc, &o));
             start = support_clock();
             check(&r, softassign_gl_set_costs(r.gl, &p));
-            gpu.Finish();
+            timer.finish();
             start = support_clock() - start;
             full = seconds_of(one_cooling, &r, software ? 1 : 5);
             r.sweeps = 1;

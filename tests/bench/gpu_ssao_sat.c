@@ -7,11 +7,12 @@
 #include "ssao_sat.h"
 #include "bench.h"
 #include "mesh.h"
-#include "gl_context.h"
+#include "gpu.h"
 #include "reference_ssao.h"
 
 static gl_context context;
 static sat__gl gpu;
+static gpu_clock timer;
 static int software;
 
 /* ---- the usual methods as fragment passes: linear depth, half resolution, then a separable blur that keeps edges
@@ -153,18 +154,10 @@ static double milliseconds(work *w)
     int i, j, rounds = software ? 1 : 9, repeat = software ? 1 : 10;
     run(w);
     if (!software) run(w);
-    gpu.Finish();
     for (i = 0; i < rounds; i++) {
-        sat__gl_timer timer;
-        double start = support_clock(), seconds;
-        sat__gl_timer_begin(&gpu, &timer);
+        gpu_begin(&timer);
         for (j = 0; j < repeat; j++) run(w);
-        seconds = sat__gl_timer_end(&gpu, &timer);
-        if (seconds < 0) {
-            gpu.Finish();
-            seconds = support_clock() - start;
-        }
-        t[i] = 1e3 * seconds / repeat;
+        t[i] = 1e3 * gpu_end(&timer) / repeat;
     }
     return support_median(t, rounds);
 }
@@ -237,8 +230,8 @@ int main(void)
         return 0;
     }
     printf("# renderer: %s\n", gl_context_renderer(&context));
-    software = strstr(gl_context_renderer(&context), "llvmpipe") != NULL ||
-               strstr(gl_context_renderer(&context), "softpipe") != NULL;
+    timer = gpu_clock_of(&context);
+    software = gpu_is_software(&context);
     small = software || bench_quick();
     for (i = 256; i <= (small ? 256 : 2048); i *= 2) sizes[count++] = i;
     if (!small) sizes[count++] = 4096;

@@ -6,7 +6,9 @@
 #define TONEMAP_GL
 #include "tonemap.h"
 #include "bench.h"
-#include "gl_context.h"
+#include "gpu.h"
+
+static gpu_clock timer;
 
 typedef struct frame { tonemap_gl *map; unsigned hdr; } frame;
 
@@ -27,16 +29,16 @@ static void fill(float *pixels, int width, int height)
 }
 
 /* Seconds of one call, by waiting for the GPU around a number of them. */
-static double seconds(sat__gl *gl, const frame *f, int calls, int rounds)
+static double seconds(const frame *f, int calls, int rounds)
 {
     double t[9], start;
     int i, k;
     for (i = 0; i < calls; ++i) tonemap_gl_apply(f->map, 0, f->hdr, 0);
-    gl->Finish();
+    timer.finish();
     for (k = 0; k < rounds; ++k) {
         start = support_clock();
         for (i = 0; i < calls; ++i) tonemap_gl_apply(f->map, 0, f->hdr, 0);
-        gl->Finish();
+        timer.finish();
         t[k] = (support_clock() - start) / calls;
     }
     return support_median(t, rounds);
@@ -55,7 +57,7 @@ static double seconds_luminance(sat__gl *gl, const frame *f, int calls, int roun
             tonemap__gl_measure(f->map, f->hdr);
             tonemap__gl_adapt(f->map, 0);
         }
-        gl->Finish();
+        timer.finish();
         t[k] = (support_clock() - start) / calls;
     }
     sat__gl_end(gl, &state);
@@ -99,9 +101,10 @@ int main(void)
         return 0;
     }
     if (sat__gl_open(&gl, context.get_proc) != SAT_OK) return 1;
+    timer = gpu_clock_of(&context);
     bench_start("tonemap.h on OpenGL");
     printf("# renderer: %s\n", gl_context_renderer(&context));
-    slow = bench_quick() || strstr(context.message, "llvmpipe") || strstr(context.message, "softpipe");
+    slow = bench_quick() || gpu_is_software(&context);
     count = slow ? 3 : 15;
     rounds = slow ? 3 : 9;
     calls = slow ? 1 : 20;
@@ -117,7 +120,7 @@ int main(void)
             o.mesopic = (tonemap_mesopic)k;
             o.cd_per_unit = 1;
             f = make(&context, hdr, sizes[i][0], sizes[i][1], &o);
-            t[k] = seconds(&gl, &f, calls, rounds);
+            t[k] = seconds(&f, calls, rounds);
             if (k == 0) luminance = seconds_luminance(&gl, &f, calls, rounds);
             tonemap_gl_destroy(f.map);
         }
@@ -139,7 +142,7 @@ int main(void)
                 else o.operation = k ? TONEMAP_PHOTOGRAPHIC_LOCAL : TONEMAP_ASHIKHMIN;
                 if (m == 2) o.selective = 0.1;
                 f = make(&context, hdr, sizes[i][0], sizes[i][1], &o);
-                fps[m] = 1 / seconds(&gl, &f, calls, rounds);
+                fps[m] = 1 / seconds(&f, calls, rounds);
                 tonemap_gl_destroy(f.map);
             }
             bench_row("%d\t%d\t%s\t%.1f\t%.1f\t%.1f\t%.2f", sizes[i][0], sizes[i][1], k ? "photographic" : "Ashikhmin",
