@@ -534,8 +534,8 @@ typedef struct sat_gl_options {
     double max_value;             /* 1e30; 1e-300..1e300; pixels beyond +-max_value are clamped to it; NaN counts as 0.
                                      Lower it for FIXED32: the quantum is proportional to it */
     double max_box_area;          /* 0; 0..1e300; 0: the whole table; FIXED32: no larger box is ever asked for */
-    int width;                    /* 0; 0..32768; with height: create makes all textures, and no other size is taken */
-    int height;                   /* 0; 0..32768 */
+    int width;                    /* 0; 0..16777216; with height: create makes all textures, and no other size is taken */
+    int height;                   /* 0; 0..16777216 */
     sat_allocator allocator;      /* malloc; used by create and destroy only */
 } sat_gl_options;
 SAT_DEF sat_gl_options sat_gl_defaults(void);
@@ -6388,8 +6388,8 @@ static const sat__field sat__gl_fields[] = {
     SAT__FIELD(sat_gl_options, 'd', quantum, 0, 1e-35, 1e35, '0'),
     SAT__FIELD(sat_gl_options, 'd', max_value, 1e30, 1e-300, 1e300, ' '),
     SAT__FIELD(sat_gl_options, 'd', max_box_area, 0, 0, 1e300, ' '),
-    SAT__FIELD(sat_gl_options, 'i', width, 0, 0, 32768, ' '),
-    SAT__FIELD(sat_gl_options, 'i', height, 0, 0, 32768, ' '),
+    SAT__FIELD(sat_gl_options, 'i', width, 0, 0, 16777216, ' '),
+    SAT__FIELD(sat_gl_options, 'i', height, 0, 0, 16777216, ' '),
     SAT__FIELD(sat_gl_options, 'a', allocator, 0, 0, 0, ' '),
 };
 
