@@ -534,7 +534,7 @@ typedef struct sat_gl_options {
     double max_value;             /* 1e30; 1e-300..1e300; pixels beyond +-max_value are clamped to it; NaN counts as 0.
                                      Lower it for FIXED32: the quantum is proportional to it */
     double max_box_area;          /* 0; 0..1e300; 0: the whole table; FIXED32: no larger box is ever asked for */
-    int width;                    /* 0; 0..16777216; with height: create makes all textures, and no other size is taken */
+    int width;                    /* 0; 0..16777216; with height: create makes all textures; no other size is taken */
     int height;                   /* 0; 0..16777216 */
     sat_allocator allocator;      /* malloc; used by create and destroy only */
 } sat_gl_options;
