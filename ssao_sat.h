@@ -32,22 +32,25 @@
    - One matrix decides the convention: linear, hardware or reversed depth, [-1,1] or [0,1], infinite far planes,
      off-centre, flipped, left-handed, orthographic, jittered, an oblique near plane (mirrors, water). What must be 0
      may be the rounding of a matrix product. A depth kind that contradicts the matrix is refused.
-   - No pixel and no small object moves the frame: depth ranges leave out the nearest and farthest 4 of 256 blocks of a
-     sample, and what lies beyond is in the end slabs.
+   - No pixel moves the frame and a small object hardly does (a bird nearer than all else: by 0.0002 on average, 0.035
+     at most): depth ranges leave out the nearest and farthest 4 of 256 blocks of a sample, and what lies beyond is in
+     the end slabs.
    - Half-resolution tables (SLABS: of all pixels, so a wire counts at every column) with an upsample that knows planes
      and never reads sky; bent normals; signed depth unsharp masking; bands of rows for stills of any size; statistics
-     of what was left out and of normals in the wrong space; other sizes and options without a new object; OpenGL 3.3 /
-     ES 3.0, nothing compiled in a frame.
+     of what was left out and of normals in the wrong space; 8 bits, half floats or floats; other sizes and options
+     without a new object; OpenGL 3.3 / ES 3.0, nothing compiled in a frame.
 
    WHAT IT DOES NOT
 
    - It sees what the depth buffer holds: occluders off the screen or behind others do not count. Nothing is assumed
      about thickness, so thin poles darken a little what lies behind them.
    - No temporal accumulation: there is no noise to accumulate away. No shading: the accessibility is yours to multiply.
-   - On the GPU no bent normals and no signed output. Logarithmic depth is not decoded: give distances.
-   - GTAO has a smaller error at small radii (bench_ssao_sat): cells average what samples resolve.
-   - Smooth normals on a coarse mesh are believed: its facets then darken at their edges. Without normals they are taken
-     from depth.
+   - On the GPU no bent normals and no signed output. Logarithmic depth is not decoded: give distances. The upsample's
+     weights are no output: they are nine a pixel, and follow from depth and normals alone.
+   - GTAO at half resolution has about the same error in less time (COST), at small radii a smaller one: cells average
+     what samples resolve.
+   - Smooth normals on a coarse mesh are believed: its facets then darken at their edges. Leave normals NULL there:
+     those from depth are the facets' own.
 
    DEVIATIONS from chapter 5, with their reasons
 
@@ -79,7 +82,7 @@
    MEMORY, THREADS, ERRORS
 
    ssao_sat_create makes one allocation; frames make none. Bytes a pixel of the tables: 16 a slab and about 60; so 8
-   slabs at half resolution take 47 a pixel of the picture. Stack: at most 3 KB. With band_rows the memory is that of
+   slabs at half resolution take 47 a pixel of the picture. Stack: at most 5 KB. With band_rows the memory is that of
    band_rows + 2 max_pixels + 8 table rows.
    An object serves one call at a time. The input is only read. Every argument is checked in every build, and on an
    error nothing is written; ssao_sat_explain and ssao_sat_explain_input say in a sentence what was wrong. NULL options
@@ -111,33 +114,61 @@
 
    COST
 
-   Work a table pixel: 16 lookups a ring and slab in reach; flat regions cost 4. Measured by bench_ssao_sat, three
-   scenes x radii 0.1, 0.25, 0.6 at 512 x 512, 96 rays a pixel, one thread, gcc -O2 (SSE2), processor time in the same
-   run (1 = half-resolution GTAO, 3 x (3 + 3) samples). The others are plain scalar C, the slabs four lanes wide: a GTAO
-   in vectors is faster than the slabs.
+   Work a table pixel: 16 lookups a ring and slab in reach; flat regions cost 4. Fitted and measured at 512 x 512 with
+   256 rays a pixel, radii 0.1, 0.25, 0.6, gcc -O2 (SSE2), by fit_ssao_sat and bench_ssao_sat. The peers are four lanes
+   wide as the slabs are, and at half resolution run in the slabs' own frame. RMSE of three scenes, to which the slabs'
+   kernel and the peers' parameters were fitted:
 
-     method                        time   RMSE    SSIM   RMSE, gain and power    RMSE, another scene,
-                                                         from other scenes       nothing fitted to it
-     minimalist                    0.19   0.183   0.73   0.168                   0.139
-     normal-guided                 0.20   0.173   0.76   0.165                   0.222
-     refined                       0.60   0.173   0.73   0.165                   0.149
-     plane, one box                0.22   0.118   0.75   0.121                   0.104
-     plane, 2 x 2                  0.29   0.103   0.77   0.107                   0.092
-     slabs, 4 of them              0.42   0.066   0.88   0.067                   0.055
-     slabs (default)               0.48   0.065   0.89   0.066                   0.051
-     SSAO 16 + 15 x 15 blur        0.67   0.073   0.85   0.075                   0.080
-     HBAO 16 x 8, half resolution  2.34   0.066   0.88   0.068                   0.048
-     HBAO 16 x 8 + 15 x 15 blur    4.82   0.066   0.87   0.068                   0.047
-     GTAO, half resolution         1.00   0.060   0.88   0.060                   0.049
-     GTAO 3 x (3 + 3) + 5 x 5      1.72   0.058   0.88   0.058                   0.047
+     slabs (default) 0.058      4 slabs 0.060                   full resolution 0.058
+     XeGTAO, half resolution:   low 0.087, medium 0.064, high 0.057, ultra 0.056
+     XeGTAO, full resolution:   high 0.058, ultra 0.055
+     visibility bitmasks:       half 3 x (3 + 3) 0.057 and 4 x (8 + 8) 0.058, full 4 x (8 + 8) 0.054
+     HBAO 16 x 8:               half resolution 0.066, full resolution 0.064
+     SSAO 16 + 15 x 15 blur:    0.073
 
-   Where things are thinner than cells the order is another: RMSE on grass and poles (192 x 192) 0.105, HBAO 0.093, GTAO
-   0.148; in a hall of 40 m 0.077, HBAO 0.076, GTAO 0.081, all at half resolution. Time grows with the radius, because
-   more slabs come into reach and less is flat: radii 0.1 : 0.25 : 0.6 cost 1 : 1.4 : 2.0; the others cost 1 : 1.0 :
-   1.1. Leaving out flat regions changes nothing in the output. Bent normals cost a tenth or so and are 1 to 7 degrees
-   off the ray-traced ones. A gliding camera (192 x 192) changes the result by 0.0016 a frame where half-resolution GTAO
-   changes by 0.0031, HBAO by 0.0020. Box means of 1/z at 4096 x 4096: 5e-6 of a depth step off, where float tables are
-   0.6 off. Full-resolution tables cost 2.7 times as much and gain 0.0005.
+   Scenes that nothing was fitted to, RMSE on other objects, on grass and poles, in a hall of 40 m:
+
+     slabs (default)               0.038   0.104   0.064
+     4 slabs                       0.041   0.113   0.067
+     XeGTAO high, half and full    0.048   0.131   0.060    0.048   0.116   0.060
+     XeGTAO ultra, half and full   0.047   0.125   0.059    0.046   0.115   0.055
+     bitmask 4 x (8 + 8), the same 0.046   0.168   0.059    0.043   0.155   0.054
+     HBAO 16 x 8, half and full    0.050   0.088   0.057    0.050   0.082   0.051
+
+   Time, 1 = XeGTAO high at half resolution: slabs 1.4, 4 slabs 1.3; XeGTAO low 0.67, ultra 2.3; bitmask 1.4 and 3.7;
+   HBAO 2.5; at full resolution slabs 5.1, XeGTAO 3.1 and 7.8, bitmask 14, HBAO 11; GTAO in scalar C at half resolution
+   3.9; plane 0.84 with one box, 1.3 with 2 x 2; minimalist 0.66. So XeGTAO is the faster on scenes it was fitted to,
+   for about the same error; the slabs carry over better to other objects, and have no noise to denoise. A gliding
+   camera changes the result by 0.0013 a frame in the corner, 0.0014 in the room, 0.010 in grass, 0.0010 in the hall;
+   XeGTAO high at half resolution by 0.0015, 0.0023, 0.030, 0.0010; HBAO by 0.0011, 0.0015, 0.013, 0.0007. Time grows
+   with the radius, because more slabs come into reach and less is flat: radii 0.1 : 0.25 : 0.6 cost 1 : 1.7 : 2.4,
+   XeGTAO 1 : 1.0 : 1.1. Leaving out flat regions and rings changes nothing in the output. Bent normals cost a tenth or
+   so and are 1 to 7 degrees off the ray-traced ones. RMSE of the others, fitted scenes and other objects: plane 0.118
+   and 0.103, 2 x 2 0.103 and 0.092; minimalist 0.184 and 0.139, normal-guided 0.174 and 0.222, refined 0.173 and
+   0.148.
+   Box means of 1/z at 4096 x 4096: 5e-6 of a depth step off, where float tables are 0.6 off.
+*/
+
+/*
+   CONTENTS: each section begins with its mark
+
+   >> types                   interface: methods, input, options, statistics
+   >> calls                   interface: create, apply, helpers for shading
+   >> on OpenGL               interface: textures in and out
+   >> vectors                 of four lanes
+   >> object                  what it holds, the fitted kernel, the options' rows
+   >> camera                  what one matrix decides
+   >> reading pixels          distances and normals
+   >> slabs                   depth range and edges
+   >> regions                 sizes in pixels
+   >> tables                  the rows of a band and their sums
+   >> estimate by slabs       the default method
+   >> estimate by one table   PLANE and the published methods
+   >> output                  copied or upsampled
+   >> frame                   bands, statistics
+   >> entry points            checks, layout, create and apply
+   >> shaders                 the same in GLSL
+   >> passes                  programs, textures, frames
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(SSAO_SAT_IMPLEMENTATION)
@@ -181,7 +212,7 @@ extern "C" {
 #endif
 
 /* ------------------------------------------------------------------------------------------------
-   Types
+   >> types
    ------------------------------------------------------------------------------------------------ */
 
 typedef enum ssao_sat_method {
@@ -277,7 +308,7 @@ typedef struct ssao_sat_stats {
 typedef struct ssao_sat ssao_sat;
 
 /* ------------------------------------------------------------------------------------------------
-   Calls
+   >> calls
    ------------------------------------------------------------------------------------------------ */
 
 SSAO_SAT_DEF int ssao_sat_version(void);
@@ -301,9 +332,14 @@ SSAO_SAT_DEF const char *ssao_sat_explain_input(char *text, size_t size, const s
    input. stats may be NULL. On an error nothing is written. */
 SSAO_SAT_DEF sat_result ssao_sat_apply(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride,
                                        const ssao_sat_input *input, ssao_sat_stats *stats);
+/* The same in 8 bits (255 open) or in half floats, without a float picture in between; rounded to nearest. */
+SSAO_SAT_DEF sat_result ssao_sat_apply_u8(ssao_sat *ao, uint8_t *accessibility, ptrdiff_t out_stride,
+                                          const ssao_sat_input *input, ssao_sat_stats *stats);
+SSAO_SAT_DEF sat_result ssao_sat_apply_half(ssao_sat *ao, uint16_t *accessibility, ptrdiff_t out_stride,
+                                            const ssao_sat_input *input, ssao_sat_stats *stats);
 #ifndef SSAO_SAT_NO_BENT
-/* The same, and the mean unblocked direction (unit, view space, xyz; the normal where all is open, 0 0 1 on sky): look
-   up irradiance along it instead of the normal. SLABS only. */
+/* The same as apply, and the mean unblocked direction (unit, view space, xyz; the normal where all is open, 0 0 1 on
+   sky): look up irradiance along it instead of the normal. SLABS only. */
 SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride,
                                             float *bent_normals, ptrdiff_t bent_stride, const ssao_sat_input *input,
                                             ssao_sat_stats *stats);
@@ -334,7 +370,7 @@ extern "C" {
 #endif
 
 /* ------------------------------------------------------------------------------------------------
-   OpenGL 3.3 core or ES 3.0 (with EXT_color_buffer_float)
+   >> on OpenGL: 3.3 core or ES 3.0 (with EXT_color_buffer_float)
    ------------------------------------------------------------------------------------------------ */
 
 /* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL
@@ -397,7 +433,7 @@ extern "C" {
 #endif
 
 /* ------------------------------------------------------------------------------------------------
-   Vectors of four: SSE2 and NEON through sat.h, or plain C. One kernel serves them all.
+   >> vectors: of four, SSE2 and NEON through sat.h, or plain C. One kernel serves them all.
    ------------------------------------------------------------------------------------------------ */
 
 #if defined(SAT__VECTOR)
@@ -509,7 +545,7 @@ static inline void ssao_sat__transpose(ssao_sat__f *m)
 #endif
 
 /* ------------------------------------------------------------------------------------------------
-   The object and the frame
+   >> object: and frame, fitted numbers, options
    ------------------------------------------------------------------------------------------------ */
 
 enum {
@@ -635,7 +671,9 @@ struct ssao_sat {
     float flat_limit;
     int frame_slabs;        /* <= options.slabs */
     int bent_wanted, is_signed;
-    float *out, *bent_out;
+    int element;            /* bytes of an output: float, half or 8 bits */
+    void *out;
+    float *bent_out;
     ptrdiff_t out_stride, bent_stride;
     /* this band: rows [first, first + held) are held, [begin, end) estimated */
     int first, held, begin, end;
@@ -704,7 +742,7 @@ SSAO_SAT_DEF ssao_sat_input ssao_sat_input_linear(const float *depth, int width,
 }
 
 /* ------------------------------------------------------------------------------------------------
-   Camera: one matrix decides perspective or orthographic, the depth convention and the direction of y
+   >> camera: one matrix decides perspective or orthographic, the depth convention and the direction of y
    ------------------------------------------------------------------------------------------------ */
 
 /* Solves clip = M view for the view coordinates of a pixel; 0 when M is no projection of the stated kind. */
@@ -793,7 +831,7 @@ static int ssao_sat__read_camera(ssao_sat__camera *c, const ssao_sat_input *in, 
 }
 
 /* ------------------------------------------------------------------------------------------------
-   Reading the picture: distance, affine depth and normal of pixels; 0 where there is nothing
+   >> reading pixels: distance, affine depth and normal of pixels; 0 where there is nothing
    ------------------------------------------------------------------------------------------------ */
 
 /* Distance along the axis; 0 for sky and for whatever is no distance. Tested on bits: NaN must not reach a table. */
@@ -925,7 +963,7 @@ static void ssao_sat__read_row(const ssao_sat *s, int y, int x0, int end, int st
 }
 
 /* ------------------------------------------------------------------------------------------------
-   Depth range and slab edges
+   >> slabs: depth range and edges
    ------------------------------------------------------------------------------------------------ */
 
 static float ssao_sat__scale_depth(const ssao_sat *s, float z) { return s->camera.orthographic ? z : logf(z); }
@@ -1128,7 +1166,7 @@ static void ssao_sat__prepare_value(ssao_sat *s)
 }
 
 /* ------------------------------------------------------------------------------------------------
-   Regions
+   >> regions
    ------------------------------------------------------------------------------------------------ */
 
 /* Half side along x, in table pixels, of a region of `reach` world units at distance z, cut so that neither side
@@ -1150,7 +1188,7 @@ static inline float ssao_sat__fade(const ssao_sat *s, float half_side)
 }
 
 /* ------------------------------------------------------------------------------------------------
-   Holding the rows of a band, and their tables. All tables are sums modulo 2^32: box sums are exact
+   >> tables: the rows of a band, and their tables. All tables are sums modulo 2^32: box sums are exact
    wherever the table starts, so bands, workers and GPUs get the same bits.
    ------------------------------------------------------------------------------------------------ */
 
@@ -1405,7 +1443,7 @@ static inline float ssao_sat__accessibility(const ssao_sat *s, float occlusion, 
 
 #ifndef SSAO_SAT_NO_SLABS
 /* ------------------------------------------------------------------------------------------------
-   SLABS: in every cell of every ring, what each slab holds is one occluder at its exact centroid
+   >> estimate by slabs: in every cell of every ring, what each slab holds is one occluder at its exact centroid
 
        occlusion = f(n.v) sum over cells and slabs of coverage k(max(0, n.d / |d| - bias), |d| / radius)
                                                       max(0, 1 - |d|^2 / range^2)
@@ -1413,6 +1451,13 @@ static inline float ssao_sat__accessibility(const ssao_sat *s, float occlusion, 
    with the polynomials k and the factor f of ssao_sat__kernels.
    The eight cells around a pixel are two vectors: corners and sides. The four words of a table entry are one load.
    ------------------------------------------------------------------------------------------------ */
+
+/* What all pixels share, the same in all lanes: read from memory that no store can be thought to change. */
+typedef struct ssao_sat__lanes {
+    ssao_sat__f low[SSAO_SAT__MAX_SLABS], quantum[SSAO_SAT__MAX_SLABS];
+    ssao_sat__f ax, bx, ay, by, falloff, inverse_radius, bias;
+    ssao_sat__f term[SSAO_SAT__MAX_SCALES][SSAO_SAT__MAX_SCALES][SSAO_SAT__TERMS]; /* kernel of rings [first, last] */
+} ssao_sat__lanes;
 
 typedef struct ssao_sat__point {
     int x, y;
@@ -1427,7 +1472,7 @@ typedef struct ssao_sat__point {
 typedef struct ssao_sat__cells {
     int column[4], row[4];
     ssao_sat__f weight[2];
-    ssao_sat__f term[SSAO_SAT__TERMS]; /* of the kernel, the same in all lanes */
+    const ssao_sat__f *term; /* of the kernel */
 } ssao_sat__cells;
 
 /* Horner in the distance, for one power of the sine. */
@@ -1439,35 +1484,31 @@ static inline ssao_sat__f ssao_sat__cubic(const ssao_sat__f *c, ssao_sat__f d)
 }
 
 /* The occluders of one slab in four cells, given the sums over each. */
-static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__slab *slab,
+static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__lanes *l, int slab,
                                            ssao_sat__f *sums, int group, const ssao_sat__cells *c)
 {
-    const ssao_sat__f one = ssao_sat__set(1), zero = ssao_sat__set(0),
-                      falloff = ssao_sat__set(1 / (s->range * s->range));
+    const ssao_sat__f one = ssao_sat__set(1), zero = ssao_sat__set(0);
     ssao_sat__f count, affine, r, z, dx, dy, dz, square, height, share, length, inverse, sine, part;
     ssao_sat__transpose(sums); /* count, level, x, y of the four cells */
     count = sums[0];
-    affine = ssao_sat__add(ssao_sat__mul(ssao_sat__set(slab->low), count),
-                           ssao_sat__mul(ssao_sat__set(slab->quantum), sums[1]));
+    affine = ssao_sat__add(ssao_sat__mul(l->low[slab], count), ssao_sat__mul(l->quantum[slab], sums[1]));
     r = ssao_sat__div(one, s->camera.orthographic ? ssao_sat__max(count, one)
                                                   : ssao_sat__max(affine, ssao_sat__set(1e-30f)));
     z = ssao_sat__mul(s->camera.orthographic ? affine : count, r);
-    dx = ssao_sat__add(ssao_sat__mul(ssao_sat__set((float)s->camera.full[0]), sums[2]),
-                       ssao_sat__mul(ssao_sat__set(s->camera.bx), count));
-    dy = ssao_sat__add(ssao_sat__mul(ssao_sat__set((float)s->camera.full[2]), sums[3]),
-                       ssao_sat__mul(ssao_sat__set(s->camera.by), count));
+    dx = ssao_sat__add(ssao_sat__mul(l->ax, sums[2]), ssao_sat__mul(l->bx, count));
+    dy = ssao_sat__add(ssao_sat__mul(l->ay, sums[3]), ssao_sat__mul(l->by, count));
     dx = ssao_sat__sub(ssao_sat__mul(dx, r), p->px);
     dy = ssao_sat__sub(ssao_sat__mul(dy, r), p->py);
     dz = ssao_sat__sub(z, p->pz);
     square = ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, dx), ssao_sat__mul(dy, dy)), ssao_sat__mul(dz, dz));
     height = ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, p->nx), ssao_sat__mul(dy, p->ny)), ssao_sat__mul(dz, p->nz));
-    share = ssao_sat__sub(one, ssao_sat__mul(square, falloff));
+    share = ssao_sat__sub(one, ssao_sat__mul(square, l->falloff));
     share = ssao_sat__if_positive(height, ssao_sat__mul(ssao_sat__max(zero, share), count));
     if (!ssao_sat__any_positive(share)) return;
     length = ssao_sat__sqrt(ssao_sat__max(square, p->least));
     inverse = ssao_sat__div(one, length);
-    sine = ssao_sat__max(zero, ssao_sat__sub(ssao_sat__mul(height, inverse), ssao_sat__set(s->fit.bias)));
-    length = ssao_sat__mul(length, ssao_sat__set(1 / s->radius));
+    sine = ssao_sat__max(zero, ssao_sat__sub(ssao_sat__mul(height, inverse), l->bias));
+    length = ssao_sat__mul(length, l->inverse_radius);
     length = ssao_sat__min(length, ssao_sat__set(2)); /* the share is 0 from fit.range on: no overflow beyond */
     part = ssao_sat__mul(sine, ssao_sat__cubic(c->term + 8, length));
     part = ssao_sat__mul(sine, ssao_sat__add(part, ssao_sat__cubic(c->term + 4, length)));
@@ -1485,7 +1526,8 @@ static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s
 }
 
 /* Sixteen table entries make the sums over eight cells of one slab. */
-static inline void ssao_sat__add_slab(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__cells *c, int k)
+static inline void ssao_sat__add_slab(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__lanes *l,
+                                      const ssao_sat__cells *c, int k)
 {
     const uint32_t *table = s->table + 4 * (size_t)k * s->table_plane, *row[4];
     ssao_sat__i band[3][4], upper, lower;
@@ -1515,8 +1557,8 @@ static inline void ssao_sat__add_slab(ssao_sat__point *p, const ssao_sat *s, con
     sides[2] = SSAO_SAT__CELL(1, 2);
     sides[3] = SSAO_SAT__CELL(2, 1);
 #undef SSAO_SAT__CELL
-    ssao_sat__add_occluders(p, s, &s->slabs[k], corners, 0, c);
-    ssao_sat__add_occluders(p, s, &s->slabs[k], sides, 1, c);
+    ssao_sat__add_occluders(p, s, l, k, corners, 0, c);
+    ssao_sat__add_occluders(p, s, l, k, sides, 1, c);
 }
 
 /* Borders of the cells along one axis: [at - outer, at - inner) [at - inner, at + inner] (at + inner, at + outer], and
@@ -1576,20 +1618,33 @@ static inline int ssao_sat__may_occlude(const ssao_sat__point *p, const ssao_sat
     return height > s->fit.bias * distance;
 }
 
-/* The kernel of rings [first, end), which are looked up at once: the sum of theirs. */
-static void ssao_sat__add_terms(ssao_sat__cells *c, const ssao_sat__kernel *kernel, int first, int end)
+static void ssao_sat__set_lanes(ssao_sat__lanes *l, const ssao_sat *s)
 {
-    int i, ring;
-    for (i = 0; i < SSAO_SAT__TERMS; i++) {
-        float term = kernel->term[first][i];
-        for (ring = first + 1; ring < end; ring++) term += kernel->term[ring][i];
-        c->term[i] = ssao_sat__set(term);
+    const ssao_sat__kernel *kernel = &ssao_sat__kernels[s->options.scales - 1];
+    int first, last, ring, i;
+    l->ax = ssao_sat__set((float)s->camera.full[0]);
+    l->bx = ssao_sat__set(s->camera.bx);
+    l->ay = ssao_sat__set((float)s->camera.full[2]);
+    l->by = ssao_sat__set(s->camera.by);
+    l->falloff = ssao_sat__set(1 / (s->range * s->range));
+    l->inverse_radius = ssao_sat__set(1 / s->radius);
+    l->bias = ssao_sat__set(s->fit.bias);
+    for (i = 0; i < s->frame_slabs; i++) {
+        l->low[i] = ssao_sat__set(s->slabs[i].low);
+        l->quantum[i] = ssao_sat__set(s->slabs[i].quantum);
     }
+    for (first = 0; first < s->options.scales; first++)
+        for (last = first; last < s->options.scales; last++)
+            for (i = 0; i < SSAO_SAT__TERMS; i++) {
+                float term = 0;
+                for (ring = first; ring <= last; ring++) term += kernel->term[ring][i];
+                l->term[first][last][i] = ssao_sat__set(term);
+            }
 }
 
 /* The first `rings` rings around the point; those that round to the same pixels are looked up once. */
-static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, float half_side, int rings, int first_slab,
-                                int end_slab)
+static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__lanes *l, float half_side,
+                                int rings, int first_slab, int end_slab)
 {
     float r = half_side;
     int inner[2], outer[2], next[2][2], ring, first = 0, k;
@@ -1602,10 +1657,10 @@ static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, float hal
         if (ring > 0 && (ring == rings || memcmp(next[0], inner, sizeof inner) ||
                          memcmp(next[1], outer, sizeof outer))) {
             ssao_sat__cut_cells(&cells, s, p->x, p->y, inner, outer);
-            ssao_sat__add_terms(&cells, &ssao_sat__kernels[s->options.scales - 1], first, ring);
+            cells.term = l->term[first][ring - 1];
             for (k = first_slab; k < end_slab; k++)
                 if (s->used_slabs >> k & 1 && ssao_sat__may_occlude(p, s, outer, k))
-                    ssao_sat__add_slab(p, s, &cells, k);
+                    ssao_sat__add_slab(p, s, l, &cells, k);
             first = ring;
         }
         memcpy(inner, next[0], sizeof inner);
@@ -1682,7 +1737,7 @@ static void ssao_sat__set_point(ssao_sat__point *p, const ssao_sat *s, int x, in
 }
 
 /* Occlusion of one pixel of the tables from the slabs that meet [z - range, z + range]. */
-static void ssao_sat__estimate_slabs(ssao_sat *s, int x, int y, ssao_sat_stats *stats)
+static void ssao_sat__estimate_slabs(ssao_sat *s, const ssao_sat__lanes *l, int x, int y, ssao_sat_stats *stats)
 {
     size_t at = ssao_sat__at(s, y) + (size_t)x;
     ssao_sat__point p;
@@ -1706,7 +1761,7 @@ static void ssao_sat__estimate_slabs(ssao_sat *s, int x, int y, ssao_sat_stats *
         side_y = (int)(half_side * s->camera.aspect) + 1;
         stats->border += x < side_x || y < side_y || x + side_x >= s->columns || y + side_y >= s->rows;
         stats->estimated++;
-        ssao_sat__add_rings(&p, s, half_side, ssao_sat__ring_count(s, x, y, half_side), first, end);
+        ssao_sat__add_rings(&p, s, l, half_side, ssao_sat__ring_count(s, x, y, half_side), first, end);
         fade *= ssao_sat__by_facing(s, &p);
         s->open[at] =
             ssao_sat__accessibility(s, ssao_sat__sum_lanes(p.occlusion[0], p.occlusion[1]), fade * s->fit.gain);
@@ -1718,7 +1773,7 @@ static void ssao_sat__estimate_slabs(ssao_sat *s, int x, int y, ssao_sat_stats *
 #endif /* SSAO_SAT_NO_SLABS */
 
 /* ------------------------------------------------------------------------------------------------
-   The single-table methods: MINIMALIST, NORMAL_GUIDED, REFINED as published, and PLANE
+   >> estimate by one table: MINIMALIST, NORMAL_GUIDED, REFINED as published, and PLANE
    ------------------------------------------------------------------------------------------------ */
 
 /* A region and its corners in the table: 3 x 3 of them first, 5 x 5 when a child is split again (Slomp 2012, figure
@@ -1961,13 +2016,17 @@ static void ssao_sat__estimate_rows(int begin, int end, int worker, void *contex
     ssao_sat *s = (ssao_sat *)context;
     ssao_sat_stats unused;
     int y, x, above = s->step == 2 && s->begin > 0;
+#ifndef SSAO_SAT_NO_SLABS
+    ssao_sat__lanes lanes;
+    if (s->options.method == SSAO_SAT_SLABS && !s->is_signed) ssao_sat__set_lanes(&lanes, s);
+#endif
     memset(&unused, 0, sizeof unused);
     for (y = s->begin - above + begin; y < s->begin - above + end; y++) {
         ssao_sat_stats *stats =
             y >= s->begin && y < s->end ? &s->workers[worker].stats : &unused; /* neighbours of the band count there */
 #ifndef SSAO_SAT_NO_SLABS
         if (s->options.method == SSAO_SAT_SLABS && !s->is_signed) {
-            for (x = 0; x < s->columns; x++) ssao_sat__estimate_slabs(s, x, y, stats);
+            for (x = 0; x < s->columns; x++) ssao_sat__estimate_slabs(s, &lanes, x, y, stats);
             continue;
         }
 #endif
@@ -1977,13 +2036,24 @@ static void ssao_sat__estimate_rows(int begin, int end, int worker, void *contex
 }
 
 /* ------------------------------------------------------------------------------------------------
-   Output: copied, or upsampled with weights that fall with the distance of a neighbour from the pixel's tangent plane
-   and with the angle between the normals. Sky has no weight; a pixel without neighbours on its plane takes what is
-   near. ------------------------------------------------------------------------------------------------ */
+   >> output: copied, or upsampled with weights that fall with the distance of a neighbour from the pixel's tangent
+   plane and with the angle between the normals. Sky has no weight; a pixel without neighbours on its plane takes what
+   is near.
+   ------------------------------------------------------------------------------------------------ */
 
-static inline float *ssao_sat__out_row(float *out, ptrdiff_t stride, int y)
+static inline float *ssao_sat__out_row(void *out, ptrdiff_t stride, int y)
 {
     return (float *)(void *)((unsigned char *)out + (ptrdiff_t)y * stride);
+}
+
+/* A row of accessibility as the caller wants it. */
+static void ssao_sat__pack_row(const ssao_sat *s, int y, const float *row)
+{
+    void *out = ssao_sat__out_row(s->out, s->out_stride, y);
+    int x;
+    if (s->element == 4) memcpy(out, row, (size_t)s->width * sizeof *row);
+    for (x = 0; x < s->width && s->element == 2; x++) ((uint16_t *)out)[x] = sat__half_from_float(row[x]);
+    for (x = 0; x < s->width && s->element == 1; x++) ((uint8_t *)out)[x] = (uint8_t)(row[x] * 255 + 0.5f);
 }
 
 #ifndef SSAO_SAT_NO_BENT
@@ -2004,7 +2074,7 @@ static inline void ssao_sat__write_bent(const ssao_sat *s, float *out, float z, 
 static void ssao_sat__copy_row(const ssao_sat *s, int y)
 {
     size_t at = ssao_sat__at(s, y);
-    memcpy(ssao_sat__out_row(s->out, s->out_stride, y), s->open + at, (size_t)s->width * sizeof(float));
+    ssao_sat__pack_row(s, y, s->open + at);
 #ifndef SSAO_SAT_NO_BENT
     if (s->bent_wanted) {
         float *bent = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
@@ -2108,10 +2178,10 @@ static void ssao_sat__upsample_row(const ssao_sat *s, const ssao_sat__picture_ro
     }
 }
 
-static void ssao_sat__write_row(const ssao_sat *s, const ssao_sat__picture_row *r, int x0, int y)
+static void ssao_sat__write_row(const ssao_sat *s, float *out, const ssao_sat__picture_row *r, int x0, int y)
 {
-    float *out = ssao_sat__out_row(s->out, s->out_stride, y);
     int x, i;
+    (void)y;
     for (x = x0, i = 0; x < s->width; x += 2, i++) out[x] = r->z[i] > 0 ? r->open[i] : s->is_signed ? 0.0f : 1.0f;
 #ifndef SSAO_SAT_NO_BENT
     if (s->bent_wanted) {
@@ -2128,6 +2198,7 @@ static void ssao_sat__write_rows(int begin, int end, int worker, void *context)
     ssao_sat *s = (ssao_sat *)context;
     float *scratch = s->scratch + (size_t)worker * 8 * s->stride;
     ssao_sat__picture_row r;
+    float *out;
     int y, x0, c;
     r.z = scratch;
     r.nx = scratch + s->stride;
@@ -2140,15 +2211,17 @@ static void ssao_sat__write_rows(int begin, int end, int worker, void *context)
             ssao_sat__copy_row(s, y);
             continue;
         }
+        out = s->element == 4 ? ssao_sat__out_row(s->out, s->out_stride, y) : r.blocked[0]; /* not bent then */
         for (x0 = 0; x0 < 2 && x0 < s->width; x0++) {
             ssao_sat__upsample_row(s, &r, x0, y);
-            ssao_sat__write_row(s, &r, x0, y);
+            ssao_sat__write_row(s, out, &r, x0, y);
         }
+        if (s->element != 4) ssao_sat__pack_row(s, y, out);
     }
 }
 
 /* ------------------------------------------------------------------------------------------------
-   A frame: band by band rows are read, tables built, pixels estimated, rows written
+   >> frame: band by band rows are read, tables built, pixels estimated, rows written
    ------------------------------------------------------------------------------------------------ */
 
 static void ssao_sat__run_band(ssao_sat *s, int begin, int end)
@@ -2180,8 +2253,9 @@ static void ssao_sat__fill(ssao_sat *s)
 {
     int y, x;
     for (y = 0; y < s->height; y++) {
-        float *o = ssao_sat__out_row(s->out, s->out_stride, y);
+        float *o = s->element == 4 ? ssao_sat__out_row(s->out, s->out_stride, y) : s->scratch;
         for (x = 0; x < s->width; x++) o[x] = s->is_signed ? 0.0f : 1.0f;
+        if (s->element != 4) ssao_sat__pack_row(s, y, o);
 #ifndef SSAO_SAT_NO_BENT
         if (s->bent_wanted) {
             float *b = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
@@ -2310,7 +2384,7 @@ static void ssao_sat__run(ssao_sat *s, ssao_sat_stats *stats)
 }
 
 /* ------------------------------------------------------------------------------------------------
-   Calls
+   >> entry points
    ------------------------------------------------------------------------------------------------ */
 
 /* Do two sets of rows share a byte? Interleaved rows of one buffer count as sharing. */
@@ -2338,11 +2412,13 @@ static sat_result ssao_sat__check_input(ssao_sat *s, const ssao_sat_input *input
     return ssao_sat__read_camera(&s->camera, in, s->step, s->options.bottom_up) ? SAT_OK : SAT_ERR_ARGUMENT;
 }
 
-static int ssao_sat__output_is_valid(const ssao_sat *s, const float *out, ptrdiff_t *stride, size_t bytes)
+static int ssao_sat__output_is_valid(const ssao_sat *s, const void *out, ptrdiff_t *stride, size_t pixel,
+                                     size_t element)
 {
     const ssao_sat_input *in = &s->input;
     const void *depth = in->depth ? (const void *)in->depth : (const void *)in->half_depth;
-    if (!sat__rows_are_valid(out, stride, s->width, s->height, bytes / (size_t)s->width, 4)) return 0;
+    size_t bytes = (size_t)s->width * pixel;
+    if (!sat__rows_are_valid(out, stride, s->width, s->height, pixel, element)) return 0;
     return !ssao_sat__overlap(out, *stride, bytes, depth, in->depth_stride, (size_t)s->width * (in->depth ? 4 : 2),
                               s->height) &&
            !ssao_sat__overlap(out, *stride, bytes, in->normals, in->normal_stride, (size_t)s->width * 12, s->height);
@@ -2355,21 +2431,24 @@ static ssao_sat__fit ssao_sat__fit_of(const ssao_sat_options *o)
     return fit;
 }
 
-static sat_result ssao_sat__apply(ssao_sat *s, float *out, ptrdiff_t stride, float *bent, ptrdiff_t bent_stride,
-                                  const ssao_sat_input *input, ssao_sat_stats *stats, int is_signed)
+/* `element`: bytes of an output, 4 for float, 2 for half, 1 for 8 bits. */
+static sat_result ssao_sat__apply(ssao_sat *s, void *out, ptrdiff_t stride, size_t element, float *bent,
+                                  ptrdiff_t bent_stride, const ssao_sat_input *input, ssao_sat_stats *stats,
+                                  int is_signed)
 {
     sat_result result;
     if (!s || !out || !input) return SAT_ERR_ARGUMENT;
     result = ssao_sat__check_input(s, input);
     if (result != SAT_OK) return result;
-    if (!ssao_sat__output_is_valid(s, out, &stride, (size_t)s->width * 4)) return SAT_ERR_ARGUMENT;
+    if (!ssao_sat__output_is_valid(s, out, &stride, element, element)) return SAT_ERR_ARGUMENT;
     if (bent) {
-        if (!ssao_sat__output_is_valid(s, bent, &bent_stride, (size_t)s->width * 12)) return SAT_ERR_ARGUMENT;
+        if (!ssao_sat__output_is_valid(s, bent, &bent_stride, 12, 4)) return SAT_ERR_ARGUMENT;
         if (ssao_sat__overlap(out, stride, (size_t)s->width * 4, bent, bent_stride, (size_t)s->width * 12, s->height))
             return SAT_ERR_ARGUMENT;
     }
     s->out = out;
     s->out_stride = stride;
+    s->element = (int)element;
     s->bent_out = bent;
     s->bent_stride = bent_stride;
     s->bent_wanted = bent != NULL;
@@ -2385,13 +2464,25 @@ static sat_result ssao_sat__apply(ssao_sat *s, float *out, ptrdiff_t stride, flo
 SSAO_SAT_DEF sat_result ssao_sat_apply(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride,
                                        const ssao_sat_input *input, ssao_sat_stats *stats)
 {
-    return ssao_sat__apply(ao, accessibility, out_stride, NULL, 0, input, stats, 0);
+    return ssao_sat__apply(ao, accessibility, out_stride, 4, NULL, 0, input, stats, 0);
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_apply_u8(ssao_sat *ao, uint8_t *accessibility, ptrdiff_t out_stride,
+                                          const ssao_sat_input *input, ssao_sat_stats *stats)
+{
+    return ssao_sat__apply(ao, accessibility, out_stride, 1, NULL, 0, input, stats, 0);
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_apply_half(ssao_sat *ao, uint16_t *accessibility, ptrdiff_t out_stride,
+                                            const ssao_sat_input *input, ssao_sat_stats *stats)
+{
+    return ssao_sat__apply(ao, accessibility, out_stride, 2, NULL, 0, input, stats, 0);
 }
 
 SSAO_SAT_DEF sat_result ssao_sat_apply_signed(ssao_sat *ao, float *out, ptrdiff_t out_stride,
                                               const ssao_sat_input *input, ssao_sat_stats *stats)
 {
-    return ssao_sat__apply(ao, out, out_stride, NULL, 0, input, stats, 1);
+    return ssao_sat__apply(ao, out, out_stride, 4, NULL, 0, input, stats, 1);
 }
 
 #ifndef SSAO_SAT_NO_BENT
@@ -2400,7 +2491,7 @@ SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, 
                                             ssao_sat_stats *stats)
 {
     if (!ao || !bent_normals || ao->options.method != SSAO_SAT_SLABS) return SAT_ERR_ARGUMENT;
-    return ssao_sat__apply(ao, accessibility, out_stride, bent_normals, bent_stride, input, stats, 0);
+    return ssao_sat__apply(ao, accessibility, out_stride, 4, bent_normals, bent_stride, input, stats, 0);
 }
 #endif
 
@@ -2608,7 +2699,7 @@ SAT__IEEE_END
 #endif /* SSAO_SAT_IMPLEMENTATION */
 
 /* ------------------------------------------------------------------------------------------------
-   OpenGL: depth range, slab edges, table by recursive doubling (Slomp 2012, 4.4), estimate, upsample
+   >> shaders: depth range, slab edges, table by recursive doubling (Slomp 2012, 4.4), estimate, upsample
 
    The tables of all slabs are tiles of one integer texture, so that one pass scans them all. Sums are those of the C
    code modulo 2^32, whatever the order; distances and edges are computed in the GPU's floats and may differ in the last
@@ -3018,6 +3109,10 @@ static const char ssao_sat__gl_upsample[] =
     "    if (total > 0.0) result.r = sum / total;\n"
     "#endif\n"
     "}\n";
+
+/* ------------------------------------------------------------------------------------------------
+   >> passes: programs, textures, frames
+   ------------------------------------------------------------------------------------------------ */
 
 enum {
     SSAO_SAT__GL_RANGE,

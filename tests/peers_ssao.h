@@ -455,6 +455,7 @@ static inline double peer_apply(peer_picture *g, ssao_sat *s, const peer_method 
     if (ssao_sat__check_input(s, &in) != SAT_OK) exit(1);
     s->out = out;
     s->out_stride = (ptrdiff_t)p->width * 4;
+    s->element = 4;
     s->bent_wanted = s->is_signed = s->first = s->begin = 0;
     s->end = s->held = s->rows;
     memset(s->workers, 0, sizeof *s->workers);

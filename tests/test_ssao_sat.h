@@ -1541,6 +1541,38 @@ TEST(resized_is_made_anew)
     EXPECT(support_memory_clean(&memory));
 }
 
+/* The outputs that are no floats are those of apply, rounded, whatever the way to them. */
+TEST(packed_outputs)
+{
+    static float base[SIDE * SIDE];
+    static uint8_t bytes[SIDE * SIDE + 8];
+    static uint16_t halves[SIDE * SIDE];
+    const ref_picture *p = picture(2, 0);
+    int k, i;
+    for (k = 0; k < 4; k++) {
+        ssao_sat_options o = options_of(k == 3 ? SSAO_SAT_PLANE : SSAO_SAT_SLABS, k == 2 ? 0 : 0.25);
+        ssao_sat_input in = linear_input(p);
+        ssao_sat *ao;
+        int wrong = 0;
+        o.half_resolution = k != 1;
+        if (!EXPECT_EQ(ssao_sat_create(&ao, SIDE, SIDE, &o), SAT_OK)) return;
+        EXPECT_EQ(ssao_sat_apply(ao, base, 0, &in, NULL), SAT_OK);
+        EXPECT_EQ(ssao_sat_apply_u8(ao, bytes + 3, 0, &in, NULL), SAT_OK); /* any address will do */
+        EXPECT_EQ(ssao_sat_apply_half(ao, halves, 0, &in, NULL), SAT_OK);
+        for (i = 0; i < SIDE * SIDE; i++)
+            wrong += fabsf((float)bytes[3 + i] - 255 * base[i]) > 0.501f ||
+                     fabsf(sat__half_to_float(halves[i]) - base[i]) > 0.0005f;
+        EXPECT_EQ(wrong, 0);
+        EXPECT_EQ(ssao_sat_apply_half(ao, (uint16_t *)(void *)(bytes + 3 + ((uintptr_t)(bytes + 3) % 2 == 0)), 0, &in,
+                                      NULL),
+                  SAT_ERR_ARGUMENT);
+        EXPECT_EQ(ssao_sat_apply_u8(ao, NULL, 0, &in, NULL), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(ssao_sat_apply_u8(NULL, bytes, 0, &in, NULL), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(ssao_sat_apply_u8(ao, bytes, SIDE - 1, &in, NULL), SAT_ERR_ARGUMENT);
+        ssao_sat_destroy(ao);
+    }
+}
+
 TEST(shading_helpers)
 {
     float v, last = 0;

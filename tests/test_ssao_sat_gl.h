@@ -291,6 +291,112 @@ TEST(gpu_corners_of_the_options)
     ref_free(&p);
 }
 
+/* What needs other shaders, by name: what ssao_sat_gl_set_options refuses to change. */
+static int is_compiled(const char *name)
+{
+    static const char *const names[] = {"method",        "half_resolution", "slabs",      "scales",
+                                        "plane_boxes",   "refine_levels",   "as_printed", "inverted_depth"};
+    size_t i;
+    for (i = 0; i < sizeof names / sizeof names[0]; i++)
+        if (strcmp(names[i], name) == 0) return 1;
+    return 0;
+}
+
+enum { CORNER = 16 };
+
+/* Both on a picture of 16 x 16; -1 when both refuse the options, else the largest difference. */
+static double corner_difference(ssao_sat_gl *gl, const ssao_sat_options *o, const ssao_sat_input *in, unsigned depth)
+{
+    static float a[CORNER * CORNER], b[CORNER * CORNER];
+    double worst = 0;
+    int i;
+    sat_result c = run_c(b, in, o), g = ssao_sat_gl_set_options(gl, o);
+    if (c != SAT_OK || g != SAT_OK) return c == g ? -1 : 9;
+    if (ssao_sat_gl_apply(gl, 0, depth, 0, in) != SAT_OK) return 9;
+    download(a, ssao_sat_gl_texture(gl), CORNER, CORNER);
+    for (i = 0; i < CORNER * CORNER; i++) worst = support_larger(worst, fabs((double)a[i] - (double)b[i]));
+    return worst;
+}
+
+/* One object; lowest and highest values of what it can change, or all pairs of them. */
+static void corners_of_object(ssao_sat_options base, const ssao_sat_input *in, unsigned depth, int pairs)
+{
+    ssao_sat_gl *gl = NULL;
+    int i, j, k;
+    EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, CORNER, CORNER, &base), SAT_OK);
+    for (i = 0; i < SSAO_SAT__FIELDS && gl; i++)
+        for (j = pairs ? 0 : i; j <= i; j++)
+            for (k = 0; k < 4; k++) {
+                const sat__field *f = &ssao_sat__fields[i], *g = &ssao_sat__fields[j];
+                ssao_sat_options o = base;
+                double d;
+                if (f->type == 'a' || f->type == 't' || g->type == 'a' || g->type == 't') continue;
+                if (is_compiled(f->name) || is_compiled(g->name)) continue;
+                if (strcmp(f->name, "float_table") == 0 || strcmp(g->name, "float_table") == 0) continue;
+                if (strcmp(f->name, "bottom_up") == 0 || strcmp(g->name, "bottom_up") == 0) continue;
+                if ((i == j) != ((k & 1) == k >> 1)) continue; /* a pair: one low, one high */
+                sat__field_set(f, &o, k & 1 ? f->high : f->low);
+                sat__field_set(g, &o, k & 2 ? g->high : g->low);
+                d = corner_difference(gl, &o, in, depth);
+                if (!EXPECT(d < 0.02)) printf("    method %d: %s and %s, %d: %g\n", (int)o.method, f->name, g->name, k, d);
+            }
+    ssao_sat_gl_destroy(gl);
+}
+
+/* Pairs of corners of what is free in the frame; and its corners with those of what shaders are made for. (Shaders
+   take long to compile: not all pairs of these.) */
+TEST(gpu_pairs_of_the_options)
+{
+    static float z[CORNER * CORNER];
+    ssao_sat_input in = ssao_sat_input_linear(z, CORNER, CORNER, 1);
+    unsigned depth;
+    int i, k, m;
+    if (!open_gl()) SKIP(test_gl.message);
+    for (i = 0; i < CORNER * CORNER; i++) z[i] = i == 40 ? 0 : 2 + 0.5f * (float)((i % CORNER > 7) + (i / CORNER > 9));
+    depth = upload(SAT__GL_R32F, CORNER, CORNER, z);
+    corners_of_object(ssao_sat_defaults(), &in, depth, 1);
+    for (m = 0; m < 2; m++)
+        for (k = 0; k < 4; k++) {
+            ssao_sat_options o = ssao_sat_defaults();
+            o.method = (ssao_sat_method)(m ? (int)SSAO_SAT__LAST_METHOD : (int)SSAO_SAT__FIRST_METHOD);
+            for (i = 0; i < SSAO_SAT__FIELDS; i++) {
+                const sat__field *f = &ssao_sat__fields[i];
+                if (!is_compiled(f->name) || strcmp(f->name, "method") == 0) continue;
+                if (strcmp(f->name, "half_resolution") == 0) sat__field_set(f, &o, k & 1);
+                else sat__field_set(f, &o, k & 2 ? f->high : f->low);
+            }
+            corners_of_object(o, &in, depth, 0);
+        }
+    test_f.DeleteTextures(1, &depth);
+}
+
+static int programs_made;
+static unsigned SAT__GL_CALL count_program(void) { programs_made++; return 0; }
+
+TEST(nothing_is_compiled_in_a_frame)
+{
+    static float z[GL_WIDTH * GL_HEIGHT];
+    ssao_sat_options o = ssao_sat_defaults();
+    ssao_sat_input in;
+    ssao_sat_gl *gl = NULL;
+    ref_picture p;
+    unsigned depth, normals;
+    int k;
+    if (!open_gl()) SKIP(test_gl.message);
+    p = small_picture(0, 0);
+    in = ref_input(&p, REF_LINEAR, z);
+    depth = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, p.z);
+    normals = upload(SAT__GL_RGB32F, GL_WIDTH, GL_HEIGHT, p.normals);
+    if (!EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, &o), SAT_OK)) return;
+    gl->gl.CreateProgram = count_program;
+    for (k = 0; k < 4; k++) EXPECT_EQ(ssao_sat_gl_apply(gl, 0, depth, k % 2 ? normals : 0, &in), SAT_OK);
+    EXPECT_EQ(programs_made, 0);
+    ssao_sat_gl_destroy(gl);
+    test_f.DeleteTextures(1, &depth);
+    test_f.DeleteTextures(1, &normals);
+    ref_free(&p);
+}
+
 TEST(gpu_options_change_in_the_frame)
 {
     static float z[GL_WIDTH * GL_HEIGHT], a[GL_WIDTH * GL_HEIGHT], b[GL_WIDTH * GL_HEIGHT];

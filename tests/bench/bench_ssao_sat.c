@@ -12,18 +12,18 @@
 
 /* Peers at the vector width of the slabs, as fitted by FIT=1: radius, second parameter, gain, power. */
 static const peer_method peers[] = {
-    {"XeGTAO low 1x(2+2), half", PEER_GTAO, 1, 2, 1, 1, 1.7f, 0.4f, 0.407f, 4},
-    {"XeGTAO medium 2x(2+2), half", PEER_GTAO, 2, 2, 1, 1, 1.7f, 0.4f, 0.407f, 4},
+    {"XeGTAO low 1x(2+2), half", PEER_GTAO, 1, 2, 1, 1, 1.7f, 0.4f, 0.818f, 2},
+    {"XeGTAO medium 2x(2+2), half", PEER_GTAO, 2, 2, 1, 1, 1.7f, 0.4f, 0.268f, 8},
     {"XeGTAO high 3x(3+3), half", PEER_GTAO, 3, 3, 1, 1, 1.7f, 0.4f, 0.407f, 4},
     {"XeGTAO ultra 9x(3+3), half", PEER_GTAO, 9, 3, 1, 1, 1.7f, 0.4f, 0.407f, 4},
     {"XeGTAO high, 3 denoiser passes, half", PEER_GTAO, 3, 3, 3, 1, 1.7f, 0.4f, 0.268f, 6},
     {"XeGTAO high 3x(3+3), full", PEER_GTAO, 3, 3, 3, 0, 1.7f, 0.4f, 0.407f, 4},
     {"XeGTAO ultra 9x(3+3), full", PEER_GTAO, 9, 3, 1, 0, 1.7f, 0.4f, 0.407f, 4},
-    {"bitmask 3x(3+3), half", PEER_BITMASK, 3, 3, 1, 1, 1.4f, 0.7f, 0.941f, 2},
-    {"bitmask 4x(8+8), half", PEER_BITMASK, 4, 8, 1, 1, 1.4f, 0.7f, 1.245f, 1},
+    {"bitmask 3x(3+3), half", PEER_BITMASK, 3, 3, 1, 1, 1.4f, 0.7f, 0.538f, 4},
+    {"bitmask 4x(8+8), half", PEER_BITMASK, 4, 8, 1, 1, 1.4f, 0.7f, 0.712f, 2},
     {"bitmask 4x(8+8), full", PEER_BITMASK, 4, 8, 1, 0, 1.4f, 0.7f, 0.712f, 2},
-    {"HBAO 16x8, half", PEER_HBAO, 16, 8, 1, 1, 1.4f, 0.05f, 1.431f, 1},
-    {"HBAO 16x8, full", PEER_HBAO, 16, 8, 1, 0, 1.4f, 0.05f, 1.431f, 1}};
+    {"HBAO 16x8, half", PEER_HBAO, 16, 8, 1, 1, 1.4f, 0.1f, 1.646f, 1},
+    {"HBAO 16x8, full", PEER_HBAO, 16, 8, 1, 0, 1.4f, 0.1f, 1.646f, 1}};
 
 enum {
     FITTED = 3,
