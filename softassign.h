@@ -686,6 +686,10 @@ struct softassign {
     int *list_slot;        /* rows x list, by value when listed */
     float *list_cost, *list_value;
     int *list_length;
+    int *row_result;       /* checks: a row's sat_result; the memory of list_length, which comes later */
+    float *pheromone;      /* ants: of the columns in the lists; the memory of list_value, which they do not read */
+    int *order;            /* ants: rows; the memory of `closed` of the paths */
+    int *holders;          /* rows that hold a slot in an assignment beside the solver's; the memory of `touched` */
     double *list_limit;    /* every slot outside the list has cost - price at or above this, as long as prices fall */
     unsigned char *raised; /* per slot: its price rose since the lists were made */
     unsigned char *stale;  /* per row: its list is to be made (anew) */
@@ -1804,7 +1808,7 @@ static void softassign__dense_swap(softassign *s, int row, int slot)
    that cost takes it; a row that got just one pays down to its second best (Jonker and Volgenant 1987). */
 static void softassign__reduce_columns(softassign *s)
 {
-    int n = s->columns, i, j, *from = s->parent, *times = s->touched;
+    int n = s->columns, i, j, *from = s->parent, *times = s->holders;
     float *least = s->parent_cost;
     for (j = 0; j < n; j++) {
         least[j] = SOFTASSIGN__INFINITY;
@@ -2411,12 +2415,12 @@ static void softassign__leave_dense(softassign *s)
 static int softassign__first_choices(softassign *s, int *count)
 {
     int i, j, different = 0, left = 0;
-    for (j = 0; j < s->columns; j++) s->touched[j] = 0;
+    for (j = 0; j < s->columns; j++) s->holders[j] = 0;
     for (i = 0; i < s->rows; i++) {
         double m1, m2;
         if (s->slot_of_row[i] >= 0) continue;
         j = softassign__two_smallest(softassign__matrix_row(s, i), s->price, s->columns, &m1, &m2);
-        different += m2 <= m1 || j < 0 || !s->touched[j]++;
+        different += m2 <= m1 || j < 0 || !s->holders[j]++;
         if (j < 0 || s->first_row[j] >= 0) s->kept[left++] = i;
         else {
             softassign__dense_swap(s, i, j);
@@ -2550,7 +2554,7 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
                                                      sizeof(float)); /* the repair needs no lists */
     s->exact_distance = (softassign__fixed *)sat__carve(a, list > shared ? list : shared, sizeof(float));
     s->list_cost = (float *)(void *)s->exact_price;
-    s->list_value = (float *)(void *)s->exact_distance;
+    s->pheromone = s->list_value = (float *)(void *)s->exact_distance;
     s->parent_cost = (float *)sat__carve(a, seats, sizeof(float));
     s->column_sum = (float *)sat__carve(a, seats, sizeof(float));
     s->soft_row = (float *)sat__carve(a, padded, sizeof(float));
@@ -2561,16 +2565,16 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->slot_of_row = (int *)sat__carve(a, rows, sizeof(int));
     s->next_row = (int *)sat__carve(a, rows, sizeof(int));
     s->list_slot = (int *)sat__carve(a, list, sizeof(int));
-    s->list_length = (int *)sat__carve(a, rows, sizeof(int));
+    s->row_result = s->list_length = (int *)sat__carve(a, rows, sizeof(int));
     s->parent = (int *)sat__carve(a, seats, sizeof(int));
     s->stamp = (int *)sat__carve(a, seats, sizeof(int));
     s->row_stamp = (int *)sat__carve(a, rows, sizeof(int));
-    s->touched = (int *)sat__carve(a, seats, sizeof(int));
+    s->holders = s->touched = (int *)sat__carve(a, seats, sizeof(int));
     s->kept = (int *)sat__carve(a, rows, sizeof(int));
     s->leader = (int *)sat__carve(a, rows, sizeof(int));
     s->shown = (int *)sat__carve(a, rows, sizeof(int));
     s->shown_column = (int *)sat__carve(a, rows, sizeof(int));
-    s->closed = (int *)sat__carve(a, seats + rows, sizeof(int));
+    s->order = s->closed = (int *)sat__carve(a, seats + rows, sizeof(int));
     s->heap = (int *)sat__carve(a, seats + rows, sizeof(int));
     s->heap_at = (int *)sat__carve(a, seats + rows, sizeof(int));
     s->raised = (unsigned char *)sat__carve(a, seats, 1);
@@ -2631,7 +2635,7 @@ static void softassign__greedy_take(softassign *s, int row, int slot, float cost
    Returns the number of rows that found none. */
 static int softassign__greedy(softassign *s)
 {
-    int *wanted = s->touched, *best = s->heap, i, j, lost = 0;
+    int *wanted = s->holders, *best = s->heap, i, j, lost = 0;
     for (j = 0; j < s->slot_count; j++) wanted[j] = 0;
     for (i = 0; i < s->rows; i++) {
         best[i] = s->list_length[i] ? s->list_slot[(size_t)i * (size_t)s->list] : -1;
@@ -2814,7 +2818,7 @@ static void softassign__anneal(softassign *s, int *best)
    >> ants
    Ants (Slomp 2012, appendix 3.A): every ant builds an assignment row by row, drawn by pheromone times similarity; all
    trails evaporate, good ones are renewed; what is shown has a share of random tiles that falls to none.
-   Pheromone lies on the lists (in list_value); a row whose list is used up takes the best of some random free slots.
+   Pheromone lies on the lists; a row whose list is used up takes the best of some random free slots.
    ------------------------------------------------------------------------------------------------ */
 
 static int softassign__ant_choice(softassign *s, int row, uint64_t *seed, float *cost)
@@ -2830,7 +2834,7 @@ static int softassign__ant_choice(softassign *s, int row, uint64_t *seed, float 
         if (!softassign__is_free(s, s->list_slot[at + (size_t)q])) continue;
         ratio *= ratio;
         ratio *= ratio; /* similarity to the fourth */
-        weight[q] = s->list_value[at + (size_t)q] * ratio * ratio;
+        weight[q] = s->pheromone[at + (size_t)q] * ratio * ratio;
         sum += weight[q];
         last = q;
     }
@@ -2878,7 +2882,7 @@ static void softassign__deposit(softassign *s, const int *seats, float amount)
     for (i = 0; i < s->rows; i++)
         for (q = 0; q < s->list_length[i]; q++) {
             size_t at = (size_t)i * (size_t)s->list + (size_t)q;
-            if (s->list_slot[at] == seats[i]) s->list_value[at] += amount;
+            if (s->list_slot[at] == seats[i]) s->pheromone[at] += amount;
         }
 }
 
@@ -2886,14 +2890,14 @@ static void softassign__deposit(softassign *s, const int *seats, float amount)
 static void softassign__add_noise(softassign *s, int *shown, int count, uint64_t *seed)
 {
     int n, j, i;
-    for (j = 0; j < s->slot_count; j++) s->touched[j] = 0;
-    for (i = 0; i < s->rows; i++) s->touched[shown[i]]++;
+    for (j = 0; j < s->slot_count; j++) s->holders[j] = 0;
+    for (i = 0; i < s->rows; i++) s->holders[shown[i]]++;
     for (n = 0; n < count; n++) {
         i = (int)(softassign__uniform(seed) * s->rows);
         j = (int)(softassign__uniform(seed) * s->slot_count);
-        if (s->touched[j] >= s->capacity[j] || !(softassign__cost(s, i, j) < SOFTASSIGN__INFINITY)) continue;
-        s->touched[shown[i]]--;
-        s->touched[j]++;
+        if (s->holders[j] >= s->capacity[j] || !(softassign__cost(s, i, j) < SOFTASSIGN__INFINITY)) continue;
+        s->holders[shown[i]]--;
+        s->holders[j]++;
         shown[i] = j;
     }
 }
@@ -2903,9 +2907,9 @@ static void softassign__run_ants(softassign *s, int *best, int *leader, int *sho
     const softassign_options *o = &s->options;
     uint64_t seed = o->seed;
     double lowest = (double)SOFTASSIGN__INFINITY;
-    int step, ant, i, *order = s->closed;
+    int step, ant, i, *order = s->order;
     size_t at, cells = (size_t)s->rows * (size_t)s->list;
-    for (at = 0; at < cells; at++) s->list_value[at] = 1;
+    for (at = 0; at < cells; at++) s->pheromone[at] = 1;
     for (i = 0; i < s->rows; i++) order[i] = i;
     for (step = 0; step < o->iterations[0]; step++) {
         double nearest = (double)SOFTASSIGN__INFINITY;
@@ -2920,8 +2924,8 @@ static void softassign__run_ants(softassign *s, int *best, int *leader, int *sho
             for (i = 0; i < s->rows; i++) best[i] = leader[i];
         }
         for (at = 0; at < cells; at++) {
-            s->list_value[at] *= (float)(1 - o->evaporation);
-            if (s->list_value[at] < 1e-3f) s->list_value[at] = 1e-3f;
+            s->pheromone[at] *= (float)(1 - o->evaporation);
+            if (s->pheromone[at] < 1e-3f) s->pheromone[at] = 1e-3f;
         }
         softassign__deposit(s, leader, (float)o->evaporation * 4);
         softassign__deposit(s, best, (float)o->evaporation * 8);
@@ -3352,7 +3356,7 @@ static int softassign__progress(softassign *s, const int *seats)
    free one. 0 when a row finds none. */
 static int softassign__fill(softassign *s, int *seats)
 {
-    int *used = s->touched, i, j, q, next = 0;
+    int *used = s->holders, i, j, q, next = 0;
     for (j = 0; j < s->slot_count; j++) used[j] = s->used[j];
     for (i = 0; i < s->rows; i++) seats[i] = s->slot_of_row[i];
     for (i = 0; i < s->rows; i++) {
@@ -3414,7 +3418,7 @@ static void softassign__check_range(int begin, int end, int worker, void *contex
     for (i = begin; i < end; i++) {
         float *copy = s->dense && !s->in_place ? s->matrix + (size_t)i * (size_t)s->columns : NULL;
         uint32_t largest = 0;
-        int *wrong = &s->list_length[i], stay = p->previous ? p->previous[i] : -1;
+        int *wrong = &s->row_result[i], stay = p->previous ? p->previous[i] : -1;
         *wrong = SAT_OK;
         if (p->cost) {
             const float *cost = softassign__cost_row(p, i);
@@ -3461,9 +3465,9 @@ static sat_result softassign__check_costs(softassign *s)
     sat__parallel_for(&s->options.threads, s->rows, softassign__check_range, s);
     if (!p->cost) s->stats.distances_computed += (size_t)s->rows * (size_t)s->columns;
     for (i = 0; i < s->rows; i++)
-        if (s->list_length[i] != SAT_OK) {
+        if (s->row_result[i] != SAT_OK) {
             s->stats.row_error = i;
-            return (sat_result)s->list_length[i];
+            return (sat_result)s->row_result[i];
         }
     return SAT_OK;
 }

@@ -366,6 +366,58 @@ TEST(softassign_gl_refuses_the_options_that_the_cpu_refuses)
     close_gl();
 }
 
+/* NULL means softassign_defaults(), and the corners of the options that are read, in pairs, give the CPU's matrix. But
+   for a temperature of 0, whose exponents are 0 times infinity. */
+TEST(softassign_gl_corners_of_options_in_pairs)
+{
+    enum { ROWS = 5, COLUMNS = 7, CELLS = ROWS * COLUMNS };
+    static const char *const names[] = {"temperature",   "cooling",       "iterations[0]",   "iterations[1]",
+                                        "iterations[2]", "alpha",         "outlier",         "outlier_evolves"};
+    const sat__field *fields[8];
+    float *cost = make_costs(ROWS, COLUMNS, 5), cpu[CELLS], gpu[CELLS];
+    softassign_problem p = problem_of(cost, ROWS, COLUMNS);
+    softassign_gl *gl;
+    int a, b, i, k, found = 0, x[ROWS], compared = 0, wrong = 0;
+    if (!open_gl()) return;
+    for (a = 0; a < 8; a++)
+        for (i = 0; i < SAT__COUNT(softassign__fields); i++)
+            if (strcmp(softassign__fields[i].name, names[a]) == 0) fields[a] = &softassign__fields[i], found++;
+    EXPECT_EQ(found, 8);
+    EXPECT_EQ(softassign_gl_create(&gl, test_context.get_proc, NULL), SAT_OK);
+    EXPECT_EQ(softassign_gl_set_costs(gl, &p), SAT_OK);
+    for (a = 0; a < 8; a++)
+        for (b = a; b < 8; b++)
+            for (k = 0; k < 9; k++) {
+                const sat__field *f = fields[a], *g = fields[b];
+                const double first[3] = {f->initial, a ? f->low : 1e-3, f->high < 2e9 || f->type == 'd' ? f->high : 3};
+                const double second[3] = {g->initial, b ? g->low : 1e-3, g->high < 2e9 || g->type == 'd' ? g->high : 3};
+                softassign_options o = softassign_defaults();
+                softassign_stats r;
+                double soft_cost;
+                for (i = 0; a + b + k && i < 3; i++) o.iterations[i] = 2;
+                if (k / 3) sat__field_set(f, &o, first[k / 3]);
+                if (k % 3) sat__field_set(g, &o, second[k % 3]);
+                if (a + b + k) gl->options = o; /* all but gather, which is compiled in; the first are those of NULL */
+                o.method = SOFTASSIGN_PUBLISHED;
+                o.certify = 0;
+                o.soft = cpu;
+                memset(cpu, 0, sizeof cpu);
+                memset(gpu, 0, sizeof gpu);
+                EXPECT_EQ(softassign_solve(x, &p, &o, &r), SAT_OK);
+                EXPECT_EQ(softassign_gl_published(gl, gpu, 0, &soft_cost), SAT_OK);
+                for (i = 0; i < CELLS; i++) {
+                    compared++;
+                    if (cpu[i] > 1e30f && gpu[i] > 1e30f) continue;
+                    wrong += !(fabsf(cpu[i] - gpu[i]) <= 1e-3f + 1e-3f * fabsf(cpu[i]));
+                }
+            }
+    EXPECT_EQ(wrong, 0);
+    EXPECT(compared == 36 * 9 * CELLS);
+    softassign_gl_destroy(gl);
+    free(cost);
+    close_gl();
+}
+
 /* Distances of many features round more in a pass: the bound is still below the optimum. */
 TEST(softassign_gl_bound_holds_for_many_features)
 {
