@@ -736,7 +736,7 @@ TEST(raindrop_bows_stand_where_they_should)
         }
         EXPECT_NEAR(raindrop_bow_angle(k, 1.333), least, 1e-7);
     }
-    EXPECT_EQ(raindrop_bow_profile(profile, 7200), SAT_OK);
+    EXPECT_EQ(raindrop_bow_profile(profile, 7200, 0), SAT_OK);
     for (i = 0; i < 7200; i++) {
         double from_antisolar = 180 - (i + 0.5) / 7200 * 180, l = 0.7152 * (double)profile[3 * i + 1] +
                                                                   0.2126 * (double)profile[3 * i] +
@@ -776,8 +776,46 @@ TEST(raindrop_bows_stand_where_they_should)
         EXPECT_REL(energy, mean, 0.01);
     }
     REPORT("share of the light in both bows", energy, "");
-    EXPECT_EQ(raindrop_bow_profile(NULL, 100), SAT_ERR_ARGUMENT);
-    EXPECT_EQ(raindrop_bow_profile(profile, 3), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_bow_profile(NULL, 100, 0), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_bow_profile(profile, 3, 0), SAT_ERR_ARGUMENT);
+}
+
+/* Airy's integral against its tabulated values, and the arcs against the maxima of its square, at 1.0188 and 3.2482. */
+TEST(raindrop_bows_have_supernumerary_arcs)
+{
+    static const double values[5][2] = {{0, 0.3550280538878}, {1, 0.5355608832924}, {-2, 0.0349241304233},
+                                        {2.338107410460, 0}, {10, 0.0402412384864}};
+    static const double diameters[3] = {0.2, 0.5, 2};
+    static float airy[RAINDROP__AIRY_COUNT], profile[3 * 7200], geometry[3 * 7200];
+    double n = raindrop_water_index(550), h = 9.0 / 4 * sqrt((4 - n * n) / pow(n * n - 1, 3));
+    int i, k;
+    raindrop__fill_airy(airy);
+    for (i = 0; i < 5; i++) EXPECT_NEAR(raindrop__airy(airy, values[i][0]), values[i][1], 2e-5);
+    EXPECT_EQ(raindrop_bow_profile(geometry, 7200, 0), SAT_OK);
+    for (k = 0; k < 3; k++) {
+        double s = pow(acos(-1.0) * diameters[k] * 1e6 / 550, 2.0 / 3) / cbrt(h) * acos(-1.0) / 180, sum[2] = {0, 0};
+        double bow = 180 - raindrop_bow_angle(1, n) * 180 / acos(-1.0);
+        double first = bow - 1.0188 / s, arc = bow - 3.2482 / s;
+        int best = 0;
+        EXPECT_EQ(raindrop_bow_profile(profile, 7200, diameters[k]), SAT_OK);
+        for (i = 0; i < 7200; i++) {
+            double weight = cos(acos(-1.0) * i / 7200) - cos(acos(-1.0) * (i + 1) / 7200);
+            sum[0] += (double)profile[3 * i + 1] * weight;
+            sum[1] += (double)geometry[3 * i + 1] * weight;
+            if (i < 170 * 40 && profile[3 * i + 1] > profile[3 * best + 1]) best = i;
+        }
+        EXPECT_REL(sum[0], sum[1], 0.005); /* no light is lost or won */
+        EXPECT_NEAR(180 - (best + 0.5) / 40, first, 0.25);
+        REPORT("bow of Airy's theory, brightest green", 180 - (best + 0.5) / 40, "degrees");
+        if (k == 2) continue; /* of large drops the sun's disc blurs the arcs */
+        for (best = i = (int)((180 - arc - 0.4) * 40); i < (int)((180 - arc + 0.4) * 40); i++)
+            if (profile[3 * i + 1] > profile[3 * best + 1]) best = i;
+        EXPECT_NEAR(180 - (best + 0.5) / 40, arc, 0.25);
+        EXPECT(profile[3 * best + 1] > 1.3f * geometry[3 * best + 1]); /* an arc, not a slope */
+        REPORT("first supernumerary arc, green", 180 - (best + 0.5) / 40, "degrees");
+    }
+    EXPECT_EQ(raindrop_bow_profile(profile, 7200, 7), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_bow_profile(profile, 7200, -1), SAT_ERR_ARGUMENT);
 }
 
 TEST(raindrop_environment_shows_the_bows)
@@ -1199,11 +1237,14 @@ static const char *rt_explain(int which, void *options, int create, sat_result *
         }
     } else {
         raindrop_rain_options o = raindrop_rain_defaults();
+        raindrop_environment_options quick = raindrop_environment_defaults();
         const raindrop_camera *camera = which == 2 ? (const raindrop_camera *)options : NULL;
         const raindrop_render_options *render = which == 3 ? (const raindrop_render_options *)options : NULL;
         image.height = 4;
         o.count = 1;
-        EXPECT_EQ(raindrop_environment_create(&e, &image, NULL, NULL), SAT_OK);
+        quick.far_resolution = 8;
+        quick.far_samples = 16;
+        EXPECT_EQ(raindrop_environment_create(&e, &image, &quick, NULL), SAT_OK);
         EXPECT_EQ(raindrop_rain_create(&r, &o), SAT_OK);
         raindrop_explain_render(text, sizeof text, 12, 1, 1, camera, render);
         *result = raindrop_render(rgb, 12, 1, 1, NULL, camera, r, e, render, NULL);
@@ -1658,6 +1699,96 @@ TEST(raindrop_depth_of_field_equals_a_sampled_lens)
     rt_close(&scene);
 }
 
+/* A white sky: the picture of a drop before black is what it covers. */
+static raindrop_environment *rt_white(void)
+{
+    static float white[3 * 16 * 8];
+    sat_image image = sat_image_f32(white, 16, 8, 3);
+    raindrop_environment_options e = raindrop_environment_defaults();
+    raindrop_environment *environment = NULL;
+    int i;
+    for (i = 0; i < 3 * 16 * 8; i++) white[i] = 1;
+    e.far_samples = 16;
+    EXPECT_EQ(raindrop_environment_create(&environment, &image, &e, NULL), SAT_OK);
+    return environment;
+}
+
+/* The veil is the mean picture of the drops that it stands for: a shell of them, drawn, and the closed form. */
+TEST(raindrop_veil_is_the_mean_of_the_drops)
+{
+    enum { COUNT = 60000 };
+    rt_scene scene = rt_open();
+    raindrop_drop *drops = (raindrop_drop *)malloc(sizeof *drops * COUNT);
+    raindrop_rain *rain;
+    raindrop_veil_options o = raindrop_veil_defaults();
+    raindrop_render_options r = raindrop_render_defaults();
+    const size_t pixels = (size_t)RT_W * RT_H;
+    const double from = 3, reach = 9, radius = 0.025, volume = 4.0 / 3 * acos(-1.0) * (9.0 * 9 * 9 - 27);
+    double drawn[3] = {0, 0, 0}, closed[3] = {0, 0, 0}, sum = 0;
+    uint64_t seed = 9;
+    size_t k;
+    int i, c;
+    for (i = 0; i < COUNT; i++) {
+        double d = cbrt(27 + support_uniform(&seed) * (729 - 27)), t = 2 * support_uniform(&seed) - 1,
+               a = 6.283185307179586 * support_uniform(&seed), s = sqrt(1 - t * t);
+        drops[i] = rt_drop((float)(d * s * cos(a)), (float)(d * s * sin(a)), (float)(d * t), (float)radius);
+    }
+    rain = rt_rain_of(drops, COUNT);
+    r.far_radius = 64;
+    for (k = 0; k < 3 * pixels; k++) scene.background[k] = 2; /* what the rain hides, and what it sends */
+    rt_render(&scene, rain, &r, NULL);
+    o.extinction = (float)(COUNT * acos(-1.0) * radius * radius / volume);
+    o.from = (float)from;
+    o.reach = (float)reach;
+    EXPECT_EQ(raindrop_veil(scene.background, 0, RT_W, RT_H, NULL, &scene.camera, scene.environment, &o), SAT_OK);
+    for (k = 0; k < pixels; k++)
+        for (c = 0; c < 3; c++) {
+            drawn[c] += (double)scene.picture[3 * k + (size_t)c] / (double)pixels;
+            closed[c] += (double)scene.background[3 * k + (size_t)c] / (double)pixels;
+        }
+    for (c = 0; c < 3; c++) {
+        EXPECT_REL(closed[c] - 2, drawn[c] - 2, 0.02);
+        sum += (closed[c] - 2) / (drawn[c] - 2) / 3;
+    }
+    REPORT("veil over drawn drops, mean change of the picture", sum, "");
+    EXPECT(o.extinction * 6 > 0.2f);
+    free(drops);
+    raindrop_rain_destroy(rain);
+    rt_close(&scene);
+}
+
+TEST(raindrop_veil_grows_with_the_depth)
+{
+    static float depth[16] = {0.5f, 5, 50, 500, 5000, 0, -1, 1e30f}, rgb[3 * 8], want[3];
+    raindrop_environment *white = rt_white();
+    raindrop_veil_options o = raindrop_veil_defaults();
+    raindrop_camera camera = raindrop_camera_defaults();
+    char text[160];
+    int i;
+    camera.fov_y = 0.01f;
+    EXPECT_NEAR(raindrop_extinction(10), 0.00069, 1e-5);
+    EXPECT_REL(raindrop_extinction(50), 0.0021, 0.1); /* 2.1 a kilometre */
+    EXPECT_EQ(raindrop_extinction(-1), 0);
+    EXPECT(!(raindrop_extinction((double)sat__float_from_bits(0x7fc00000u)) > 0));
+    o.extinction = 0.0021f;
+    EXPECT_EQ(raindrop_veil(rgb, 0, 8, 1, depth, &camera, white, &o), SAT_OK);
+    for (i = 0; i < 8; i++) {
+        double z = i > 3 ? 1000 : (double)depth[i], s = z > 4 ? z - 4 : 0;
+        EXPECT_NEAR(rgb[3 * i], 1 - exp(-0.0021 * s), 3e-5);
+    }
+    memcpy(want, rgb + 3, sizeof want);
+    o.extinction = -1;
+    EXPECT_EQ(raindrop_veil(rgb, 0, 8, 1, depth, &camera, white, &o), SAT_ERR_ARGUMENT);
+    EXPECT(strcmp(raindrop_explain_veil(text, sizeof text, &o), "extinction is -1; 0..1e18") == 0);
+    EXPECT(strcmp(raindrop_explain_veil(text, sizeof text, NULL), "") == 0);
+    o.extinction = 0; /* no rain, no change */
+    EXPECT_EQ(raindrop_veil(rgb, 0, 8, 1, depth, &camera, white, &o), SAT_OK);
+    EXPECT(memcmp(want, rgb + 3, sizeof want) == 0);
+    EXPECT_EQ(raindrop_veil(NULL, 0, 8, 1, depth, &camera, white, &o), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_veil(rgb, 0, 8, 1, depth, &camera, NULL, &o), SAT_ERR_ARGUMENT);
+    raindrop_environment_destroy(white);
+}
+
 /* Whatever the size, the streak and the blur, a drop takes as much light away as its disc: black drops before white. */
 TEST(raindrop_coverage_is_the_area)
 {
@@ -1709,20 +1840,6 @@ TEST(raindrop_coverage_is_the_area)
         }
     }
     rt_close(&scene);
-}
-
-/* A white sky: the picture of a drop before black is what it covers. */
-static raindrop_environment *rt_white(void)
-{
-    static float white[3 * 16 * 8];
-    sat_image image = sat_image_f32(white, 16, 8, 3);
-    raindrop_environment_options e = raindrop_environment_defaults();
-    raindrop_environment *environment = NULL;
-    int i;
-    for (i = 0; i < 3 * 16 * 8; i++) white[i] = 1;
-    e.far_samples = 16;
-    EXPECT_EQ(raindrop_environment_create(&environment, &image, &e, NULL), SAT_OK);
-    return environment;
 }
 
 /* The light of one drop of a radius, streak and blur in pixels over its area; its place and direction are drawn. */

@@ -515,6 +515,21 @@ TEST(raindrop_gl_rain_falls_as_on_the_cpu)
     gust[1] = sat__float_from_bits(0x7fc00000u);
     EXPECT_EQ(raindrop_gl_set_wind(g, gust), SAT_ERR_ARGUMENT);
     EXPECT_EQ(raindrop_gl_set_wind(g, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    gust[1] = 100; /* the box moves with the camera, on both sides */
+    EXPECT_EQ(raindrop_rain_set_centre(rain, gust), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_centre(g, gust), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_centre(g, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_rain_advance(rain, 0.01), SAT_OK);
+    EXPECT_EQ(raindrop_gl_advance(g, 0.01), SAT_OK);
+    {
+        raindrop_drop back[100];
+        int i;
+        off = 0;
+        EXPECT_EQ(raindrop_gl_read_drops(g, back, 100), SAT_OK);
+        for (i = 0; i < 100; i++) off += fabs((double)(back[i].position[1] - rain->drops[i].position[1])) > 1e-3;
+        EXPECT(off <= 1);
+    }
     EXPECT_EQ(raindrop_gl_advance(g, -1), SAT_ERR_ARGUMENT);
     raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
@@ -602,6 +617,109 @@ TEST(raindrop_gl_restores_the_state)
     s.gl.DeleteTextures(1, &texture);
     s.gl.DeleteBuffers(1, &buffer);
     s.gl.DeleteVertexArrays(1, &array);
+    raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
+
+/* The veil before hills of several depths, with the bows and without. */
+TEST(raindrop_gl_veils_as_the_cpu)
+{
+    static float sky[3 * 64 * 32], depth[RG_W * RG_H], window[RG_W * RG_H];
+    sat_image image = sat_image_f32(sky, 64, 32, 3);
+    raindrop_environment_options e = raindrop_environment_defaults();
+    raindrop_environment *environment = NULL;
+    raindrop_veil_options o = raindrop_veil_defaults();
+    raindrop_gl *g = NULL;
+    sat__gl_state state;
+    unsigned texture = 0, target = 0;
+    rg_scene s;
+    int bow, x, y, c;
+    if (!rg_open(&s)) return;
+    reference_sky(sky, 64, 32);
+    s.camera.depth_near = 0.1f;
+    s.camera.depth_far = 5000;
+    for (x = 0; x < RG_W * RG_H; x++) {
+        double z = x % 7 == 0 ? 0 : 0.5 * pow(1.0005, x % 17000), far = 5000, near = (double)s.camera.depth_near;
+        depth[x] = (float)z;
+        y = RG_H - 1 - x / RG_W;
+        window[y * RG_W + x % RG_W] =
+            z > 0 ? (float)(((far + near) - 2 * far * near / z) / (far - near) * 0.5 + 0.5) : 1;
+    }
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_gl_veil(g, RG_W, RG_H, 0, NULL, NULL), SAT_ERR_ARGUMENT); /* no environment */
+    sat__gl_begin(&s.gl, &state, 1);
+    EXPECT_EQ(sat__gl_texture(&s.gl, &texture, SAT__GL_DEPTH_COMPONENT32F, RG_W, RG_H, window), SAT_OK);
+    EXPECT_EQ(sat__gl_framebuffer(&s.gl, &target, &s.texture, 1, 0), SAT_OK);
+    sat__gl_end(&s.gl, &state);
+    for (bow = 0; bow < 2; bow++) {
+        double error, worst = 0;
+        e.bow_by_depth = bow;
+        e.sun_direction[1] = 0.3f;
+        e.sun_direction[2] = sqrtf(1 - 0.3f * 0.3f);
+        e.far_samples = 16;
+        o.extinction = 0.002f;
+        EXPECT_EQ(raindrop_environment_create(&environment, &image, &e, NULL), SAT_OK);
+        EXPECT_EQ(raindrop_gl_set_environment(g, environment), SAT_OK);
+        memcpy(s.cpu, s.background, sizeof(float) * 3 * RG_W * RG_H);
+        EXPECT_EQ(raindrop_veil(s.cpu, 0, RG_W, RG_H, depth, &s.camera, environment, &o), SAT_OK);
+        for (y = 0; y < RG_H; y++)
+            for (x = 0; x < RG_W; x++)
+                for (c = 0; c < 4; c++)
+                    s.gpu[4 * ((RG_H - 1 - y) * RG_W + x) + c] = c < 3 ? s.background[3 * (y * RG_W + x) + c] : 1;
+        sat__gl_begin(&s.gl, &state, 1);
+        sat__gl_upload(&s.gl, s.texture, SAT__GL_RGBA32F, RG_W, RG_H, s.gpu);
+        sat__gl_end(&s.gl, &state);
+        s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, target);
+        EXPECT_EQ(raindrop_gl_veil(g, RG_W, RG_H, texture, &s.camera, &o), SAT_OK);
+        sat__gl_begin(&s.gl, &state, 1);
+        EXPECT_EQ(sat__gl_read(&s.gl, s.gpu, s.texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
+        sat__gl_end(&s.gl, &state);
+        for (y = 0; y < RG_H; y++)
+            for (x = 0; x < RG_W; x++)
+                for (c = 0; c < 3; c++) {
+                    double want = (double)s.cpu[3 * (y * RG_W + x) + c];
+                    error = fabs((double)s.gpu[4 * ((RG_H - 1 - y) * RG_W + x) + c] - want) / (1 + want);
+                    if (error > worst) worst = error;
+                }
+        EXPECT(worst < 2e-3);
+        REPORT(bow ? "veil with bows, largest difference" : "veil, largest difference", worst, "from the CPU");
+        raindrop_environment_destroy(environment);
+    }
+    o.reach = -1;
+    EXPECT_EQ(raindrop_gl_veil(g, RG_W, RG_H, texture, &s.camera, &o), SAT_ERR_ARGUMENT);
+    EXPECT(strcmp(raindrop_gl_message(g), "reach is -1; 0..1e18") == 0);
+    s.camera.depth_far = 0;
+    EXPECT_EQ(raindrop_gl_veil(g, RG_W, RG_H, texture, &s.camera, NULL), SAT_ERR_ARGUMENT);
+    s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, 0);
+    s.gl.DeleteFramebuffers(1, &target);
+    s.gl.DeleteTextures(1, &texture);
+    raindrop_gl_destroy(g);
+    rg_close(&s);
+}
+
+/* Slices of depth bring the picture to that of sorted drops: in rain a hundred times as dense as the heaviest. */
+TEST(raindrop_gl_slices_sort)
+{
+    static const int slices[4] = {1, 4, 16, 64};
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_rain *rain = rg_rain(60000, 1, 3);
+    double error[4];
+    int i;
+    if (!rg_open(&s)) {
+        raindrop_rain_destroy(rain);
+        return;
+    }
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    for (i = 0; i < 4; i++) {
+        raindrop_render_options o = raindrop_render_defaults();
+        o.slices = slices[i];
+        error[i] = rg_compare(&s, g, rain, &o);
+        REPORT(i ? "slices of depth, RMSE from sorted drops" : "unsorted, RMSE from sorted drops", error[i], "");
+    }
+    EXPECT(error[1] < 0.8 * error[0] && error[2] < 0.4 * error[0] && error[3] < 0.05 * error[0]);
+    raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
     rg_close(&s);
 }
