@@ -196,6 +196,23 @@ TEST(one_allocation_and_none_a_frame)
 
 /* ---- the equations */
 
+TEST(memory_is_as_written)
+{
+    static const int sizes[][2] = {{1, 1}, {1, 3000}, {3000, 1}, {15, 16}, {640, 480}, {1920, 1080}};
+    int i, workers;
+    for (i = 0; i < 6; ++i)
+        for (workers = 1; workers < 8; workers += 3) {
+            tonemap_options o = tonemap_defaults();
+            tonemap *map = NULL;
+            size_t row = 4 * (size_t)(sizes[i][0] + 31), height = (size_t)sizes[i][1], n = (size_t)workers;
+            o.threads = support_threads(workers);
+            EXPECT_EQ(tonemap_create(&map, sizes[i][0], sizes[i][1], &o), SAT_OK);
+            EXPECT(map->block_size <= row * (height + 80 * n) + 5 * height + 61440 + 32768 * n);
+            EXPECT(map->block_size >= (row - 60) * (height + 80 * n));
+            tonemap_destroy(map);
+        }
+}
+
 TEST(log_average_is_eq_A1)
 {
     float *pixels = hdr_pixels(131, 67, 3, 5);
