@@ -15,7 +15,7 @@
    --paper where they are transparent, and shrunk in linear light; what cannot be read is named and left out. Likeness
    is the distance of 4 x 4 means of linear light in CIELAB. Tiles stand in a file, by default one that goes with the
    program; --index keeps it, so that each picture is read once in its life, and a stopped run goes on. In memory are
-   208 bytes a tile. The mosaic is written as it is drawn, a strip at a time. docs/mosaic.md tells more. */
+   250 bytes a tile and its path. The mosaic is written as it is drawn, a strip at a time. docs/mosaic.md tells more. */
 
 #define _POSIX_C_SOURCE   200809L
 #define _FILE_OFFSET_BITS 64
