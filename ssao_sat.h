@@ -400,11 +400,14 @@ SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl); /* NULL is fine */
 /* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader. `view` is the 12 floats of ssao_sat_gl_view as
    vec4 view[3]:
 
-       float ssao_sat_distance(vec4 view[3], ivec2 pixel, float d)                             depth value -> distance,
-       0: nothing there float ssao_sat_distance(vec4 view[3], float d)                                          the
-       same, but for oblique near planes
-       vec3  ssao_sat_position(vec4 view[3], ivec2 pixel, float z)                             z points forward
-       vec3  ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z)        the same axes */
+       float ssao_sat_distance(vec4 view[3], ivec2 pixel, float d)
+           from a depth value to a distance; 0: nothing there
+       float ssao_sat_distance(vec4 view[3], float d)
+           the same, but for oblique near planes
+       vec3  ssao_sat_position(vec4 view[3], ivec2 pixel, float z)
+           z points forward
+       vec3  ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z)
+           the same axes */
 SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void);
 SSAO_SAT_DEF sat_result ssao_sat_gl_view(float *view, const ssao_sat_input *input, int bottom_up);
 

@@ -5,8 +5,7 @@
        photomosaic target.jpg --tiles folder --gap 0.001 --method fast --compare --out both.png
        photomosaic target.jpg --tiles folder --method ants --video frames      frames/0000.png, ...: order out of chaos
        photomosaic target.jpg --tiles folder --pan 24 --switching 0.05 --video frames      a film, frame by frame warm
-       photomosaic                                                              target and tiles drawn here:
-       out/photomosaic.png
+       photomosaic                                                              target and tiles drawn here
 
    Several target pictures in a row need several calls. The last line is the proof: no other choice of tiles is
    nearer to the target by more than the gap.
