@@ -537,3 +537,50 @@ TEST(gl_failures_have_a_message)
     EXPECT(support_memory_clean(&memory));
     screen_close(&s);
 }
+
+/* The functions for shaders of the caller's own, a texel each, against what they say they do. */
+TEST(gl_glsl_is_what_it_says)
+{
+    static const char fragment[] =
+        "layout(location = 0) out vec4 colour;\n"
+        "void main() {\n"
+        "    float v = floor(gl_FragCoord.x) / 32.0;\n"
+        "    vec3 rgb = vec3(v, 0.5 * v, 2.0 * v - 0.1);\n"
+        "    colour = vec4(tonemap_srgb(rgb).xz, tonemap_luminance(rgb), tonemap_rho(v * 10.0));\n"
+        "}\n";
+    static float out[64][4];
+    const char *library[2], *text[2];
+    sat__gl_shaders shaders;
+    sat__gl_state state;
+    unsigned program = 0, target = 0, framebuffer = 0;
+    screen s;
+    int i;
+    if (!screen_open(&s)) return;
+    memset(&shaders, 0, sizeof shaders);
+    library[0] = tonemap_gl_glsl();
+    text[0] = fragment;
+    library[1] = text[1] = NULL;
+    shaders.name = "functions";
+    shaders.library = library;
+    shaders.fragment = text;
+    sat__gl_begin(&s.gl, &state, 1);
+    if (!EXPECT_EQ(sat__gl_build(&s.gl, &program, &shaders), SAT_OK)) puts(s.gl.message);
+    EXPECT_EQ(sat__gl_texture(&s.gl, &target, SAT__GL_RGBA32F, 64, 1, NULL), SAT_OK);
+    EXPECT_EQ(sat__gl_framebuffer(&s.gl, &framebuffer, &target, 1, 0), SAT_OK);
+    sat__gl_pass(&s.gl, program, framebuffer, 64, 1);
+    sat__gl_draw(&s.gl);
+    EXPECT_EQ(sat__gl_read(&s.gl, out, target, SAT__GL_RGBA32F, 64, 1), SAT_OK);
+    for (i = 0; i < 64; i++) {
+        double v = i / 32.0, blue = fmin(fmax(2 * v - 0.1, 0), 1), red = fmin(v, 1);
+        double y = 0.2126 * v + 0.7152 * 0.5 * v + 0.0722 * (2 * v - 0.1);
+        EXPECT_NEAR(out[i][0], red <= 0.0031308 ? 12.92 * red : 1.055 * pow(red, 1 / 2.4) - 0.055, 1e-5);
+        EXPECT_NEAR(out[i][1], blue <= 0.0031308 ? 12.92 * blue : 1.055 * pow(blue, 1 / 2.4) - 0.055, 1e-5);
+        EXPECT_NEAR(out[i][2], y > 0 ? y : 0, 1e-4);
+        EXPECT_NEAR(out[i][3], tonemap__rho((float)(v * 10)), 1e-4);
+    }
+    s.gl.DeleteProgram(program);
+    s.gl.DeleteFramebuffers(1, &framebuffer);
+    s.gl.DeleteTextures(1, &target);
+    sat__gl_end(&s.gl, &state);
+    screen_close(&s);
+}
