@@ -543,7 +543,8 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, const sat_gl_target 
                                            const raindrop_render_options *options);
 
 /* raindrop_veil over the bound framebuffer. depth: a texture of the camera's depth_near and depth_far, 1 where it is
-   empty, which the framebuffer must not hold; 0: empty everywhere. */
+   empty, which the framebuffer must not hold; 0: empty everywhere. The first veil compiles its program, unless
+   options.compile_all had it. */
 RAINDROP_DEF sat_result raindrop_gl_veil(raindrop_gl *gl, int width, int height, unsigned depth,
                                          const raindrop_camera *camera, const raindrop_veil_options *options);
 
@@ -4741,6 +4742,24 @@ static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int
     return sat__gl_build(&g->gl, &g->draw[look][kind], &shaders);
 }
 
+/* One for environments with bows and one for those without. */
+static inline sat_result raindrop__gl_veil_program(raindrop_gl *g, int bow)
+{
+    const char *library[3], *fragment[2];
+    sat__gl_shaders shaders;
+    if (g->veil[bow]) return SAT_OK;
+    memset(&shaders, 0, sizeof shaders);
+    library[0] = raindrop__glsl_constants;
+    library[1] = raindrop__glsl_environment;
+    fragment[0] = raindrop__glsl_veil;
+    library[2] = fragment[1] = NULL;
+    shaders.name = "raindrop: veil";
+    shaders.library = library;
+    shaders.fragment = fragment;
+    if (bow) sat__gl_define(&g->gl, "BOW", 1);
+    return sat__gl_build(&g->gl, &g->veil[bow], &shaders);
+}
+
 static inline sat_result raindrop__gl_programs(raindrop_gl *g)
 {
     static const char *const varyings[] = {"next_drop", "next_motion", NULL};
@@ -4752,6 +4771,8 @@ static inline sat_result raindrop__gl_programs(raindrop_gl *g)
         for (kind = 0; kind < (g->options.compile_all ? RAINDROP__GL_KINDS : 1) && result == SAT_OK; kind++)
             if (look > RAINDROP_LOOK_SPRITE || (kind & ~RAINDROP__GL_FLAT) == 0)
                 result = raindrop__gl_draw_program(g, look, kind);
+    if (result == SAT_OK && g->options.compile_all) result = raindrop__gl_veil_program(g, 0);
+    if (result == SAT_OK && g->options.compile_all) result = raindrop__gl_veil_program(g, 1);
     if (result != SAT_OK) return result;
     memset(&shaders, 0, sizeof shaders);
     vertex[0] = raindrop__glsl_constants;
@@ -5221,23 +5242,6 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, const sat_gl_target *
 
 /* ---- the veil */
 
-static inline sat_result raindrop__gl_veil_program(raindrop_gl *g)
-{
-    const char *library[3], *fragment[2];
-    sat__gl_shaders shaders;
-    if (g->veil[g->bow != 0]) return SAT_OK;
-    memset(&shaders, 0, sizeof shaders);
-    library[0] = raindrop__glsl_constants;
-    library[1] = raindrop__glsl_environment;
-    fragment[0] = raindrop__glsl_veil;
-    library[2] = fragment[1] = NULL;
-    shaders.name = "raindrop: veil";
-    shaders.library = library;
-    shaders.fragment = fragment;
-    if (g->bow) sat__gl_define(&g->gl, "BOW", 1);
-    return sat__gl_build(&g->gl, &g->veil[g->bow != 0], &shaders);
-}
-
 static inline void raindrop__gl_set_veil(raindrop_gl *g, unsigned program, const raindrop__frame *frame, unsigned depth,
                                          const raindrop_veil_options *o)
 {
@@ -5286,7 +5290,7 @@ RAINDROP_DEF sat_result raindrop_gl_veil(raindrop_gl *g, int width, int height, 
         raindrop__say(&t, g->environment ? "depth needs a depth_far" : "there was no raindrop_gl_set_environment");
         return SAT_ERR_ARGUMENT;
     }
-    result = raindrop__gl_veil_program(g);
+    result = raindrop__gl_veil_program(g, g->bow != 0);
     if (result != SAT_OK) return result;
     raindrop__set_frame(&frame);
     sat__gl_begin(&g->gl, &state, 3);
