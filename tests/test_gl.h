@@ -459,6 +459,7 @@ static void gl_frame_calls(gl_scene *s, sat_gl *tables, sat_gl *tiles, softassig
         ro.orders = round & 1;
         camera.exposure = round & 2 ? 0.01f : 0;
         EXPECT_EQ(raindrop_gl_render(s->rain, &target, GL_W, GL_H, &camera, NULL, &ro), SAT_OK);
+        EXPECT_EQ(raindrop_gl_veil(s->rain, GL_W, GL_H, 0, NULL, NULL), SAT_OK);
     }
     EXPECT_EQ(sat_gl_build(tables, round & 1 ? 99u : 0, 5, GL_W, GL_H), SAT_OK);
     EXPECT_EQ(sat_gl_scan(tables, 0, 5, GL_W, GL_H), SAT_OK);
