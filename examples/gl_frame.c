@@ -53,7 +53,7 @@ static int frame_check(frame *f, sat_result result, const char *what)
 /* What ssao_sat.h and fiv.h ask about the camera: its matrix, and the way back from the depth buffer. */
 static void frame_look(frame *f)
 {
-    const raindrop_camera *c = &f->scene.scene.camera;
+    const raindrop_camera *c = &f->scene.things.camera;
     const float *p = f->scene.projection;
     float *world = f->view.world_from_clip;
     int k;
@@ -82,7 +82,7 @@ static int frame_prepare(frame *f, fiv_instance *instances, const image *sky, co
     ok = frame_check(f, fiv_environment_create(&f->light, &picture, NULL, NULL), "light") &&
          frame_check(f, raindrop_environment_create(&f->mirror, &picture, NULL, NULL), "light in drops");
     for (i = 0; ok && i < SCENE_OBJECTS; ++i) {
-        const scene_object *o = &f->scene.scene.objects[i];
+        const scene_object *o = &f->scene.things.objects[i];
         ok = frame_check(f, fiv_occluder_create(&f->occluder[i], o->positions, o->vertices, o->indices, o->triangles,
                                                 &fo, NULL), "masks") &&
              frame_check(f, fiv_occluder_light(f->occluder[i], f->light, NULL), "shadows");

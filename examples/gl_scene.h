@@ -17,7 +17,7 @@ typedef struct gl_scene {
     unsigned vertex_buffer, vertex_array;
     float projection[16], matrix[16];         /* column-major; OpenGL's usual perspective, and it behind the camera */
     float axes[9], lens[4];                   /* right, up, back; half the picture at distance 1, 2 / its size */
-    scene scene;                              /* sculptures, camera */
+    scene things;                             /* sculptures, camera */
 } gl_scene;
 
 static const char gl_scene_draw_vertex[] =
@@ -45,7 +45,7 @@ static const char gl_scene_light_fragment[] =
 /* The camera's matrices. */
 static inline void gl_scene_look(gl_scene *f)
 {
-    const raindrop_camera *c = &f->scene.camera;
+    const raindrop_camera *c = &f->things.camera;
     const float *axes[3] = {c->right, c->up, c->back};
     float near_plane = 0.05f, far_plane = 50, tangent = tanf(0.5f * c->fov_y), *p = f->projection;
     float aspect = (float)f->width / (float)f->height, a = -(far_plane + near_plane) / (far_plane - near_plane);
@@ -70,12 +70,12 @@ static inline int gl_scene_vertices(gl_scene *f)
     size_t n = 0, j, k, count = 6;
     float *v;
     int i;
-    for (i = 0; i < SCENE_OBJECTS; ++i) count += 3 * f->scene.objects[i].triangles;
+    for (i = 0; i < SCENE_OBJECTS; ++i) count += 3 * f->things.objects[i].triangles;
     v = (float *)calloc(count, 10 * sizeof *v);
     if (!v) return 0;
     for (i = 0; i < SCENE_OBJECTS; ++i)
-        for (j = 0; j < 3 * f->scene.objects[i].triangles; ++j, n += 10) {
-            const scene_object *o = &f->scene.objects[i];
+        for (j = 0; j < 3 * f->things.objects[i].triangles; ++j, n += 10) {
+            const scene_object *o = &f->things.objects[i];
             for (k = 0; k < 3; ++k) {
                 v[n + k] = o->place[k] + o->scale * o->positions[3 * o->indices[j] + k];
                 v[n + 3 + k] = o->normals[3 * o->indices[j] + k], v[n + 6 + k] = o->colour[k];
@@ -105,10 +105,10 @@ static inline int gl_scene_create(gl_scene *f, sat_gl_get_proc *get_proc, int wi
     f->width = width, f->height = height;
     if ((*why = gl_tools_load(&f->t, get_proc)) != NULL) return 0;
     *why = "not enough memory for the scene";
-    if (!scene_make_knot(&f->scene.objects[0], 120, 20) || !scene_make_pawn(&f->scene.objects[1], 40, 3)) return 0;
-    scene_place(&f->scene.objects[0], -0.17f, -0.05f, 0.24f, 0.62f, 0.3f, 0.16f, 0.04f);
-    scene_place(&f->scene.objects[1], 0.3f, 0.06f, 0.23f, 0.66f, 0.64f, 0.58f, 0.04f);
-    f->scene.camera = raindrop_camera_look(eye, target, up, 0.62f);
+    if (!scene_make_knot(&f->things.objects[0], 120, 20) || !scene_make_pawn(&f->things.objects[1], 40, 3)) return 0;
+    scene_place(&f->things.objects[0], -0.17f, -0.05f, 0.24f, 0.62f, 0.3f, 0.16f, 0.04f);
+    scene_place(&f->things.objects[1], 0.3f, 0.06f, 0.23f, 0.66f, 0.64f, 0.58f, 0.04f);
+    f->things.camera = raindrop_camera_look(eye, target, up, 0.62f);
     gl_scene_look(f);
     if (!gl_scene_vertices(f)) return 0;
     f->colour = gl_tools_texture(&f->t, GL_TOOLS_RGBA16F, width, height, 0, NULL);
@@ -166,7 +166,7 @@ static inline void gl_scene_destroy(gl_scene *f)
         f->t.DeleteBuffers(1, &f->vertex_buffer), f->t.DeleteVertexArrays(1, &f->vertex_array);
         f->t.DeleteProgram(f->draw), f->t.DeleteProgram(f->light);
     }
-    scene_free(&f->scene);
+    scene_free(&f->things);
 }
 
 #endif /* GL_SCENE_H */

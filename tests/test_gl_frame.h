@@ -129,14 +129,14 @@ static void ft_shadows(void)
 {
     fiv_instance casters[SCENE_OBJECTS], others[1];
     fiv_irradiance_options o = fiv_irradiance_defaults();
-    const raindrop_camera *c = &ft_frame.scene.scene.camera;
+    const raindrop_camera *c = &ft_frame.scene.things.camera;
     const float *p = ft_frame.scene.projection;
     int i, k;
     o.own_masks = o.rays = 0; /* what the shader does */
     for (k = 0; k < SCENE_OBJECTS; k++) {
         casters[k].occluder = ft_frame.occluder[k];
-        casters[k].scale = ft_frame.scene.scene.objects[k].scale;
-        memcpy(casters[k].position, ft_frame.scene.scene.objects[k].place, sizeof casters[k].position);
+        casters[k].scale = ft_frame.scene.things.objects[k].scale;
+        memcpy(casters[k].position, ft_frame.scene.things.objects[k].place, sizeof casters[k].position);
     }
     for (i = 0; i < FT_N; i++) {
         double z = (double)p[14] / (-(2 * (double)ft_depth[i] - 1) - (double)p[10]); /* view space, below 0 */
