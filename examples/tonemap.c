@@ -108,6 +108,17 @@ static int map_picture(const common_settings *common, unsigned char *bytes, floa
 
 /* ---- what else can be installed: pfstools' operators, which read and write files ---- */
 
+/* A folder of our own for their files; 0 where there is none, and on Windows, where they are not. */
+static int make_folder(char *name)
+{
+#ifdef _WIN32
+    (void)name;
+    return 0;
+#else
+    return mkdtemp(name) != NULL;
+#endif
+}
+
 /* Runs one on the picture; 0 when it is not there. */
 static int map_by_peer(unsigned char *bytes, const image *picture, const char *folder, const char *peer)
 {
@@ -191,7 +202,7 @@ static int write_sheet(const common_settings *common, const image *picture, cons
     unsigned char *pixels = (unsigned char *)malloc(COUNT * bytes);
     char folder[] = "/tmp/tonemap_XXXXXX", path[300];
     double seconds;
-    int i, count = 0, ok = pixels != NULL || common_say(common, "no memory"), peers = mkdtemp(folder) != NULL;
+    int i, count = 0, ok = pixels != NULL || common_say(common, "no memory"), peers = make_folder(folder);
     peers = peers && save_for_peers(picture, folder);
     for (i = 0; i < COUNT && ok; ++i) {
         tonemap_options o = *options;
