@@ -2019,7 +2019,7 @@ static int fiv__ray_meets_cluster(const fiv__mesh *mesh, const fiv__cluster *c, 
     return 0;
 }
 
-static int fiv__ray_meets(const fiv__mesh *mesh, const float offset[3], const float d[3])
+static inline int fiv__ray_meets(const fiv__mesh *mesh, const float offset[3], const float d[3])
 {
     float axes[3][3];
     size_t i;
@@ -2071,7 +2071,7 @@ static size_t fiv__encode(uint16_t *words, const uint64_t *rows, int row_count)
     return n;
 }
 
-static void fiv__decode(uint64_t *rows, const uint16_t *words, size_t count, int row_count)
+static inline void fiv__decode(uint64_t *rows, const uint16_t *words, size_t count, int row_count)
 {
     size_t i;
     int row = 0;
