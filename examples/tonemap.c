@@ -193,6 +193,7 @@ static int write_sheet(const common_settings *common, const image *picture, cons
         {"pfstmo_reinhard02 -s", 0, "pfstmo_reinhard02 -s"},
         {"pfstmo_mantiuk06", 0, "pfstmo_mantiuk06"},
         {"pfstmo_drago03", 0, "pfstmo_drago03"},
+        {"pfstmo_reinhard05", 0, "pfstmo_reinhard05"},
         {"linear", TONEMAP_LINEAR, NULL},
     };
     enum { COUNT = sizeof variants / sizeof variants[0] };
@@ -217,7 +218,7 @@ static int write_sheet(const common_settings *common, const image *picture, cons
     snprintf(path, sizeof path, "%s/in.exr", folder);
     remove(path);
     remove(folder);
-    ok = ok && common_contact_sheet(common, common->out, cells, count, 4);
+    ok = ok && common_contact_sheet(common, common->out, cells, count, 5);
     free(pixels);
     return ok;
 }

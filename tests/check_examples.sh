@@ -34,7 +34,7 @@ check_ranges() {
             else low=${range% to *} low=${low##* } high=${range##* }; fi
             value=$(awk -v v="$low" 'BEGIN { printf "%.10g", v - 1 }')
             run 2 "--$name $value: must be $range" "$program" --"$name=$value"
-            [ -z "$high" ] || value=$(awk -v v="$high" 'BEGIN { printf "%.10g", v + 1 }')
+            [ -z "$high" ] || value=$(awk -v v="$high" 'BEGIN { printf "%.10g", v < 1e8 ? v + 1 : 2 * v }')
             [ -z "$high" ] || run 2 "--$name $value: must be $range" "$program" --"$name=$value"
             for value in nan many '' 1e400x 99999999999999999999999x; do run 2 "--$name $value: must be $range" "$program" --"$name=$value"; done
         elif [[ $line == *" WORD "* ]]; then
