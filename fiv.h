@@ -4129,13 +4129,14 @@ FIV_DEF sat_result fiv_occluder_save(void *memory, size_t size, const fiv_occlud
     return SAT_OK;
 }
 
-/* Every word of every sample stays within the mask's rows and texels. */
-static int fiv__words_are_valid(const fiv_occluder *o)
+/* Every word of every sample is one of the `count` that there are, and stays within the mask's rows and texels. */
+static int fiv__words_are_valid(const fiv_occluder *o, size_t count)
 {
     size_t sample, i;
     for (sample = 0; sample < o->stats.samples; sample++) {
         int row = 0;
-        if (o->first[sample] > o->first[sample + 1] || o->state[sample] > FIV__INSIDE) return 0;
+        if (o->first[sample] > o->first[sample + 1] || o->first[sample + 1] > count) return 0;
+        if (o->state[sample] > FIV__INSIDE) return 0;
         for (i = o->first[sample]; i < o->first[sample + 1]; i++) {
             int word = o->words[i];
             row = word >> 12 == 15 ? word & 0xfff : row + (word >> 12);
@@ -4271,7 +4272,8 @@ FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, siz
     p = fiv__take(o->support, p, FIV__SUPPORT * FIV__SUPPORT * sizeof(float));
     p = fiv__take(o->first, p, (n + 1) * sizeof(uint32_t));
     p = fiv__take(o->words, p, (size_t)s.words * sizeof(uint16_t));
-    if (o->first[0] != 0 || o->first[n] != s.words || !fiv__words_are_valid(o) || !fiv__load_mesh(&o->mesh, p)) {
+    if (o->first[0] != 0 || o->first[n] != s.words || !fiv__words_are_valid(o, (size_t)s.words) ||
+        !fiv__load_mesh(&o->mesh, p)) {
         fiv_occluder_destroy(o);
         return SAT_ERR_DATA;
     }

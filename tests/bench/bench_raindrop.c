@@ -443,14 +443,14 @@ static void bench_energy(void)
     enum { SIDE = 64, PLACES = 64 };
     static const float radii[] = {0.05f, 0.2f, 0.5f, 1, 1.5f, 2, 8}, streaks[] = {0, 1, 4, 16};
     static float white[3 * 16 * 8], picture[3 * SIDE * SIDE];
-    sat_image image = sat_image_f32(white, 16, 8, 3);
+    sat_image view = sat_image_f32(white, 16, 8, 3);
     raindrop_environment *sky = NULL;
     raindrop_camera camera = raindrop_camera_defaults();
     raindrop_render_options o = raindrop_render_defaults();
     size_t i, j;
     int k, place;
     for (i = 0; i < 3 * 16 * 8; i++) white[i] = 1;
-    raindrop_environment_create(&sky, &image, NULL, NULL);
+    raindrop_environment_create(&sky, &view, NULL, NULL);
     o.coverage_threshold = 0;
     bench_table("Light of a drop over its area, by its place among the pixels", "radius_px\tstreak_px\tsmallest\tmean\tlargest\tdefault");
     for (i = 0; i < sizeof radii / sizeof *radii; i++)
