@@ -419,6 +419,13 @@ static void bench_blur(void)
     free(p);
     free(out);
 }
+#else
+static void bench_blur(void)
+{
+    bench_table("Box filter of a whole image: time against cv::blur",
+                "kind\tradius\tside\ttime_blur_ratio\ttime_with_build_blur_ratio\tdefault");
+    bench_missing("OpenCV", "libopencv-dev");
+}
 #endif
 
 static void update(void *user)
@@ -624,9 +631,7 @@ int main(void)
 #ifndef BENCH_BUILD_ONLY
     bench_lookups();
     bench_whole_images();
-#ifdef HAVE_OPENCV
     bench_blur();
-#endif
     bench_siblings();
     bench_bounds();
     bench_scans();
