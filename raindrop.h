@@ -694,12 +694,6 @@ static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindr
 }
 #endif
 
-static inline raindrop__v raindrop__dot_v(const raindrop__v a[3], const raindrop__v b[3])
-{
-    return raindrop__add(raindrop__add(raindrop__mul(a[0], b[0]), raindrop__mul(a[1], b[1])),
-                         raindrop__mul(a[2], b[2]));
-}
-
 /* ------------------------------------------------------------------------------------------------
    >> options   tables of defaults and ranges, and what X_explain says; each function here writes one sentence about
                 what is wrong and returns whether nothing is

@@ -870,12 +870,6 @@ static inline float sat__srgb_decode(float encoded)
     return encoded <= 0.04045f ? encoded / 12.92f : powf((encoded + 0.055f) / 1.055f, 2.4f);
 }
 
-/* Relative luminance of linear Rec. 709 colour under D65. */
-static inline float sat__luminance(float red, float green, float blue)
-{
-    return 0.2126729f * red + 0.7151522f * green + 0.0721750f * blue;
-}
-
 /* ---- options: one row a field. The same table gives the defaults, checks what a caller wrote and names what is wrong;
    a test compares it with the comments of the struct. */
 

@@ -1,33 +1,17 @@
 #!/bin/bash
 # The promises that all headers share: names that other headers take, stack, functions that nobody calls, comments that agree
 # with the tables of options; NULL and zero arguments. usage: tests/check_house.sh NAME, or `null` for the arguments of all
-#
-# Offences that are known are named in tests/known_faults.txt, "CHECK HEADER WORD" a line, and counted as skipped;
-# LIST_FAULTS=FILE appends those that there are.
 
 lib=$1
 . "$(dirname "$0")/check.sh"
 family="sat tonemap ssao_sat fiv raindrop softassign"
-known=tests/known_faults.txt
-
-# offences CHECK TEXT: each line's first word is what the list of known faults may name
-offences() {
-    local check=$1 line word new=
-    while IFS= read -r line; do
-        [ -n "$line" ] || continue
-        word=${line%%[ (:]*}
-        [ -z "$LIST_FAULTS" ] || echo "$check $lib $word" >>"$LIST_FAULTS"
-        if grep -qxF "$check $lib $word" "$known" 2>/dev/null; then skip "known: $check: $line"; else new+=$line$'\n'; fi
-    done <<<"$2"
-    empty "$check" "$new"
-}
 code() { ${CC:-cc} -fpreprocessed -dD -E -P -x c "$1" 2>/dev/null | sed "s/\"\([^\"\\\\]\|\\\\.\)*\"//g; s/'[^']*'//g"; }   # no comments, no texts
 
 # Names. The list of words is quick and names each; then compilers prove it, the interface alone and with everything.
 check_hostile() {
     local words cc std text
     words=$(sed -n 's/^#define \([A-Za-z0-9_]*\).*/\1/p' tests/hostile.h | paste -sd'|')
-    offences names "$(code "$lib.h" | grep -owE "$words" | sort | uniq -c | awk '{ print $2, $1, "times" }')"
+    empty names "$(code "$lib.h" | grep -owE "$words" | sort | uniq -c | awk '{ print $2, $1, "times" }')"
     printf '#include "tests/hostile.h"\n#include "%s.h"\n' "$lib" >"$dir/macros.c"
     printf '#include <X11/Xlib.h>\n#include <X11/Xutil.h>\n#include "%s.h"\n' "$lib" >"$dir/x11.c"
     printf '#include <windows.h>\n#include "%s.h"\n' "$lib" >"$dir/windows.c"
@@ -41,7 +25,7 @@ check_hostile() {
             for mode in "" "$IMPL" "$IMPL $GL"; do
                 [ "$mode" != "$IMPL" ] || [ $cc = gcc ] || continue
                 text=$($cc $std -fsyntax-only -w $DEFS $mode 2>&1 | grep -F "$lib.h:" | grep error | head -3 | tr "\n" " ")
-                offences "$name" "${text:+$cc${mode:+ implementation}: $text}"
+                empty "$name" "${text:+$cc${mode:+ implementation}: $text}"
             done
         done
     done
@@ -52,7 +36,7 @@ check_stack() {
     local opt
     for opt in -O2; do
         ok "compiles $opt" gcc -std=c99 $opt -w -fstack-usage $DEFS -D${LIB}_IMPLEMENTATION= $GL -c "$dir/impl.c" -o "$dir/stack.o"
-        offences stack "$(awk -F'\t' '$2 > 32768 { sub(/.*:/, "", $1); print $1 " takes " $2 " bytes of stack" }' "$dir/stack.su")"
+        empty stack "$(awk -F'\t' '$2 > 32768 { sub(/.*:/, "", $1); print $1 " takes " $2 " bytes of stack" }' "$dir/stack.su")"
     done
 }
 
@@ -61,7 +45,7 @@ check_used() {
     local name
     ok "compiles" gcc -std=c99 -O0 -w $DEFS -D${LIB}_IMPLEMENTATION= $GL -c "$dir/impl.c" -o "$dir/used.o"
     cat tests/test_*.[ch] tests/use_*.c tests/bench/*.[ch]* examples/*.[ch] >"$dir/callers"
-    offences unused "$(nm -g --defined-only "$dir/used.o" | awk '$2 == "T" { print $3 }' | grep -v __ | while read -r name; do
+    empty unused "$(nm -g --defined-only "$dir/used.o" | awk '$2 == "T" { print $3 }' | grep -v __ | while read -r name; do
         grep -qwF "$name" "$dir/callers" || echo "$name is called by no test, example or bench"; done)"
 }
 
@@ -71,7 +55,7 @@ check_gl() {
     local name
     code sat.h >"$dir/gl.txt"
     for name in $family; do code "$name.h"; done >"$dir/gl_all.txt"
-    offences required "$(awk '/define SAT__GL_FUNCTIONS/ { on = 1 } on { print } on && !/\\$/ { exit }' sat.h | grep -oE 'X\([^,]*, *[A-Za-z0-9_]+' |
+    empty required "$(awk '/define SAT__GL_FUNCTIONS/ { on = 1 } on { print } on && !/\\$/ { exit }' sat.h | grep -oE 'X\([^,]*, *[A-Za-z0-9_]+' |
         sed 's/.*[ ,]//' | while read -r name; do grep -qE "(->|\.)$name\(" "$dir/gl_all.txt" || echo "$name is required and never called"; done)"
 }
 
@@ -110,14 +94,14 @@ check_comments() {
       echo 'static void same(const char *what, double row, double comment, const char *text) { if (!(row == comment)) printf("%s is %.9g in the table, %s in the comment\n", what, row, text); }'
       echo 'int main(void) {'; echo '    (void)fault; (void)same;'; cat "$dir/rows.txt"; echo '    return 0; }'; } >"$dir/comments.c"
     ok "comments compile" ${CC:-cc} -std=c99 -O0 -w $DEFS $GL "$dir/comments.c" -o "$dir/comments" $LIBS
-    offences comments "$("$dir/comments" | sed 's/^\([a-z_0-9.]*\)/\1/')"
+    empty comments "$("$dir/comments" | sed 's/^\([a-z_0-9.]*\)/\1/')"
 }
 
 # One shape in all six, over the prototypes: what a call changes comes first, the object and then the outputs; then what it reads; last
 # options and statistics. Statistics are X_stats, by X_get_stats or a last argument. Strings that callbacks get are nobody's business.
 check_shape() {
     printf '#include "%s.h"\n' "$lib" >"$dir/shape.c"
-    offences shape "$(${CC:-cc} -std=c99 -E -P $DEFS $GL "$dir/shape.c" | tr '\n' ' ' | sed 's/[;}]/&\n/g; s/  */ /g' | awk -v lib="$lib" '
+    empty shape "$(${CC:-cc} -std=c99 -E -P $DEFS $GL "$dir/shape.c" | tr '\n' ' ' | sed 's/[;}]/&\n/g; s/  */ /g' | awk -v lib="$lib" '
         /typedef struct [a-z_0-9]+ [a-z_0-9]+ *;/ { match($0, /struct [a-z_0-9]+/); opaque[substr($0, RSTART + 7, RLENGTH - 7)] = 1 }
         /^ *extern .*\(.*\) *;/ {
             s = $0; name = s; sub(/\(.*/, "", name); sub(/.*[ *]/, "", name)
@@ -135,7 +119,7 @@ check_shape() {
                 if (opaque[type] && a !~ /\*\*/ && i > 1) print name ": " a ", which changes, is not the first"
             }
         }')"
-    offences words "$(code "$lib.h" | grep -owE '[a-z_]*_(statistics|report)|vertical_fov|fov_vertical|[a-z_]*_?quantize[a-z]*|dt_seconds|near_distance|depth_range' | sort -u)"
+    empty words "$(code "$lib.h" | grep -owE '[a-z_]*_(statistics|report)|vertical_fov|fov_vertical|[a-z_]*_?quantize[a-z]*|dt_seconds|near_distance|depth_range' | sort -u)"
 }
 
 # The programs under USE in the first comment are C: each block of lines that are set in by seven blanks, in a function of its own
@@ -157,7 +141,7 @@ check_snippets() {
 # the mark of its section, in the same order, and no section has more than 700 lines.
 check_contents() {
     grep -q '^ *CONTENTS' "$lib.h" || { skip "there is no list of contents"; return; }
-    offences contents "$(awk '
+    empty contents "$(awk '
         /^ *CONTENTS/ { listing = 1; next }
         listing && /\*\// { listing = 0 }
         match($0, /^[ \/*-]*>> [A-Za-z][A-Za-z0-9 ,_-]*/) { # not the operator
@@ -180,7 +164,7 @@ check_null() {
     printf '#include "%s.h"\n' $family >"$dir/all.c"
     ${CC:-cc} -std=c99 -E -P $flags "$dir/all.c" | tr '\n' ' ' | sed 's/[;}]/&\n/g' | sed 's/  */ /g' | awk -f tests/null_arguments.awk >"$dir/null_arguments.h"
     ok "the table of calls compiles" ${CC:-cc} -std=c99 -O1 -w $flags tests/null_arguments.c -o "$dir/null" $LIBS
-    [ "$failed" = 0 ] && offences null "$("./$dir/null")"
+    [ "$failed" = 0 ] && empty null "$("./$dir/null")"
     rm -f core
 }
 

@@ -24,6 +24,12 @@
 #endif
 #endif
 
+/* Relative luminance of linear Rec. 709 colour under D65. */
+static inline float luminance_of(float red, float green, float blue)
+{
+    return 0.2126729f * red + 0.7151522f * green + 0.0721750f * blue;
+}
+
 /* ---- pictures */
 
 struct scene { const char *name; image picture; sat_image view; size_t n; };
@@ -164,7 +170,7 @@ static double *luminance_codes(const scene *s, const tonemap_options *options, t
     double *codes = metrics_alloc(s->n);
     tonemap *map;
     for (size_t i = 0; i < s->n; ++i)
-        plane[i] = sat__luminance(s->picture.pixels[3 * i], s->picture.pixels[3 * i + 1], s->picture.pixels[3 * i + 2]);
+        plane[i] = luminance_of(s->picture.pixels[3 * i], s->picture.pixels[3 * i + 1], s->picture.pixels[3 * i + 2]);
     grey.view = sat_image_f32(plane, s->picture.width, s->picture.height, 1);
     tonemap_create(&map, s->picture.width, s->picture.height, options);
     tonemap_apply_f32(map, linear, (ptrdiff_t)s->picture.width * 4, &grey.view, 0, stats);
@@ -378,7 +384,7 @@ static double *pfs_codes(scene *s)
     codes = metrics_alloc(s->n);
     for (size_t i = 0; i < s->n; ++i)
         codes[i] =
-            metrics_code((double)sat__luminance(out.pixels[3 * i], out.pixels[3 * i + 1], out.pixels[3 * i + 2]));
+            metrics_code((double)luminance_of(out.pixels[3 * i], out.pixels[3 * i + 1], out.pixels[3 * i + 2]));
     image_free(&out);
     return codes;
 }
