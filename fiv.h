@@ -4316,238 +4316,265 @@ extern "C" {
 static const char fiv__glsl_cube[] =
     "#ifndef FIV_GLSL\n"
     "#define FIV_GLSL\n"
-    "uniform highp sampler2DArray fiv_shells;\n"
-    "uniform highp sampler2D fiv_support, fiv_scene, fiv_diffuse;\n"
-    "uniform highp usampler2D fiv_maps;\n"
-    "uniform ivec4 fiv_counts;\n" /* instances, lights, columns of a depth map's field, face */
-    "uniform vec3 fiv_x, fiv_y, fiv_z;\n" /* columns of the environment's rotation */
-    "vec4 fiv_row(int instance, int texel) { return texelFetch(fiv_scene, ivec2(texel, instance), 0); }\n"
-    "vec3 fiv_corner(int face, int x, int y) {\n"
-    "    return texelFetch(fiv_diffuse, ivec2(x, face * (fiv_counts.w + 1) + y), 0).rgb;\n"
-    "}\n"
-    "vec3 fiv_total(vec3 normal) {\n"
-    "    vec3 d = vec3(dot(fiv_x, normal), dot(fiv_y, normal), dot(fiv_z, normal)), a = abs(d);\n"
-    "    int k = a.x >= a.y ? (a.x >= a.z ? 0 : 2) : (a.y >= a.z ? 1 : 2);\n"
-    "    bool back = d[k] < 0.0;\n"
-    "    vec2 p = k == 0 ? d.yz : k == 1 ? d.zx : d.xy;\n"
-    "    p = ((back ? p.yx : p) / a[k] + 1.0) * 0.5 * float(fiv_counts.w);\n"
-    "    ivec2 i = clamp(ivec2(p), 0, fiv_counts.w - 1);\n"
-    "    int face = 2 * k + (back ? 1 : 0);\n"
-    "    p -= vec2(i);\n"
-    "    return mix(mix(fiv_corner(face, i.x, i.y), fiv_corner(face, i.x + 1, i.y), p.x),\n"
-    "               mix(fiv_corner(face, i.x, i.y + 1), fiv_corner(face, i.x + 1, i.y + 1), p.x), p.y);\n"
-    "}\n"
-    "vec2 fiv_square(vec3 d) {\n"
-    "    vec2 p = d.xz / (abs(d.x) + abs(d.y) + abs(d.z));\n"
-    "    vec2 folded = (1.0 - abs(p.yx)) * vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);\n"
-    "    return d.y < 0.0 ? folded : p;\n"
-    "}\n"
-    "float fiv_reach(float slot, vec3 d) {\n"
-    "    vec2 p = (fiv_square(d) + 1.0) * 16.0 + 0.5;\n"
-    "    return textureLod(fiv_support, (p + vec2(0.0, 33.0 * slot)) / vec2(textureSize(fiv_support, 0)), 0.0).r;\n"
-    "}\n";
+    SAT__GLSL(
+        uniform highp sampler2DArray fiv_shells;
+        uniform highp sampler2D fiv_support, fiv_scene, fiv_diffuse;
+        uniform highp usampler2D fiv_maps;
+        uniform ivec4 fiv_counts; /* instances, lights, columns of a depth map's field, face */
+        uniform vec3 fiv_x, fiv_y, fiv_z; /* columns of the environment's rotation */
+        vec4 fiv_row(int instance, int texel) { return texelFetch(fiv_scene, ivec2(texel, instance), 0); })
+    SAT__GLSL(
+        vec3 fiv_corner(int face, int x, int y) {
+            return texelFetch(fiv_diffuse, ivec2(x, face * (fiv_counts.w + 1) + y), 0).rgb;
+        })
+    SAT__GLSL(
+        vec3 fiv_total(vec3 normal) {
+            vec3 d = vec3(dot(fiv_x, normal), dot(fiv_y, normal), dot(fiv_z, normal)), a = abs(d);
+            int k = a.x >= a.y ? (a.x >= a.z ? 0 : 2) : (a.y >= a.z ? 1 : 2);
+            bool back = d[k] < 0.0;
+            vec2 p = k == 0 ? d.yz : k == 1 ? d.zx : d.xy;
+            p = ((back ? p.yx : p) / a[k] + 1.0) * 0.5 * float(fiv_counts.w);
+            ivec2 i = clamp(ivec2(p), 0, fiv_counts.w - 1);
+            int face = 2 * k + (back ? 1 : 0);
+            p -= vec2(i);
+            return mix(mix(fiv_corner(face, i.x, i.y), fiv_corner(face, i.x + 1, i.y), p.x),
+                       mix(fiv_corner(face, i.x, i.y + 1), fiv_corner(face, i.x + 1, i.y + 1), p.x), p.y);
+        })
+    SAT__GLSL(
+        vec2 fiv_square(vec3 d) {
+            vec2 p = d.xz / (abs(d.x) + abs(d.y) + abs(d.z));
+            vec2 folded = (1.0 - abs(p.yx)) * vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);
+            return d.y < 0.0 ? folded : p;
+        })
+    SAT__GLSL(
+        float fiv_reach(float slot, vec3 d) {
+            vec2 p = (fiv_square(d) + 1.0) * 16.0 + 0.5;
+            return textureLod(fiv_support, (p + vec2(0.0, 33.0 * slot)) / vec2(textureSize(fiv_support, 0)), 0.0).r;
+        });
 
 /* The cell around an offset, as fiv__locate has it, and the sums over its eight samples. */
 static const char fiv__glsl_cell[] =
-    "struct fiv_cell {\n"
-    "    vec3 at;\n" /* column, row, layer of the inner four samples */
-    "    float rows, r, part;\n"
-    "    vec2 shell;\n"
-    "};\n"
-    "struct fiv_sum { mat3 v; float angle, total, inside; };\n"
-    "vec3 fiv_own(int instance, vec3 v) {\n"
-    "    return fiv_row(instance, 1).xyz * v.x + fiv_row(instance, 2).xyz * v.y + fiv_row(instance, 3).xyz * v.z;\n"
-    "}\n"
-    "fiv_cell fiv_locate(int instance, vec3 d) {\n"
-    "    vec4 grid = fiv_row(instance, 4), shells = fiv_row(instance, 5);\n"
-    "    bool octahedral = fiv_row(instance, 2).w > 0.5;\n"
-    "    fiv_cell c;\n"
-    "    c.rows = grid.y;\n"
-    "    c.r = max(length(d), shells.x);\n"
-    "    float f = clamp((log2(c.r) - grid.w) * shells.y, 0.0, grid.z - 1.0), k = min(floor(f), grid.z - 2.0);\n"
-    "    vec2 p = octahedral ? (fiv_square(d) + 1.0) * 0.5 * (grid.xy - 1.0)\n"
-    "        : vec2(atan(d.z, d.x == 0.0 && d.z == 0.0 ? 1.0 : d.x) * 0.159154943 * grid.x,\n"
-    "               atan(length(d.xz), d == vec3(0.0) ? 1.0 : d.y) * 0.318309886 * (grid.y - 1.0));\n"
-    "    if (p.x < 0.0) p.x += grid.x;\n"
-    "    c.at = vec3(p, fiv_row(instance, 1).w + k);\n"
-    "    c.part = f - k;\n"
-    "    c.shell = exp2(grid.w + (k + vec2(0.0, 1.0)) / shells.y);\n"
-    "    return c;\n"
-    "}\n"
-    "vec4 fiv_shell(fiv_cell c, float field, float shell) {\n"
-    "    vec2 p = (c.at.xy + vec2(0.5, 0.5 + field * c.rows)) / vec2(textureSize(fiv_shells, 0).xy);\n"
-    "    return textureLod(fiv_shells, vec3(p, c.at.z + shell), 0.0);\n"
-    "}\n"
-    "fiv_sum fiv_gather(int instance, fiv_cell c, vec2 scale) {\n"
-    "    vec4 e = fiv_shell(c, 2.0, 0.0), f = fiv_shell(c, 2.0, 1.0);\n"
-    "    float unit = fiv_row(instance, 5).z;\n"
-    "    scale *= vec2(1.0 - c.part, c.part);\n"
-    "    vec4 a = scale.x * fiv_shell(c, 0.0, 0.0) + scale.y * fiv_shell(c, 0.0, 1.0);\n"
-    "    vec4 b = scale.x * fiv_shell(c, 1.0, 0.0) + scale.y * fiv_shell(c, 1.0, 1.0);\n"
-    "    vec2 g = scale.x * e.xy + scale.y * f.xy, h = mix(e.zw, f.zw, c.part);\n"
-    "    return fiv_sum(unit * mat3(a.xyz, vec3(a.w, b.xy), vec3(b.zw, g.x)), g.y, h.x, h.y);\n"
-    "}\n";
+    SAT__GLSL(
+        struct fiv_cell {
+            vec3 at; /* column, row, layer of the inner four samples */
+            float rows, r, part;
+            vec2 shell;
+        };)
+    SAT__GLSL(
+        struct fiv_sum { mat3 v; float angle, total, inside; };
+        vec3 fiv_own(int instance, vec3 v) {
+            return fiv_row(instance, 1).xyz * v.x + fiv_row(instance, 2).xyz * v.y + fiv_row(instance, 3).xyz * v.z;
+        })
+    SAT__GLSL(
+        fiv_cell fiv_locate(int instance, vec3 d) {
+            vec4 grid = fiv_row(instance, 4), shells = fiv_row(instance, 5);
+            bool octahedral = fiv_row(instance, 2).w > 0.5;
+            fiv_cell c;
+            c.rows = grid.y;
+            c.r = max(length(d), shells.x);
+            float f = clamp((log2(c.r) - grid.w) * shells.y, 0.0, grid.z - 1.0), k = min(floor(f), grid.z - 2.0);
+            vec2 p = octahedral ? (fiv_square(d) + 1.0) * 0.5 * (grid.xy - 1.0)
+                : vec2(atan(d.z, d.x == 0.0 && d.z == 0.0 ? 1.0 : d.x) * 0.159154943 * grid.x,
+                       atan(length(d.xz), d == vec3(0.0) ? 1.0 : d.y) * 0.318309886 * (grid.y - 1.0));
+            if (p.x < 0.0) p.x += grid.x;
+            c.at = vec3(p, fiv_row(instance, 1).w + k);
+            c.part = f - k;
+            c.shell = exp2(grid.w + (k + vec2(0.0, 1.0)) / shells.y);
+            return c;
+        })
+    SAT__GLSL(
+        vec4 fiv_shell(fiv_cell c, float field, float shell) {
+            vec2 p = (c.at.xy + vec2(0.5, 0.5 + field * c.rows)) / vec2(textureSize(fiv_shells, 0).xy);
+            return textureLod(fiv_shells, vec3(p, c.at.z + shell), 0.0);
+        })
+    SAT__GLSL(
+        fiv_sum fiv_gather(int instance, fiv_cell c, vec2 scale) {
+            vec4 e = fiv_shell(c, 2.0, 0.0), f = fiv_shell(c, 2.0, 1.0);
+            float unit = fiv_row(instance, 5).z;
+            scale *= vec2(1.0 - c.part, c.part);
+            vec4 a = scale.x * fiv_shell(c, 0.0, 0.0) + scale.y * fiv_shell(c, 0.0, 1.0);
+            vec4 b = scale.x * fiv_shell(c, 1.0, 0.0) + scale.y * fiv_shell(c, 1.0, 1.0);
+            vec2 g = scale.x * e.xy + scale.y * f.xy, h = mix(e.zw, f.zw, c.part);
+            return fiv_sum(unit * mat3(a.xyz, vec3(a.w, b.xy), vec3(b.zw, g.x)), g.y, h.x, h.y);
+        });
 
 /* What one occluder takes, and its solid angle in w; what is left of the light on its own surface (eq 13). */
 static const char fiv__glsl_occluder[] =
-    "float fiv_cap(float c, float h) {\n"
-    "    float s = 1.0 - h * h;\n"
-    "    if (c * c >= s) return max(c, 0.0);\n"
-    "    float w = sqrt(1.0 - c * c), x = h / sqrt(s), y = clamp(-x * c / w, -1.0, 1.0), q = sqrt(1.0 - y * y);\n"
-    "    return ((c * acos(y) - x * w * q) * s + atan(w * q / x)) / (3.14159265 * s);\n"
-    "}\n"
-    "vec3 fiv_shade(mat3 v, float angle, vec3 n, float cut) {\n"
-    "    vec3 along = n * v;\n"
-    "    float h = clamp(1.0 - angle * 0.159154943, 0.01, 0.999999);\n"
-    "    for (int k = 0; k < 3; k++) {\n"
-    "        float size = length(v[k]);\n"
-    "        if (cut > 0.0 && size > 0.0) along[k] = mix(along[k], size * fiv_cap(along[k] / size, h), min(4.0 * cut, 1.0));\n"
-    "    }\n"
-    "    return max(along, 0.0);\n"
-    "}\n"
-    "vec4 fiv_occluder(int instance, vec3 d, vec3 n, float cut) {\n"
-    "    fiv_cell c = fiv_locate(instance, d);\n"
-    "    fiv_sum s = fiv_gather(instance, c, vec2(1.0));\n"
-    "    if (!(s.total > 1e-3)) return s.inside > 0.5 ? vec4(1e30, 1e30, 1e30, 0.0) : vec4(0.0);\n"
-    "    float scale = 1.0 / (s.total * c.r * c.r);\n"
-    "    return vec4(fiv_shade(s.v * scale, s.angle * scale, n, cut), s.angle * scale);\n"
-    "}\n"
+    SAT__GLSL(
+        float fiv_cap(float c, float h) {
+            float s = 1.0 - h * h;
+            if (c * c >= s) return max(c, 0.0);
+            float w = sqrt(1.0 - c * c), x = h / sqrt(s), y = clamp(-x * c / w, -1.0, 1.0), q = sqrt(1.0 - y * y);
+            return ((c * acos(y) - x * w * q) * s + atan(w * q / x)) / (3.14159265 * s);
+        })
+    SAT__GLSL(
+        vec3 fiv_shade(mat3 v, float angle, vec3 n, float cut) {
+            vec3 along = n * v;
+            float h = clamp(1.0 - angle * 0.159154943, 0.01, 0.999999);
+            for (int k = 0; k < 3; k++) {
+                float size = length(v[k]);
+                if (cut > 0.0 && size > 0.0) along[k] = mix(along[k], size * fiv_cap(along[k] / size, h),
+                    min(4.0 * cut, 1.0));
+            }
+            return max(along, 0.0);
+        })
+    SAT__GLSL(
+        vec4 fiv_occluder(int instance, vec3 d, vec3 n, float cut) {
+            fiv_cell c = fiv_locate(instance, d);
+            fiv_sum s = fiv_gather(instance, c, vec2(1.0));
+            if (!(s.total > 1e-3)) return s.inside > 0.5 ? vec4(1e30, 1e30, 1e30, 0.0) : vec4(0.0);
+            float scale = 1.0 / (s.total * c.r * c.r);
+            return vec4(fiv_shade(s.v * scale, s.angle * scale, n, cut), s.angle * scale);
+        })
 #ifndef FIV_NO_SELF
-    "vec3 fiv_self(int self, vec3 d, vec3 n) {\n"
-    "    fiv_cell c;\n"
-    "    float out_by = 0.0;\n"
-    "    for (int k = 0; k < 6; k++) {\n"
-    "        c = fiv_locate(self, d - out_by * n);\n"
-    "        if (mix(fiv_shell(c, 2.0, 0.0).z, fiv_shell(c, 2.0, 1.0).z, c.part) > 0.25) break;\n"
-    "        out_by = max(2.0 * out_by, 0.05);\n"
-    "    }\n"
-    "    fiv_sum s = fiv_gather(self, c, 1.0 / (c.shell * c.shell));\n"
-    "    if (!(s.total > 1e-3)) return vec3(0.0);\n"
-    "    mat3 open = mat3(fiv_row(self, 6).xyz, fiv_row(self, 7).xyz, fiv_row(self, 8).xyz) - s.v / s.total;\n"
-    "    return fiv_shade(open, 12.5663706 - s.angle / s.total, n, 1.0);\n"
-    "}\n"
+    SAT__GLSL(
+        vec3 fiv_self(int self, vec3 d, vec3 n) {
+            fiv_cell c;
+            float out_by = 0.0;
+            for (int k = 0; k < 6; k++) {
+                c = fiv_locate(self, d - out_by * n);
+                if (mix(fiv_shell(c, 2.0, 0.0).z, fiv_shell(c, 2.0, 1.0).z, c.part) > 0.25) break;
+                out_by = max(2.0 * out_by, 0.05);
+            }
+            fiv_sum s = fiv_gather(self, c, 1.0 / (c.shell * c.shell));
+            if (!(s.total > 1e-3)) return vec3(0.0);
+            mat3 open = mat3(fiv_row(self, 6).xyz, fiv_row(self, 7).xyz, fiv_row(self, 8).xyz) - s.v / s.total;
+            return fiv_shade(open, 12.5663706 - s.angle / s.total, n, 1.0);
+        })
 #endif
     ;
 
 #ifndef FIV_NO_DELTA
 /* Split-off lights, as fiv__cover_light has them without rays. */
 static const char fiv__glsl_lights[] =
-    "struct fiv_seen { ivec2 cell; int side; vec2 at; float z, scale; };\n"
-    "float fiv_beyond(fiv_seen s, ivec2 p) {\n"
-    "    if (p.x < 0 || p.y < 0 || p.x >= s.side || p.y >= s.side) return -1.0;\n"
-    "    int word = int(texelFetch(fiv_maps, s.cell + p, 0).r);\n"
-    "    return word > 0 ? float(word - 1) / 32767.0 - 1.0 - s.z : -1.0;\n"
-    "}\n"
-    "float fiv_compare(fiv_seen s, vec2 at) {\n"
-    "    ivec2 i = ivec2(floor(at));\n"
-    "    vec2 f = at - vec2(i);\n"
-    "    float least = 0.25 / s.scale;\n"
-    "    vec2 low = vec2(fiv_beyond(s, i) > least, fiv_beyond(s, i + ivec2(1, 0)) > least);\n"
-    "    vec2 high = vec2(fiv_beyond(s, i + ivec2(0, 1)) > least, fiv_beyond(s, i + ivec2(1, 1)) > least);\n"
-    "    low = mix(low, high, f.y);\n"
-    "    return mix(low.x, low.y, f.x);\n"
-    "}\n"
-    "vec2 fiv_disc(fiv_seen s, float radius, bool search) {\n"
-    "    int n = clamp(int((search ? 0.35 : 0.75) * radius) + 3, 4, 12);\n"
-    "    float covered = 0.0, count = 0.0, sum = 0.0;\n"
-    "    for (int j = 0; j < n; j++) for (int i = 0; i < n; i++) {\n"
-    "        vec2 u = (vec2(i, j) + 0.5) * (2.0 / float(n)) - 1.0, at = s.at + radius * u;\n"
-    "        if (dot(u, u) > 1.0) continue;\n"
-    "        count++;\n"
-    "        if (search) {\n"
-    "            float beyond = fiv_beyond(s, ivec2(floor(at + 0.5)));\n"
-    "            if (beyond > 0.25 / s.scale) { sum += beyond; covered++; }\n"
-    "        } else covered += fiv_compare(s, at);\n"
-    "    }\n"
-    "    return vec2(covered / count, covered > 0.0 ? sum / covered : 0.0);\n"
-    "}\n"
-    "float fiv_cover(int instance, int light, vec3 d, float tangent) {\n"
-    "    fiv_seen s;\n"
-    "    int slot = int(fiv_row(instance, 3).w), cells = int(fiv_row(instance, 7).w), side = fiv_counts.z;\n"
-    "    s.side = int(fiv_row(instance, 6).w);\n"
-    "    s.z = -dot(d, fiv_row(instance, 16 + 3 * light + 2).xyz);\n"
-    "    if (s.z >= 1.0) return 0.0;\n"
-    "    s.scale = fiv_row(instance, 5).w;\n"
-    "    s.cell = ivec2(slot & 3, slot >> 2) * side + ivec2(light % cells, light / cells) * s.side;\n"
-    "    float shift = 0.5 * float(s.side) - 0.5, reach = tangent * (1.0 - s.z) * s.scale;\n"
-    "    s.at = shift - s.scale * vec2(dot(d, fiv_row(instance, 16 + 3 * light).xyz), dot(d, fiv_row(instance, 17 + 3 * light).xyz));\n"
-    "    if (any(greaterThanEqual(abs(s.at - shift), vec2(s.scale + reach + 2.0)))) return 0.0;\n"
-    "    if (reach > 1.0) {\n"
-    "        vec2 found = fiv_disc(s, reach, true);\n"
-    "        if (found.x == 0.0 || found.x == 1.0) return found.x;\n"
-    "        reach = tangent * found.y * s.scale;\n"
-    "        if (reach > 1.0) return fiv_disc(s, reach, false).x;\n"
-    "    }\n"
-    "    return fiv_compare(s, s.at);\n"
-    "}\n";
+    SAT__GLSL(
+        struct fiv_seen { ivec2 cell; int side; vec2 at; float z, scale; };
+        float fiv_beyond(fiv_seen s, ivec2 p) {
+            if (p.x < 0 || p.y < 0 || p.x >= s.side || p.y >= s.side) return -1.0;
+            int word = int(texelFetch(fiv_maps, s.cell + p, 0).r);
+            return word > 0 ? float(word - 1) / 32767.0 - 1.0 - s.z : -1.0;
+        })
+    SAT__GLSL(
+        float fiv_compare(fiv_seen s, vec2 at) {
+            ivec2 i = ivec2(floor(at));
+            vec2 f = at - vec2(i);
+            float least = 0.25 / s.scale;
+            vec2 low = vec2(fiv_beyond(s, i) > least, fiv_beyond(s, i + ivec2(1, 0)) > least);
+            vec2 high = vec2(fiv_beyond(s, i + ivec2(0, 1)) > least, fiv_beyond(s, i + ivec2(1, 1)) > least);
+            low = mix(low, high, f.y);
+            return mix(low.x, low.y, f.x);
+        })
+    SAT__GLSL(
+        vec2 fiv_disc(fiv_seen s, float radius, bool search) {
+            int n = clamp(int((search ? 0.35 : 0.75) * radius) + 3, 4, 12);
+            float covered = 0.0, count = 0.0, sum = 0.0;
+            for (int j = 0; j < n; j++) for (int i = 0; i < n; i++) {
+                vec2 u = (vec2(i, j) + 0.5) * (2.0 / float(n)) - 1.0, at = s.at + radius * u;
+                if (dot(u, u) > 1.0) continue;
+                count++;
+                if (search) {
+                    float beyond = fiv_beyond(s, ivec2(floor(at + 0.5)));
+                    if (beyond > 0.25 / s.scale) { sum += beyond; covered++; }
+                } else covered += fiv_compare(s, at);
+            }
+            return vec2(covered / count, covered > 0.0 ? sum / covered : 0.0);
+        })
+    SAT__GLSL(
+        float fiv_cover(int instance, int light, vec3 d, float tangent) {
+            fiv_seen s;
+            int slot = int(fiv_row(instance, 3).w), cells = int(fiv_row(instance, 7).w), side = fiv_counts.z;
+            s.side = int(fiv_row(instance, 6).w);
+            s.z = -dot(d, fiv_row(instance, 16 + 3 * light + 2).xyz);
+            if (s.z >= 1.0) return 0.0;
+            s.scale = fiv_row(instance, 5).w;
+            s.cell = ivec2(slot & 3, slot >> 2) * side + ivec2(light % cells, light / cells) * s.side;
+            float shift = 0.5 * float(s.side) - 0.5, reach = tangent * (1.0 - s.z) * s.scale;
+            s.at = shift - s.scale * vec2(dot(d, fiv_row(instance, 16 + 3 * light).xyz),
+                dot(d, fiv_row(instance, 17 + 3 * light).xyz));
+            if (any(greaterThanEqual(abs(s.at - shift), vec2(s.scale + reach + 2.0)))) return 0.0;
+            if (reach > 1.0) {
+                vec2 found = fiv_disc(s, reach, true);
+                if (found.x == 0.0 || found.x == 1.0) return found.x;
+                reach = tangent * found.y * s.scale;
+                if (reach > 1.0) return fiv_disc(s, reach, false).x;
+            }
+            return fiv_compare(s, s.at);
+        });
 #endif
 
 static const char fiv__glsl_receiver[] =
-    "float fiv_lens(float r, float s, float d) {\n"
-    "    if (d >= r + s) return 0.0;\n"
-    "    if (d <= abs(r - s)) return 3.14159265 * min(r, s) * min(r, s);\n"
-    "    float a = acos(clamp((d * d + r * r - s * s) / (2.0 * d * r), -1.0, 1.0));\n"
-    "    float b = acos(clamp((d * d + s * s - r * r) / (2.0 * d * s), -1.0, 1.0));\n"
-    "    return r * r * (a - 0.5 * sin(2.0 * a)) + s * s * (b - 0.5 * sin(2.0 * b));\n"
-    "}\n"
-    "bool fiv_place(int instance, vec3 point, out vec3 world) {\n"
-    "    vec4 place = fiv_row(instance, 0);\n"
-    "    world = (place.xyz - point) * place.w;\n"
-    "    return place.w > 0.0 && length(world) < 1e9;\n"
-    "}\n"
-    "vec3 fiv_receive(int self, vec3 point, vec3 normal) {\n"
-    "    if (!(dot(normal, normal) > 0.0)) return vec3(0.0);\n"
-    "    normal = normalize(normal);\n"
-    "    vec3 open = fiv_total(normal), sum = vec3(0.0), shared_sum = vec3(0.0), largest = vec3(0.0), world;\n"
-    "    vec4 discs[FIV_INSTANCES];\n"
-    "    vec3 takes[FIV_INSTANCES];\n"
-    "    int count = 0;\n"
-    "    for (int i = 0; i < FIV_INSTANCES; i++) {\n"
-    "        if (i >= fiv_counts.x) break;\n"
-    "        if (i == self || !fiv_place(i, point, world)) continue;\n"
-    "        vec3 n = fiv_own(i, normal);\n"
-    "        float height = dot(world, normal), cut = 0.0;\n"
-    "        if (height <= -1.0) continue;\n"
-    "        if (height < 1.0) {\n"
-    "            float slot = fiv_row(i, 3).w, below = fiv_reach(slot, -n), above = fiv_reach(slot, n);\n"
-    "            if (height <= -above) continue;\n"
-    "            if (height < below - 1e-4) cut = (below - height) / (below + above);\n"
-    "        }\n"
-    "        vec4 taken = fiv_occluder(i, fiv_own(i, world), n, cut);\n"
-    "        vec3 own = min(taken.rgb, open);\n"
-    "        discs[count] = vec4(world / max(length(world), 1e-30), sqrt(taken.w * 0.318309886));\n"
-    "        takes[count] = own;\n"
-    "        sum += own;\n"
-    "        largest = max(largest, own);\n"
-    "        for (int j = 0; j < count; j++) {\n"
-    "            float area = fiv_lens(discs[j].w, discs[count].w, length(discs[j].xyz - discs[count].xyz)), less = min(discs[j].w, discs[count].w);\n"
-    "            if (area > 0.0) shared_sum += area / (3.14159265 * less * less) * min(takes[j], own);\n"
-    "        }\n"
-    "        count++;\n"
-    "    }\n"
-    "    vec3 result = clamp(open - max(sum - shared_sum, largest), vec3(0.0), open);\n"
+    SAT__GLSL(
+        float fiv_lens(float r, float s, float d) {
+            if (d >= r + s) return 0.0;
+            if (d <= abs(r - s)) return 3.14159265 * min(r, s) * min(r, s);
+            float a = acos(clamp((d * d + r * r - s * s) / (2.0 * d * r), -1.0, 1.0));
+            float b = acos(clamp((d * d + s * s - r * r) / (2.0 * d * s), -1.0, 1.0));
+            return r * r * (a - 0.5 * sin(2.0 * a)) + s * s * (b - 0.5 * sin(2.0 * b));
+        })
+    SAT__GLSL(
+        bool fiv_place(int instance, vec3 point, out vec3 world) {
+            vec4 place = fiv_row(instance, 0);
+            world = (place.xyz - point) * place.w;
+            return place.w > 0.0 && length(world) < 1e9;
+        })
+    SAT__GLSL(
+        vec3 fiv_receive(int self, vec3 point, vec3 normal) {
+            if (!(dot(normal, normal) > 0.0)) return vec3(0.0);
+            normal = normalize(normal);
+            vec3 open = fiv_total(normal), sum = vec3(0.0), shared_sum = vec3(0.0), largest = vec3(0.0), world;
+            vec4 discs[FIV_INSTANCES];
+            vec3 takes[FIV_INSTANCES];
+            int count = 0;
+            for (int i = 0; i < FIV_INSTANCES; i++) {
+                if (i >= fiv_counts.x) break;
+                if (i == self || !fiv_place(i, point, world)) continue;
+                vec3 n = fiv_own(i, normal);
+                float height = dot(world, normal), cut = 0.0;
+                if (height <= -1.0) continue;
+                if (height < 1.0) {
+                    float slot = fiv_row(i, 3).w, below = fiv_reach(slot, -n), above = fiv_reach(slot, n);
+                    if (height <= -above) continue;
+                    if (height < below - 1e-4) cut = (below - height) / (below + above);
+                }
+                vec4 taken = fiv_occluder(i, fiv_own(i, world), n, cut);
+                vec3 own = min(taken.rgb, open);
+                discs[count] = vec4(world / max(length(world), 1e-30), sqrt(taken.w * 0.318309886));
+                takes[count] = own;
+                sum += own;
+                largest = max(largest, own);
+                for (int j = 0; j < count; j++) {
+                    float area = fiv_lens(discs[j].w, discs[count].w, length(discs[j].xyz - discs[count].xyz)),
+                        less = min(discs[j].w, discs[count].w);
+                    if (area > 0.0) shared_sum += area / (3.14159265 * less * less) * min(takes[j], own);
+                }
+                count++;
+            }
+            vec3 result = clamp(open - max(sum - shared_sum, largest), vec3(0.0), open);)
 #ifndef FIV_NO_SELF
-    "    if (self >= 0 && self < fiv_counts.x && fiv_place(self, point, world))\n"
-    "        result *= min(fiv_self(self, fiv_own(self, world), fiv_own(self, normal)) / max(open, 1e-30), 1.0);\n"
+    SAT__GLSL(
+            if (self >= 0 && self < fiv_counts.x && fiv_place(self, point, world))
+                result *= min(fiv_self(self, fiv_own(self, world), fiv_own(self, normal)) / max(open, 1e-30), 1.0);)
 #endif
 #ifndef FIV_NO_DELTA
-    "    for (int k = 0; k < fiv_counts.y; k++) {\n"
-    "        vec4 direction = fiv_row(FIV_INSTANCES, 2 * k);\n"
-    "        float cosine = dot(normal, direction.xyz), cover = 0.0;\n"
-    "        for (int i = 0; i < FIV_INSTANCES && cosine > 0.0; i++) {\n"
-    "            if (i >= fiv_counts.x) break;\n"
-    "            if (!fiv_place(i, point, world) || (i != self && dot(world, normal) <= -1.0)) continue;\n"
-    "            if (i == self) world -= normal * (2.0 / fiv_row(i, 5).w);\n"
-    "            cover = max(cover, fiv_cover(i, k, fiv_own(i, world), direction.w));\n"
-    "        }\n"
-    "        result += fiv_row(FIV_INSTANCES, 2 * k + 1).rgb * max(cosine, 0.0) * (1.0 - cover);\n"
-    "    }\n"
+    SAT__GLSL(
+            for (int k = 0; k < fiv_counts.y; k++) {
+                vec4 direction = fiv_row(FIV_INSTANCES, 2 * k);
+                float cosine = dot(normal, direction.xyz), cover = 0.0;
+                for (int i = 0; i < FIV_INSTANCES && cosine > 0.0; i++) {
+                    if (i >= fiv_counts.x) break;
+                    if (!fiv_place(i, point, world) || (i != self && dot(world, normal) <= -1.0)) continue;
+                    if (i == self) world -= normal * (2.0 / fiv_row(i, 5).w);
+                    cover = max(cover, fiv_cover(i, k, fiv_own(i, world), direction.w));
+                }
+                result += fiv_row(FIV_INSTANCES, 2 * k + 1).rgb * max(cosine, 0.0) * (1.0 - cover);
+            })
 #endif
-    "    return result;\n"
-    "}\n"
-    "vec3 fiv_irradiance(vec3 point, vec3 normal) { return fiv_receive(-1, point, normal); }\n"
+    SAT__GLSL(
+            return result;
+        })
+    SAT__GLSL(vec3 fiv_irradiance(vec3 point, vec3 normal) { return fiv_receive(-1, point, normal); })
 #ifndef FIV_NO_SELF
-    "vec3 fiv_self_irradiance(int self, vec3 point, vec3 normal) { return fiv_receive(self, point, normal); }\n"
+    SAT__GLSL(vec3 fiv_self_irradiance(int self, vec3 point, vec3 normal) { return fiv_receive(self, point, normal); })
 #endif
     "#endif\n";
 
@@ -4560,24 +4587,26 @@ static const char *const fiv__glsl[] = {fiv__glsl_cube, fiv__glsl_cell, fiv__gls
 FIV_DEF const char *const *fiv_gl_glsl(void) { return fiv__glsl; }
 
 static const char fiv__glsl_main[] =
-    "uniform highp sampler2D fiv_points, fiv_normals;\n"
-    "uniform vec4 fiv_world[4];\n"
-    "uniform vec3 fiv_turn[3], fiv_depth;\n" /* fiv_depth: 2 / size; 0 points, 1 depth in [-1,1], 2 in [0,1] */
-    "out vec4 value;\n"
-    "void main() {\n"
-    "    ivec2 p = sat_pixel();\n"
-    "    vec4 point = texelFetch(fiv_points, p, 0), normal = texelFetch(fiv_normals, p, 0);\n"
-    "    float on = point.w;\n"
-    "    if (fiv_depth.z > 0.5) {\n"
-    "        vec3 clip = vec3((vec2(p) + 0.5) * fiv_depth.xy - 1.0, fiv_depth.z > 1.5 ? point.x : 2.0 * point.x - 1.0);\n"
-    "        point = fiv_world[0] * clip.x + fiv_world[1] * clip.y + fiv_world[2] * clip.z + fiv_world[3];\n"
-    "        point.xyz /= point.w;\n"
-    "        on = normal.w;\n"
-    "        normal.xyz = fiv_turn[0] * normal.x + fiv_turn[1] * normal.y + fiv_turn[2] * normal.z;\n"
-    "    }\n"
-    "    int self = FIV_SELF != 0 && on >= 2.0 && on < 66.0 ? int(on) - 2 : -1;\n"
-    "    value = vec4(fiv_receive(self, point.xyz, normal.xyz), 1.0);\n"
-    "}\n";
+    SAT__GLSL(
+        uniform highp sampler2D fiv_points, fiv_normals;
+        uniform vec4 fiv_world[4];
+        uniform vec3 fiv_turn[3], fiv_depth; /* fiv_depth: 2 / size; 0 points, 1 depth in [-1,1], 2 in [0,1] */
+        out vec4 value;
+        void main() {
+            ivec2 p = sat_pixel();
+            vec4 point = texelFetch(fiv_points, p, 0), normal = texelFetch(fiv_normals, p, 0);
+            float on = point.w;
+            if (fiv_depth.z > 0.5) {
+                vec3 clip = vec3((vec2(p) + 0.5) * fiv_depth.xy - 1.0,
+                    fiv_depth.z > 1.5 ? point.x : 2.0 * point.x - 1.0);
+                point = fiv_world[0] * clip.x + fiv_world[1] * clip.y + fiv_world[2] * clip.z + fiv_world[3];
+                point.xyz /= point.w;
+                on = normal.w;
+                normal.xyz = fiv_turn[0] * normal.x + fiv_turn[1] * normal.y + fiv_turn[2] * normal.z;
+            }
+            int self = FIV_SELF != 0 && on >= 2.0 && on < 66.0 ? int(on) - 2 : -1;
+            value = vec4(fiv_receive(self, point.xyz, normal.xyz), 1.0);
+        });
 
 /* >> opengl   ---- objects, scenes, passes */
 

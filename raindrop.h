@@ -4079,26 +4079,31 @@ RAINDROP_DEF const char *raindrop_gl_glsl(void)
 {
     return "#ifndef RAINDROP_GLSL\n"
            "#define RAINDROP_GLSL\n"
-           "struct raindrop_ray { vec3 reflected, refracted; float fresnel, transmit, footprint; vec2 polarised, turn; };\n"
-           "void raindrop_surface(inout raindrop_ray ray, float ci, float cr, float n, bool total) {\n"
-           "    float a = (ci - n * cr) / (ci + n * cr + 1e-12), c = (n * ci - cr) / (n * ci + cr + 1e-12);\n"
-           "    float b2 = 1.0 - ci * ci, cd = ci * cr + b2 / n, sd = cr - ci / n;\n"
-           "    vec2 f = total ? vec2(1.0) : vec2(a * a, c * c), enter = 1.0 - f;\n"
-           "    ray.turn = vec2(1.0 - 2.0 * b2 * sd * sd, 2.0 * sd * cd);\n"
-           "    ray.polarised = f;\n"
-           "    ray.fresnel = 0.5 * (f.x + f.y);\n"
-           "    ray.transmit = 0.5 * dot(enter, enter);\n"
-           "    ray.footprint = total ? 2.0 : sqrt(abs(2.0 * (1.0 / (ci + 1e-6) - 1.0 / (n * cr + 1e-6)) * ray.turn.y));\n"
-           "}\n"
-           "raindrop_ray raindrop_trace(vec3 d, vec3 p, float one_minus_b2, float n) {\n"
-           "    raindrop_ray ray;\n"
-           "    float m = clamp(one_minus_b2, 0.0, 1.0), b2 = 1.0 - m, inside = (m + (n - 1.0) * (n + 1.0)) / (n * n);\n"
-           "    bool total = inside <= 0.0 && n < 1.0;\n"
-           "    raindrop_surface(ray, sqrt(m), sqrt(max(inside, 0.0)), n, total);\n"
-           "    ray.reflected = (2.0 * b2 - 1.0) * d + 2.0 * sqrt(m) * p;\n"
-           "    ray.refracted = total ? ray.reflected : ray.turn.x * d - ray.turn.y * p;\n"
-           "    return ray;\n"
-           "}\n"
+           SAT__GLSL(
+               struct raindrop_ray { vec3 reflected, refracted; float fresnel, transmit, footprint; vec2 polarised,
+                   turn; };
+               void raindrop_surface(inout raindrop_ray ray, float ci, float cr, float n, bool total) {
+                   float a = (ci - n * cr) / (ci + n * cr + 1e-12), c = (n * ci - cr) / (n * ci + cr + 1e-12);
+                   float b2 = 1.0 - ci * ci, cd = ci * cr + b2 / n, sd = cr - ci / n;
+                   vec2 f = total ? vec2(1.0) : vec2(a * a, c * c), enter = 1.0 - f;
+                   ray.turn = vec2(1.0 - 2.0 * b2 * sd * sd, 2.0 * sd * cd);
+                   ray.polarised = f;
+                   ray.fresnel = 0.5 * (f.x + f.y);
+                   ray.transmit = 0.5 * dot(enter, enter);
+                   ray.footprint = total ? 2.0 : sqrt(abs(2.0 * (1.0 / (ci + 1e-6) - 1.0 / (n * cr + 1e-6))
+                       * ray.turn.y));
+               })
+           SAT__GLSL(
+               raindrop_ray raindrop_trace(vec3 d, vec3 p, float one_minus_b2, float n) {
+                   raindrop_ray ray;
+                   float m = clamp(one_minus_b2, 0.0, 1.0), b2 = 1.0 - m,
+                       inside = (m + (n - 1.0) * (n + 1.0)) / (n * n);
+                   bool total = inside <= 0.0 && n < 1.0;
+                   raindrop_surface(ray, sqrt(m), sqrt(max(inside, 0.0)), n, total);
+                   ray.reflected = (2.0 * b2 - 1.0) * d + 2.0 * sqrt(m) * p;
+                   ray.refracted = total ? ray.reflected : ray.turn.x * d - ray.turn.y * p;
+                   return ray;
+               })
            "#endif\n";
 }
 
@@ -4115,535 +4120,616 @@ static const char raindrop__glsl_constants[] =
 
 /* Lookups in the environment's levels, laid out as an atlas: level 0, and to its right the others one above another. */
 static const char raindrop__glsl_environment[] =
-    "uniform sampler2D environment, far_drops;\n"
-    "uniform vec2 environment_size;\n" /* resolution, levels */
-    "vec3 fold(vec3 d) {\n"            /* unit square, and |x|+|y|+|z| */
-    "    float sum = abs(d.x) + abs(d.y) + abs(d.z);\n"
-    "    vec2 p = d.xz / sum, s = vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);\n"
-    "    if (d.y < 0.0) p = (1.0 - abs(p.yx)) * s;\n"
-    "    return vec3(p * 0.5 + 0.5, sum / length(d));\n"
-    "}\n"
-    "vec3 atlas(vec2 uv, float level) {\n"
-    "    float r = environment_size.x, below = exp2(level), side = r / below;\n"
-    "    vec2 corner = level < 0.5 ? vec2(0.0) : vec2(r + 2.0, r * (1.0 - 2.0 / below) + 2.0 * (level - 1.0));\n"
-    "    return textureLod(environment, (corner + 1.0 + uv * side) / vec2(textureSize(environment, 0)), 0.0).rgb;\n"
-    "}\n"
-    "vec3 look(vec3 d, float cone) {\n"
-    "    vec3 at = fold(d);\n"
-    "    float texels = 0.6 * cone * 0.5 * environment_size.x / (at.z * sqrt(at.z));\n"
-    "    float lod = texels > 1.0 ? float(floatBitsToUint(texels)) * 1.1920929e-7 - 126.957 : 0.0;\n" /* raindrop__rough_log2 */
-    "    lod = clamp(lod, 0.0, environment_size.y - 1.0);\n"
-    "    float level = floor(lod);\n"
-    "    vec3 fine = atlas(at.xy, level);\n"
-    "    if (level + 1.0 >= environment_size.y) return fine;\n"
-    "    return mix(fine, atlas(at.xy, level + 1.0), lod - level);\n"
-    "}\n";
+    SAT__GLSL(
+        uniform sampler2D environment, far_drops;
+        uniform vec2 environment_size; /* resolution, levels */
+        vec3 fold(vec3 d) { /* unit square, and |x|+|y|+|z| */
+            float sum = abs(d.x) + abs(d.y) + abs(d.z);
+            vec2 p = d.xz / sum, s = vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);
+            if (d.y < 0.0) p = (1.0 - abs(p.yx)) * s;
+            return vec3(p * 0.5 + 0.5, sum / length(d));
+        })
+    SAT__GLSL(
+        vec3 atlas(vec2 uv, float level) {
+            float r = environment_size.x, below = exp2(level), side = r / below;
+            vec2 corner = level < 0.5 ? vec2(0.0) : vec2(r + 2.0, r * (1.0 - 2.0 / below) + 2.0 * (level - 1.0));
+            return textureLod(environment, (corner + 1.0 + uv * side) / vec2(textureSize(environment, 0)), 0.0).rgb;
+        })
+    SAT__GLSL(
+        vec3 look(vec3 d, float cone) {
+            vec3 at = fold(d);
+            float texels = 0.6 * cone * 0.5 * environment_size.x / (at.z * sqrt(at.z));
+            /* raindrop__rough_log2 */
+            float lod = texels > 1.0 ? float(floatBitsToUint(texels)) * 1.1920929e-7 - 126.957 : 0.0;
+            lod = clamp(lod, 0.0, environment_size.y - 1.0);
+            float level = floor(lod);
+            vec3 fine = atlas(at.xy, level);
+            if (level + 1.0 >= environment_size.y) return fine;
+            return mix(fine, atlas(at.xy, level + 1.0), lod - level);
+        });
 
 /* raindrop__veil_rows; BOW where the environment keeps the bows. */
 static const char raindrop__glsl_veil[] =
-    "uniform vec3 right, up, back, sun, irradiance;\n"
-    "uniform vec4 view;\n"     /* half width, half height, focal length in pixels; 1: depth is a texture */
-    "uniform vec4 rain;\n"     /* extinction, from, reach */
-    "uniform vec2 planes;\n"
-    "uniform sampler2D depth;\n"
+    SAT__GLSL(
+        uniform vec3 right, up, back, sun, irradiance;
+        uniform vec4 view; /* half width, half height, focal length in pixels; 1: depth is a texture */
+        uniform vec4 rain; /* extinction, from, reach */
+        uniform vec2 planes;
+        uniform sampler2D depth;)
     "#ifdef BOW\n"
-    "uniform sampler2D bow;\n"
+    SAT__GLSL(uniform sampler2D bow;)
     "#endif\n"
-    "layout(location = 0) out vec4 colour;\n"
-    "void main() {\n"
-    "    vec3 d = vec3((gl_FragCoord.xy - view.xy) / view.z, 1.0);\n"
-    "    float way = rain.z, at = view.w > 0.5 ? texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r : 1.0;\n"
-    "    if (at < 1.0) way = min(way, length(d) * 2.0 * planes.x * planes.y / (planes.y + planes.x - (2.0 * at - 1.0) * (planes.y - planes.x)));\n"
-    "    if (way <= rain.y) discard;\n"
-    "    d = d.x * right + d.y * up - d.z * back;\n"
-    "    vec2 size = vec2(textureSize(far_drops, 0));\n"
-    "    colour = vec4(textureLod(far_drops, (fold(d).xy * (size - 2.0) + 1.0) / size, 0.0).rgb, 1.0 - exp(-rain.x * (way - rain.y)));\n"
+    SAT__GLSL(
+        layout(location = 0) out vec4 colour;
+        void main() {
+            vec3 d = vec3((gl_FragCoord.xy - view.xy) / view.z, 1.0);
+            float way = rain.z, at = view.w > 0.5 ? texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r : 1.0;
+            if (at < 1.0) way = min(way, length(d) * 2.0 * planes.x * planes.y
+                / (planes.y + planes.x - (2.0 * at - 1.0) * (planes.y - planes.x)));
+            if (way <= rain.y) discard;
+            d = d.x * right + d.y * up - d.z * back;
+            vec2 size = vec2(textureSize(far_drops, 0));
+            colour = vec4(textureLod(far_drops, (fold(d).xy * (size - 2.0) + 1.0) / size, 0.0).rgb,
+                1.0 - exp(-rain.x * (way - rain.y)));)
     "#ifdef BOW\n"
-    "    int side = textureSize(bow, 0).x, count = side * side;\n"
-    "    float x = acos(clamp(dot(d, sun) / length(d), -1.0, 1.0)) * float(count) / 3.14159265 - 0.5;\n"
-    "    int bin = clamp(int(x), 0, count - 2), after = bin + 1;\n"
-    "    vec3 a = texelFetch(bow, ivec2(bin % side, bin / side), 0).rgb, b = texelFetch(bow, ivec2(after % side, after / side), 0).rgb;\n"
-    "    colour.rgb += irradiance * mix(a, b, clamp(x - float(bin), 0.0, 1.0));\n"
+    SAT__GLSL(
+            int side = textureSize(bow, 0).x, count = side * side;
+            float x = acos(clamp(dot(d, sun) / length(d), -1.0, 1.0)) * float(count) / 3.14159265 - 0.5;
+            int bin = clamp(int(x), 0, count - 2), after = bin + 1;
+            vec3 a = texelFetch(bow, ivec2(bin % side, bin / side), 0).rgb,
+                b = texelFetch(bow, ivec2(after % side, after / side), 0).rgb;
+            colour.rgb += irradiance * mix(a, b, clamp(x - float(bin), 0.0, 1.0));)
     "#endif\n"
-    "}\n";
+    SAT__GLSL(});
 
 /* A drop's square or streak. LOOK 0 map, 1 sprite, 2 ray, 3 auto; SOFT where drops leave streaks or are out of focus,
    FLAT where some are flattened. */
 static const char raindrop__glsl_draw_vertex[] =
-    "layout(location = 0) in vec4 drop;\n"     /* position, radius */
-    "layout(location = 1) in vec4 motion;\n"   /* velocity, axis ratio */
-    "uniform vec3 eye, right, up, back;\n"
-    "uniform vec4 view;\n"                     /* half width, half height, focal length in pixels, near distance */
-    "uniform vec4 limits;\n"                   /* far radius, coverage threshold; depth is z + w / distance */
-    "uniform ivec3 sat_corner_of;\n"           /* as sat__gl_pixel has it: z > 0, upside down */
-    "uniform vec2 slice;\n"                    /* depths that are drawn */
-    "flat out vec4 place;\n"                   /* centre in pixels, half side (sprite) or radius, focal length in
+    SAT__GLSL(
+        layout(location = 0) in vec4 drop; /* position, radius */
+        layout(location = 1) in vec4 motion; /* velocity, axis ratio */
+        uniform vec3 eye, right, up, back;
+        uniform vec4 view; /* half width, half height, focal length in pixels, near distance */
+        uniform vec4 limits; /* far radius, coverage threshold; depth is z + w / distance */
+        uniform ivec3 sat_corner_of; /* as sat__gl_pixel has it: z > 0, upside down */
+        uniform vec2 slice; /* depths that are drawn */
+        flat out vec4 place; /* centre in pixels, half side (sprite) or radius, focal length in
                                                   radii; of a far drop: opacity */
-    "flat out vec4 seen;\n"                    /* centre in radii, view space, z forward; axis ratio. Of a far drop
+        flat out vec4 seen; /* centre in radii, view space, z forward; axis ratio. Of a far drop
                                                   raindrop__shape: half height, slope, half width, swapped */
-    "flat out vec4 far_colour;\n"              /* colour; 1: a far drop */
+        flat out vec4 far_colour;) /* colour; 1: a far drop */
     "#ifdef SOFT\n"
-    "uniform vec4 shutter;\n"                  /* the camera's velocity, exposure */
-    "uniform vec2 lens;\n"                     /* aperture, focus distance */
-    "flat out vec4 path;\n"                    /* in pixels: streak, circle of confusion, radius of what moves (0: sharp
+    SAT__GLSL(
+        uniform vec4 shutter; /* the camera's velocity, exposure */
+        uniform vec2 lens; /* aperture, focus distance */
+        flat out vec4 path; /* in pixels: streak, circle of confusion, radius of what moves (0: sharp
                                                   and still, or far and not round) */
-    "vec4 path_of(vec3 v, float r, bool is_far) {\n"
-    "    vec3 w = motion.xyz - shutter.xyz;\n"
-    "    vec2 fall = vec2(dot(w, right), dot(w, up)) + v.xy / v.z * dot(w, back);\n"
-    "    vec2 streak = clamp(shutter.w * view.z / v.z * fall, -1e5, 1e5);\n"
-    "    float blur = min(0.5 * lens.x * view.z * abs(1.0 / v.z - 1.0 / lens.y), 1e5), way2 = dot(streak, streak);\n"
-    "    return vec4(streak, blur, way2 + blur * blur < 0.0625 ? 0.0 : way2 <= 0.0625 && !is_far ? r + max(blur, LEAST_BLUR) : blur > 0.25 ? length(vec2(r, blur)) : r);\n"
-    "}\n"
+        vec4 path_of(vec3 v, float r, bool is_far) {
+            vec3 w = motion.xyz - shutter.xyz;
+            vec2 fall = vec2(dot(w, right), dot(w, up)) + v.xy / v.z * dot(w, back);
+            vec2 streak = clamp(shutter.w * view.z / v.z * fall, -1e5, 1e5);
+            float blur = min(0.5 * lens.x * view.z * abs(1.0 / v.z - 1.0 / lens.y), 1e5), way2 = dot(streak, streak);
+            return vec4(streak, blur, way2 + blur * blur < 0.0625 ? 0.0 : way2 <= 0.0625 && !is_far
+                ? r + max(blur, LEAST_BLUR) : blur > 0.25 ? length(vec2(r, blur)) : r);
+        })
     "#endif\n";
 
 static const char raindrop__glsl_draw_place[] =
-    "void main() {\n"
-    "    vec3 rel = drop.xyz - eye, v = vec3(dot(rel, right), dot(rel, up), -dot(rel, back));\n"
+    SAT__GLSL(
+        void main() {
+            vec3 rel = drop.xyz - eye, v = vec3(dot(rel, right), dot(rel, up), -dot(rel, back));)
     "#ifdef FLAT\n"
-    "    float ratio = motion.w, r = drop.w * pow(ratio, -1.0 / 3.0);\n"
+    SAT__GLSL(float ratio = motion.w, r = drop.w * pow(ratio, -1.0 / 3.0);)
     "#else\n"
-    "    const float ratio = 1.0;\n"
-    "    float r = drop.w;\n"
+    SAT__GLSL(
+            const float ratio = 1.0;
+            float r = drop.w;)
     "#endif\n"
-    "    float d2 = dot(v, v), tangent2 = r * r / (d2 - r * r), stretch = sqrt(d2) / v.z;\n"
-    "    float area_radius = view.z * sqrt(tangent2 * ratio * stretch * stretch * stretch);\n"
-    "    vec2 right_reach = vec2(0.0), up_reach = vec2(0.0);\n" /* from the middle to the sides of the square or streak */
-    "    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);\n"
-    "    place = vec4(0.0);\n"
-    "    seen = vec4(0.0);\n"
-    "    far_colour = vec4(0.0);\n"
+    SAT__GLSL(
+            float d2 = dot(v, v), tangent2 = r * r / (d2 - r * r), stretch = sqrt(d2) / v.z;
+            float area_radius = view.z * sqrt(tangent2 * ratio * stretch * stretch * stretch);
+            /* from the middle to the sides of the square or streak */
+            vec2 right_reach = vec2(0.0), up_reach = vec2(0.0);
+            gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+            place = vec4(0.0);
+            seen = vec4(0.0);
+            far_colour = vec4(0.0);)
     "#ifdef SOFT\n"
-    "    path = vec4(0.0);\n"
+    SAT__GLSL(path = vec4(0.0);)
     "#endif\n"
-    "    bool kept = ratio > 0.0 && ratio <= 1.0 && r > 0.0 && d2 > 1.0001 * r * r && v.z - r > view.w && v.z > 1.0001 * r && v.z >= slice.x && v.z < slice.y;\n"
-    "    if (kept && 3.14159265 * area_radius * area_radius >= limits.y) {\n"
-    "        vec2 middle = view.xy + view.z * v.xy / v.z;\n"
-    "        seen = vec4(v / r, ratio);\n"
-    "        place = vec4(middle, area_radius, v.z / (view.z * r));\n"
+    SAT__GLSL(
+            bool kept = ratio > 0.0 && ratio <= 1.0 && r > 0.0 && d2 > 1.0001 * r * r && v.z - r > view.w
+                && v.z > 1.0001 * r && v.z >= slice.x && v.z < slice.y;
+            if (kept && 3.14159265 * area_radius * area_radius >= limits.y) {
+                vec2 middle = view.xy + view.z * v.xy / v.z;
+                seen = vec4(v / r, ratio);
+                place = vec4(middle, area_radius, v.z / (view.z * r));)
     "#if LOOK < 2\n"
-    "        place.z = max(view.z * sqrt(tangent2) * stretch, 0.5);\n"
-    "        right_reach = vec2(place.z + 0.01, 0.0);\n"
-    "        up_reach = right_reach.yx;\n" /* rasterisers snap to 1/256 of a pixel; the fragment cuts exactly */
+    SAT__GLSL(
+                place.z = max(view.z * sqrt(tangent2) * stretch, 0.5);
+                right_reach = vec2(place.z + 0.01, 0.0);
+                up_reach = right_reach.yx;) /* rasterisers snap to 1/256 of a pixel; the fragment cuts exactly */
     "#else\n"
     /* tangents from the eye, exact off axis */
-    "        vec2 q = sqrt(v.xy * v.xy + v.z * v.z - r * r), low = (v.xy * q - r * v.z) / (v.z * q + r * v.xy);\n"
-    "        vec2 high = (v.xy * q + r * v.z) / (v.z * q - r * v.xy);\n"
-    "        bool is_far = area_radius < (LOOK == 3 ? max(limits.x, LEAST_RADIUS) : LEAST_RADIUS);\n"
-    "        vec4 blurred = vec4(0.0);\n"
-    "        vec2 reach = 0.5 * view.z * (high - low) + 1.0;\n"
-    "        middle = view.xy + 0.5 * view.z * (low + high);\n"
+    SAT__GLSL(
+                vec2 q = sqrt(v.xy * v.xy + v.z * v.z - r * r), low = (v.xy * q - r * v.z) / (v.z * q + r * v.xy);
+                vec2 high = (v.xy * q + r * v.z) / (v.z * q - r * v.xy);
+                bool is_far = area_radius < (LOOK == 3 ? max(limits.x, LEAST_RADIUS) : LEAST_RADIUS);
+                vec4 blurred = vec4(0.0);
+                vec2 reach = 0.5 * view.z * (high - low) + 1.0;
+                middle = view.xy + 0.5 * view.z * (low + high);)
     "#ifdef SOFT\n"
-    "        path = blurred = path_of(v, area_radius, is_far);\n"
-    "        if (is_far && path.z <= LEAST_RADIUS) path.w = 0.0;\n"
-    "        if (path.w > 0.0) {\n"
-    "            float way = length(path.xy);\n"
-    "            vec2 along = way > 1e-6 ? path.xy / way : vec2(1.0, 0.0);\n"
-    "            reach = vec2(path.w) + vec2(0.5 * way + 1.0, 1.0);\n"
-    "            middle = place.xy;\n"
-    "            right_reach = reach.x * along;\n"
-    "            up_reach = reach.y * vec2(-along.y, along.x);\n"
-    "        } else\n"
+    SAT__GLSL(
+                path = blurred = path_of(v, area_radius, is_far);
+                if (is_far && path.z <= LEAST_RADIUS) path.w = 0.0;
+                if (path.w > 0.0) {
+                    float way = length(path.xy);
+                    vec2 along = way > 1e-6 ? path.xy / way : vec2(1.0, 0.0);
+                    reach = vec2(path.w) + vec2(0.5 * way + 1.0, 1.0);
+                    middle = place.xy;
+                    right_reach = reach.x * along;
+                    up_reach = reach.y * vec2(-along.y, along.x);
+                } else)
     "#endif\n"
-    "        {\n"
-    "            right_reach = vec2(reach.x, 0.0);\n"
-    "            up_reach = vec2(0.0, reach.y);\n"
-    "        }\n"
-    "        if (is_far) {\n"
-    "            vec3 d = v.x * right + v.y * up - v.z * back, at = fold(d);\n"
-    "            vec2 size = vec2(textureSize(far_drops, 0));\n"
-    "            far_colour = vec4(textureLod(far_drops, (at.xy * (size - 2.0) + 1.0) / size, 0.0).rgb, 1.0);\n"
+    SAT__GLSL(
+                {
+                    right_reach = vec2(reach.x, 0.0);
+                    up_reach = vec2(0.0, reach.y);
+                }
+                if (is_far) {
+                    vec3 d = v.x * right + v.y * up - v.z * back, at = fold(d);
+                    vec2 size = vec2(textureSize(far_drops, 0));
+                    far_colour = vec4(textureLod(far_drops, (at.xy * (size - 2.0) + 1.0) / size, 0.0).rgb, 1.0);)
     /* raindrop__far_shape */
-    "            bool swapped = abs(blurred.x) > abs(blurred.y);\n"
-    "            vec2 way = swapped ? blurred.yx : blurred.xy;\n"
-    "            float a = 3.14159265 * (area_radius * area_radius + blurred.z * blurred.z), h2 = way.y * way.y + a, slope = way.x * way.y / h2;\n"
-    "            vec2 half_size = 0.5 * sqrt(vec2(a * (1.0 + way.x * way.x / h2), h2));\n"
-    "            seen = vec4(half_size.y, slope, half_size.x, swapped ? 1.0 : 0.0);\n"
-    "            middle = place.xy;\n"
-    "            place.w = 3.14159265 * area_radius * area_radius / (4.0 * half_size.x * half_size.y);\n"
-    "            if (blurred.z <= LEAST_RADIUS) {\n" /* one more pixel on all sides, whose squares it may touch */
-    "                right_reach = vec2(half_size.x + 0.51 + 0.5 * abs(slope), 0.0);\n"
-    "                up_reach = vec2(slope, 1.0) * (half_size.y + 0.51);\n"
-    "                if (swapped) right_reach = right_reach.yx, up_reach = up_reach.yx;\n"
-    "            }\n"
-    "        }\n"
+    SAT__GLSL(
+                    bool swapped = abs(blurred.x) > abs(blurred.y);
+                    vec2 way = swapped ? blurred.yx : blurred.xy;
+                    float a = 3.14159265 * (area_radius * area_radius + blurred.z * blurred.z), h2 = way.y * way.y + a,
+                        slope = way.x * way.y / h2;
+                    vec2 half_size = 0.5 * sqrt(vec2(a * (1.0 + way.x * way.x / h2), h2));
+                    seen = vec4(half_size.y, slope, half_size.x, swapped ? 1.0 : 0.0);
+                    middle = place.xy;
+                    place.w = 3.14159265 * area_radius * area_radius / (4.0 * half_size.x * half_size.y);
+                    if (blurred.z <= LEAST_RADIUS) { /* one more pixel on all sides, whose squares it may touch */
+                        right_reach = vec2(half_size.x + 0.51 + 0.5 * abs(slope), 0.0);
+                        up_reach = vec2(slope, 1.0) * (half_size.y + 0.51);
+                        if (swapped) right_reach = right_reach.yx, up_reach = up_reach.yx;
+                    }
+                })
     "#endif\n"
         "#ifdef QUADS\n"
-    "        vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;\n"
-    "        middle += corner.x * right_reach + corner.y * up_reach;\n"
+    SAT__GLSL(
+                vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;
+                middle += corner.x * right_reach + corner.y * up_reach;)
     "#endif\n"
-    "        gl_Position = vec4(middle / view.xy - 1.0, limits.z + limits.w / v.z, 1.0);\n"
-    "        if (sat_corner_of.z > 0) gl_Position.y = -gl_Position.y;\n"
-    "    }\n"
+    SAT__GLSL(
+                gl_Position = vec4(middle / view.xy - 1.0, limits.z + limits.w / v.z, 1.0);
+                if (sat_corner_of.z > 0) gl_Position.y = -gl_Position.y;
+            })
     "#ifndef QUADS\n"
-    "    vec2 reach = abs(right_reach) + abs(up_reach);\n"
-    "    gl_PointSize = max(2.0 * max(reach.x, reach.y), 1.0);\n"
+    SAT__GLSL(
+            vec2 reach = abs(right_reach) + abs(up_reach);
+            gl_PointSize = max(2.0 * max(reach.x, reach.y), 1.0);)
     "#endif\n"
-    "}\n";
+    SAT__GLSL(});
 
 /* Two lookups a ray, and raindrop__half_plane: what all looks share. */
 static const char raindrop__glsl_shade[] =
-    "float half_plane(float s, vec2 n) {\n"
-    "    float lo = max(min(abs(n.x), abs(n.y)), 0.01), hi = max(max(abs(n.x), abs(n.y)), 0.7), h = 0.5 * (hi + lo), g = 0.5 * (hi - lo);\n"
-    "    vec4 v = max(clamp(s, -1.0, 1.0) + vec4(h, g, -g, -h), 0.0);\n"
-    "    return clamp(0.5 * dot(v * v, vec4(1.0, -1.0, -1.0, 1.0)) / (lo * hi), 0.0, 1.0);\n"
-    "}\n"
-    "flat in vec4 place;\n"
-    "flat in vec4 seen;\n"
-    "flat in vec4 far_colour;\n"
-    "uniform vec3 right, up, back;\n"
-    "uniform vec4 view;\n"
-    "uniform vec2 optics;\n" /* index, whether the exit has Fresnel factors */
-    "layout(location = 0) out vec4 colour;\n"
-    "vec2 here() {\n" /* points reach beyond the viewport */
-    "    vec2 p = vec2(sat_pixel()) + 0.5;\n"
+    SAT__GLSL(
+        float half_plane(float s, vec2 n) {
+            float lo = max(min(abs(n.x), abs(n.y)), 0.01), hi = max(max(abs(n.x), abs(n.y)), 0.7), h = 0.5 * (hi + lo),
+                g = 0.5 * (hi - lo);
+            vec4 v = max(clamp(s, -1.0, 1.0) + vec4(h, g, -g, -h), 0.0);
+            return clamp(0.5 * dot(v * v, vec4(1.0, -1.0, -1.0, 1.0)) / (lo * hi), 0.0, 1.0);
+        })
+    SAT__GLSL(
+        flat in vec4 place;
+        flat in vec4 seen;
+        flat in vec4 far_colour;
+        uniform vec3 right, up, back;
+        uniform vec4 view;
+        uniform vec2 optics; /* index, whether the exit has Fresnel factors */
+        layout(location = 0) out vec4 colour;
+        vec2 here() { /* points reach beyond the viewport */
+            vec2 p = vec2(sat_pixel()) + 0.5;)
     "#ifndef QUADS\n"
-    "    if (any(lessThan(p, vec2(0.0))) || any(greaterThan(p, 2.0 * view.xy))) discard;\n"
+    SAT__GLSL(if (any(lessThan(p, vec2(0.0))) || any(greaterThan(p, 2.0 * view.xy))) discard;)
     "#endif\n"
-    "    return p;\n"
-    "}\n"
-    "float pixel_width() { return sqrt(dot(seen.xyz, seen.xyz) - 1.0) / view.z; }\n" /* in radii */
-    "vec3 mirrored(raindrop_ray ray, float blur) {\n"
-    "    return ray.fresnel * look(ray.reflected, blur * (2.0 * pixel_width() + 1.0 / view.z));\n"
-    "}\n"
-    "vec3 shade(raindrop_ray ray, float blur) {\n"
-    "    float pass = optics.y > 0.5 ? ray.transmit : 1.0 - ray.fresnel;\n"
-    "    return mirrored(ray, blur) + pass * look(ray.refracted, blur * abs(ray.footprint * pixel_width() - 1.0 / view.z));\n"
-    "}\n";
+    SAT__GLSL(
+            return p;
+        })
+    SAT__GLSL(float pixel_width() { return sqrt(dot(seen.xyz, seen.xyz) - 1.0) / view.z; }) /* in radii */
+    SAT__GLSL(
+        vec3 mirrored(raindrop_ray ray, float blur) {
+            return ray.fresnel * look(ray.reflected, blur * (2.0 * pixel_width() + 1.0 / view.z));
+        })
+    SAT__GLSL(
+        vec3 shade(raindrop_ray ray, float blur) {
+            float pass = optics.y > 0.5 ? ray.transmit : 1.0 - ray.fresnel;
+            return mirrored(ray, blur) + pass
+                * look(ray.refracted, blur * abs(ray.footprint * pixel_width() - 1.0 / view.z));
+        });
 
 /* LOOK 0 and 1. */
 static const char raindrop__glsl_draw_sprite[] =
     "#if LOOK == 0\n"
-    "uniform sampler2D reflections, refractions;\n"
+    SAT__GLSL(uniform sampler2D reflections, refractions;)
     "#endif\n"
     /* the camera's axes under the shortest rotation from back to the direction of the eye (eq 2.1 without eq 2.3) */
-    "vec3 turned(vec3 v, vec3 n) {\n"
-    "    float k = 1.0 / (1.0 + n.z);\n"
-    "    vec3 to_eye = n.x * right + n.y * up + n.z * back;\n"
-    "    return v.x * (right - n.x * k * (back + to_eye)) + v.y * (up - n.y * k * (back + to_eye)) + v.z * to_eye;\n"
-    "}\n"
-    "void main() {\n"
-    "    vec2 st = (here() - place.xy) / place.z;\n"
-    "    if (max(abs(st.x), abs(st.y)) > 1.0) discard;\n"
-    "    float d2 = dot(seen.xyz, seen.xyz);\n"
-    "    vec3 n = vec3(-seen.xy, seen.z) / sqrt(d2);\n"
-    "    raindrop_ray ray;\n"
+    SAT__GLSL(
+        vec3 turned(vec3 v, vec3 n) {
+            float k = 1.0 / (1.0 + n.z);
+            vec3 to_eye = n.x * right + n.y * up + n.z * back;
+            return v.x * (right - n.x * k * (back + to_eye)) + v.y * (up - n.y * k * (back + to_eye)) + v.z * to_eye;
+        })
+    SAT__GLSL(
+        void main() {
+            vec2 st = (here() - place.xy) / place.z;
+            if (max(abs(st.x), abs(st.y)) > 1.0) discard;
+            float d2 = dot(seen.xyz, seen.xyz);
+            vec3 n = vec3(-seen.xy, seen.z) / sqrt(d2);
+            raindrop_ray ray;)
     "#if LOOK == 0\n"
-    "    float lod = max(0.5 * log2(max(d2 - 1.0, 1.0)), 0.0), b2 = min(dot(st, st), 0.9999 * min(optics.x * optics.x, 1.0));\n"
-    "    vec4 l = textureLod(reflections, st * 0.5 + 0.5, lod), r = textureLod(refractions, st * 0.5 + 0.5, lod);\n"
-    "    if (r.a <= 1.0 / 255.0) discard;\n"
-    "    ray = raindrop_trace(vec3(0.0, 0.0, -1.0), vec3(sqrt(b2), 0.0, 0.0), 1.0 - b2, optics.x);\n" /* for the footprint */
-    "    ray.reflected = turned(normalize(l.xyz), n);\n"
-    "    ray.refracted = turned(normalize(r.xyz), n);\n"
-    "    ray.fresnel = l.a;\n"
-    "    ray.transmit = 1.0 - l.a;\n"
-    "    colour = vec4(shade(ray, 1.0), r.a);\n"
+    SAT__GLSL(
+            float lod = max(0.5 * log2(max(d2 - 1.0, 1.0)), 0.0),
+                b2 = min(dot(st, st), 0.9999 * min(optics.x * optics.x, 1.0));
+            vec4 l = textureLod(reflections, st * 0.5 + 0.5, lod), r = textureLod(refractions, st * 0.5 + 0.5, lod);
+            if (r.a <= 1.0 / 255.0) discard;
+            /* for the footprint */
+            ray = raindrop_trace(vec3(0.0, 0.0, -1.0), vec3(sqrt(b2), 0.0, 0.0), 1.0 - b2, optics.x);
+            ray.reflected = turned(normalize(l.xyz), n);
+            ray.refracted = turned(normalize(r.xyz), n);
+            ray.fresnel = l.a;
+            ray.transmit = 1.0 - l.a;
+            colour = vec4(shade(ray, 1.0), r.a);)
     "#else\n"
-    "    float rho = length(st), alpha = clamp((1.0 - rho) * view.z / sqrt(d2 - 1.0) + 0.5, 0.0, 1.0), dist = sqrt(d2);\n"
-    "    if (alpha <= 0.0) discard;\n"
-    "    if (rho > 0.999) st *= 0.999 / rho;\n"
-    "    vec2 xy = st / sqrt(d2 - 1.0);\n"
-    "    float c2 = 1.0 / (1.0 + dot(xy, xy));\n"
-    "    vec3 d = vec3(xy, -1.0) * sqrt(c2), p = dist * vec3(xy * c2, 1.0 - c2);\n"
-    "    ray = raindrop_trace(turned(d, n), turned(p, n), (1.0 - dot(st, st)) * c2, optics.x);\n"
-    "    colour = vec4(shade(ray, 1.0), alpha);\n"
+    SAT__GLSL(
+            float rho = length(st), alpha = clamp((1.0 - rho) * view.z / sqrt(d2 - 1.0) + 0.5, 0.0, 1.0),
+                dist = sqrt(d2);
+            if (alpha <= 0.0) discard;
+            if (rho > 0.999) st *= 0.999 / rho;
+            vec2 xy = st / sqrt(d2 - 1.0);
+            float c2 = 1.0 / (1.0 + dot(xy, xy));
+            vec3 d = vec3(xy, -1.0) * sqrt(c2), p = dist * vec3(xy * c2, 1.0 - c2);
+            ray = raindrop_trace(turned(d, n), turned(p, n), (1.0 - dot(st, st)) * c2, optics.x);
+            colour = vec4(shade(ray, 1.0), alpha);)
     "#endif\n"
-    "}\n";
+    SAT__GLSL(});
 
 /* raindrop__large_colour and raindrop__add_orders. */
 static const char raindrop__glsl_orders[] =
     "#ifdef ORDERS\n"
-    "uniform vec2 orders;\n" /* their number, radius in pixels from which drops have them */
-    "vec3 add_orders(vec3 d, vec3 p, float m, int last) {\n"
-    "    raindrop_ray ray = raindrop_trace(d, p, m, optics.x);\n"
-    "    float n = optics.x, b2 = 1.0 - m, cr = sqrt(max((m + (n - 1.0) * (n + 1.0)) / (n * n), 0.0));\n"
-    "    vec2 turn = ray.turn, once = vec2(2.0 * b2 / (n * n) - 1.0, 2.0 * cr / n), enter = 1.0 - ray.polarised, inside = enter;\n"
-    "    vec3 sum = mirrored(ray, 1.0);\n"
-    "    for (int k = 0; k <= last; k++) {\n"
-    "        vec2 leave = k == last && optics.y < 0.5 ? vec2(1.0) : enter;\n"
-    "        float footprint = sqrt(abs(2.0 * (1.0 / (sqrt(m) + 1e-6) - float(k + 1) / (n * cr + 1e-6)) * turn.y));\n"
-    "        sum += 0.5 * dot(inside, leave) * look(turn.x * d - turn.y * p, abs(footprint * pixel_width() - 1.0 / view.z));\n"
-    "        turn = vec2(turn.x * once.x - b2 * turn.y * once.y, turn.y * once.x + turn.x * once.y);\n"
-    "        inside *= ray.polarised;\n"
-    "    }\n"
-    "    return sum;\n"
-    "}\n"
-    "vec3 still_colour(vec3 d, vec3 p, float m) {\n" /* large drops: four rays at the rim */
-    "    float b = sqrt(1.0 - m), width = pixel_width(), count = 0.0;\n"
-    "    bool is_large = place.z >= orders.y;\n"
-    "    int last = is_large ? int(orders.x) : 0, taps = is_large && 1.0 - b <= 3.0 * width && width <= 0.25 ? 4 : 1;\n"
-    "    vec3 sum = vec3(0.0);\n"
-    "    for (int j = 0; j < taps; j++) {\n"
-    "        float at = taps == 1 ? b : b + (0.25 * float(j) - 0.375) * width;\n"
-    "        if (at >= 1.0) continue;\n"
-    "        sum += add_orders(d, p * (at / max(b, 1e-9)), taps == 1 ? m : (1.0 - at) * (1.0 + at), last);\n"
-    "        count += 1.0;\n"
-    "    }\n"
-    "    return sum / count;\n"
-    "}\n"
+    SAT__GLSL(
+        uniform vec2 orders; /* their number, radius in pixels from which drops have them */
+        vec3 add_orders(vec3 d, vec3 p, float m, int last) {
+            raindrop_ray ray = raindrop_trace(d, p, m, optics.x);
+            float n = optics.x, b2 = 1.0 - m, cr = sqrt(max((m + (n - 1.0) * (n + 1.0)) / (n * n), 0.0));
+            vec2 turn = ray.turn, once = vec2(2.0 * b2 / (n * n) - 1.0, 2.0 * cr / n), enter = 1.0 - ray.polarised,
+                inside = enter;
+            vec3 sum = mirrored(ray, 1.0);
+            for (int k = 0; k <= last; k++) {
+                vec2 leave = k == last && optics.y < 0.5 ? vec2(1.0) : enter;
+                float footprint = sqrt(abs(2.0 * (1.0 / (sqrt(m) + 1e-6) - float(k + 1) / (n * cr + 1e-6)) * turn.y));
+                sum += 0.5 * dot(inside, leave)
+                    * look(turn.x * d - turn.y * p, abs(footprint * pixel_width() - 1.0 / view.z));
+                turn = vec2(turn.x * once.x - b2 * turn.y * once.y, turn.y * once.x + turn.x * once.y);
+                inside *= ray.polarised;
+            }
+            return sum;
+        })
+    SAT__GLSL(
+        vec3 still_colour(vec3 d, vec3 p, float m) { /* large drops: four rays at the rim */
+            float b = sqrt(1.0 - m), width = pixel_width(), count = 0.0;
+            bool is_large = place.z >= orders.y;
+            int last = is_large ? int(orders.x) : 0, taps = is_large && 1.0 - b <= 3.0 * width && width <= 0.25 ? 4 : 1;
+            vec3 sum = vec3(0.0);
+            for (int j = 0; j < taps; j++) {
+                float at = taps == 1 ? b : b + (0.25 * float(j) - 0.375) * width;
+                if (at >= 1.0) continue;
+                sum += add_orders(d, p * (at / max(b, 1e-9)), taps == 1 ? m : (1.0 - at) * (1.0 + at), last);
+                count += 1.0;
+            }
+            return sum / count;
+        })
     "#endif\n";
 
 /* raindrop_trace_spheroid behind raindrop__flat_cover. */
 static const char raindrop__glsl_flat[] =
     "#ifdef FLAT\n"
-    "float trace_flat(out raindrop_ray ray, vec3 d, vec3 p) {\n"
-    "    vec3 s = vec3(1.0, 1.0 / seen.w, 1.0), unit = d * s, q = p * s;\n"
-    "    float n = optics.x, d2 = dot(unit, unit);\n"
-    "    q -= dot(q, unit) / d2 * unit;\n"
-    "    vec2 rim = vec2(dot(q * s, right), dot(q * s, up));\n"
-    "    float b = length(q) + 1e-9, length_of_rim = length(rim) + 1e-20, slope = place.w * length_of_rim / b + 1e-9;\n"
-    "    q *= min(1.0, 0.999 / b);\n"
-    "    vec3 hit = q - sqrt((1.0 - dot(q, q)) / d2) * unit, normal = normalize(hit * s), inner = refract(d, normal, 1.0 / n);\n"
-    "    bool total = dot(inner, inner) < 0.5;\n" /* refract then gives 0 */
-    "    ray.reflected = ray.refracted = reflect(d, normal);\n"
-    "    raindrop_surface(ray, -dot(d, normal), -dot(inner, normal), n, total);\n"
-    "    if (!total) {\n"
-    "        unit = inner * s;\n"
-    "        hit -= 2.0 * dot(hit, unit) / dot(unit, unit) * unit;\n"
-    "        ray.refracted = refract(inner, -normalize(hit * s), n);\n"
-    "        if (dot(ray.refracted, ray.refracted) < 0.5) ray.transmit = 0.0, ray.refracted = inner;\n"
-    "    }\n"
-    "    return half_plane((1.0 - b) / slope - slope / max(24.0 * b, 12.0 * slope), rim / length_of_rim);\n"
-    "}\n"
+    SAT__GLSL(
+        float trace_flat(out raindrop_ray ray, vec3 d, vec3 p) {
+            vec3 s = vec3(1.0, 1.0 / seen.w, 1.0), unit = d * s, q = p * s;
+            float n = optics.x, d2 = dot(unit, unit);
+            q -= dot(q, unit) / d2 * unit;
+            vec2 rim = vec2(dot(q * s, right), dot(q * s, up));
+            float b = length(q) + 1e-9, length_of_rim = length(rim) + 1e-20, slope = place.w * length_of_rim / b + 1e-9;
+            q *= min(1.0, 0.999 / b);
+            vec3 hit = q - sqrt((1.0 - dot(q, q)) / d2) * unit, normal = normalize(hit * s),
+                inner = refract(d, normal, 1.0 / n);
+            bool total = dot(inner, inner) < 0.5; /* refract then gives 0 */
+            ray.reflected = ray.refracted = reflect(d, normal);
+            raindrop_surface(ray, -dot(d, normal), -dot(inner, normal), n, total);
+            if (!total) {
+                unit = inner * s;
+                hit -= 2.0 * dot(hit, unit) / dot(unit, unit) * unit;
+                ray.refracted = refract(inner, -normalize(hit * s), n);
+                if (dot(ray.refracted, ray.refracted) < 0.5) ray.transmit = 0.0, ray.refracted = inner;
+            }
+            return half_plane((1.0 - b) / slope - slope / max(24.0 * b, 12.0 * slope), rim / length_of_rim);
+        })
     "#endif\n";
 
 /* LOOK 2 and 3: raindrop__batch_rays, raindrop__draw_far. */
 static const char raindrop__glsl_draw_trace[] =
-    "float disc_cover(float radius, vec2 at) {\n" /* raindrop__disc_cover */
-    "    float apart = length(at) + 1e-6;\n"
-    "    return half_plane(radius - apart - 1.0 / (24.0 * max(apart, 0.5)), at / apart);\n"
-    "}\n"
+    SAT__GLSL(
+        float disc_cover(float radius, vec2 at) { /* raindrop__disc_cover */
+            float apart = length(at) + 1e-6;
+            return half_plane(radius - apart - 1.0 / (24.0 * max(apart, 0.5)), at / apart);
+        })
     /* raindrop__far_row: one pixel of it */
-    "float far_cover(vec2 at) {\n"
-    "    if (seen.w > 0.5) at = at.yx;\n"
-    "    float low = max(at.y - 0.5, -seen.x), high = min(at.y + 0.5, seen.x), w = max(abs(seen.y) * (high - low), 0.01);\n"
-    "    if (high <= low) return 0.0;\n"
-    "    vec2 x = at.x - seen.y * 0.5 * (low + high) + vec2(-0.5, 0.5);\n"
-    "    vec2 a = max(seen.z - 0.5 * w - x, 0.0), b = max(seen.z + 0.5 * w - x, 0.0), c = max(-seen.z - 0.5 * w - x, 0.0), d = max(-seen.z + 0.5 * w - x, 0.0);\n"
-    "    vec2 right_of = ((b - a) * (b + a) - (d - c) * (d + c)) * 0.5 / w;\n"
-    "    return place.w * (high - low) * (right_of.x - right_of.y);\n"
-    "}\n"
+    SAT__GLSL(
+        float far_cover(vec2 at) {
+            if (seen.w > 0.5) at = at.yx;
+            float low = max(at.y - 0.5, -seen.x), high = min(at.y + 0.5, seen.x),
+                w = max(abs(seen.y) * (high - low), 0.01);
+            if (high <= low) return 0.0;
+            vec2 x = at.x - seen.y * 0.5 * (low + high) + vec2(-0.5, 0.5);
+            vec2 a = max(seen.z - 0.5 * w - x, 0.0), b = max(seen.z + 0.5 * w - x, 0.0),
+                c = max(-seen.z - 0.5 * w - x, 0.0), d = max(-seen.z + 0.5 * w - x, 0.0);
+            vec2 right_of = ((b - a) * (b + a) - (d - c) * (d + c)) * 0.5 / w;
+            return place.w * (high - low) * (right_of.x - right_of.y);
+        })
     /* the pixel's ray through the drop whose centre is projected `at` from here; cover: the share of the pixel it
        takes */
-    "struct fragment { raindrop_ray ray; vec3 d, p; float one_minus_b2, cover; };\n"
-    "fragment trace(vec2 at) {\n"
-    "    fragment f;\n"
-    "    vec3 d = vec3((here() - view.xy) / view.z, 1.0), q = vec3(at * place.w, 0.0);\n"
-    "    float l2 = dot(d, d), t = dot(q, d) / l2;\n"
-    "    vec3 p = q - t * d;\n"
-    "    float b2 = dot(p, p), b = sqrt(max(b2, 1e-12)), slope = max(length(p.xy * (place.w - t / view.z)) / b, 1e-9);\n"
-    "    f.d = (d.x * right + d.y * up - d.z * back) / sqrt(l2);\n"
-    "    f.p = p.x * right + p.y * up - p.z * back;\n"
+    SAT__GLSL(
+        struct fragment { raindrop_ray ray; vec3 d, p; float one_minus_b2, cover; };
+        fragment trace(vec2 at) {
+            fragment f;
+            vec3 d = vec3((here() - view.xy) / view.z, 1.0), q = vec3(at * place.w, 0.0);
+            float l2 = dot(d, d), t = dot(q, d) / l2;
+            vec3 p = q - t * d;
+            float b2 = dot(p, p), b = sqrt(max(b2, 1e-12)),
+                slope = max(length(p.xy * (place.w - t / view.z)) / b, 1e-9);
+            f.d = (d.x * right + d.y * up - d.z * back) / sqrt(l2);
+            f.p = p.x * right + p.y * up - p.z * back;)
     "#ifdef FLAT\n"
-    "    if (seen.w < 1.0) {\n"
-    "        f.cover = trace_flat(f.ray, f.d, f.p);\n"
-    "        return f;\n"
-    "    }\n"
+    SAT__GLSL(
+            if (seen.w < 1.0) {
+                f.cover = trace_flat(f.ray, f.d, f.p);
+                return f;
+            })
     "#endif\n"
-    "    f.p *= min(1.0, 0.999 / b);\n"
-    "    f.one_minus_b2 = max(1.0 - b2, 0.001999);\n"
-    "    f.ray = raindrop_trace(f.d, f.p, f.one_minus_b2, optics.x);\n"
-    "    f.cover = half_plane((1.0 - b) / slope - slope / max(24.0 * b, 12.0 * slope), p.xy / max(length(p.xy), 1e-20));\n"
-    "    return f;\n"
-    "}\n";
+    SAT__GLSL(
+            f.p *= min(1.0, 0.999 / b);
+            f.one_minus_b2 = max(1.0 - b2, 0.001999);
+            f.ray = raindrop_trace(f.d, f.p, f.one_minus_b2, optics.x);
+            f.cover = half_plane((1.0 - b) / slope - slope / max(24.0 * b, 12.0 * slope),
+                p.xy / max(length(p.xy), 1e-20));
+            return f;
+        });
 
 /* raindrop__draw_soft, raindrop__draw_far_round. */
 static const char raindrop__glsl_draw_soft[] =
     "#ifdef SOFT\n"
-    "flat in vec4 path;\n"
-    "float lens_share(float r, float c, float apart) {\n"
-    "    if (apart >= r + c) return 0.0;\n"
-    "    if (apart <= abs(r - c)) return min(r * r / (c * c), 1.0);\n"
-    "    float x = clamp((apart * apart + r * r - c * c) / (2.0 * apart * r), -1.0, 1.0);\n"
-    "    float y = clamp((apart * apart + c * c - r * r) / (2.0 * apart * c), -1.0, 1.0);\n"
-    "    float k = (r + c - apart) * (apart + r - c) * (apart - r + c) * (apart + r + c);\n"
-    "    return (r * r * acos(x) + c * c * acos(y) - 0.5 * sqrt(max(k, 0.0))) / (3.14159265 * c * c);\n"
-    "}\n"
+    SAT__GLSL(
+        flat in vec4 path;
+        float lens_share(float r, float c, float apart) {
+            if (apart >= r + c) return 0.0;
+            if (apart <= abs(r - c)) return min(r * r / (c * c), 1.0);
+            float x = clamp((apart * apart + r * r - c * c) / (2.0 * apart * r), -1.0, 1.0);
+            float y = clamp((apart * apart + c * c - r * r) / (2.0 * apart * c), -1.0, 1.0);
+            float k = (r + c - apart) * (apart + r - c) * (apart - r + c) * (apart + r + c);
+            return (r * r * acos(x) + c * c * acos(y) - 0.5 * sqrt(max(k, 0.0))) / (3.14159265 * c * c);
+        })
     /* raindrop__mean_chord, raindrop__mean_clamp, raindrop__path_cover */
-    "float mean_chord(float r, float w, float width) {\n"
-    "    vec2 x = clamp(vec2(w - 0.5 * width, w + 0.5 * width) / r, -1.0, 1.0), s = x * sqrt((1.0 - x) * (1.0 + x)) + asin(x);\n"
-    "    return r * r * 0.5 * (s.y - s.x) / width;\n"
-    "}\n"
-    "float mean_clamp(float v, float way, float w) {\n"
-    "    vec2 e = vec2(0.5 * way, -0.5 * way), a = clamp(v + 0.5 * w + e, 0.0, w), b = max(v - 0.5 * w + e, 0.0);\n"
-    "    return 0.5 * (a.x * a.x - a.y * a.y) / w + b.x - b.y;\n"
-    "}\n"
-    "float path_cover(vec2 at, vec2 along, float way, float u, float w) {\n"
-    "    vec2 apart = 0.288675 * way * along;\n"
-    "    if (way < SHORT) return 0.5 * (disc_cover(path.w, at - apart) + disc_cover(path.w, at + apart));\n"
-    "    float width = 1.0 / max(abs(along.x), abs(along.y)), h = mean_chord(path.w, w, width);\n"
-    "    return h > 0.0 ? (mean_clamp(u + h, way, width) - mean_clamp(u - h, way, width)) / way : 0.0;\n"
-    "}\n"
-    "void draw_soft(vec2 at) {\n"
-    "    float r = place.z, way = length(path.xy);\n"
-    "    bool is_far = far_colour.w > 0.5, moves = way > 0.25;\n"
-    "    vec2 along = way > 1e-6 ? path.xy / way : vec2(1.0, 0.0);\n"
-    "    float u = dot(at, along), w = along.x * at.y - along.y * at.x, h = sqrt(max(path.w * path.w - w * w, 0.0));\n"
-    "    float from = clamp(u - h, -0.5 * way, 0.5 * way), to = clamp(u + h, -0.5 * way, 0.5 * way), alpha;\n"
-    "    if (moves || is_far) alpha = path_cover(at, along, way, u, w) * r * r / (path.w * path.w);\n"
-    "    else alpha = lens_share(r, max(path.z, LEAST_BLUR), length(at)), from = to = 0.0;\n"
-    "    if (alpha <= 0.0) discard;\n"
-    "    colour = vec4(far_colour.rgb, alpha);\n"
-    "    if (is_far) return;\n"
-    "    int samples = !moves ? 1 : r < 6.0 ? 4 : r < 24.0 ? 8 : 16;\n"
-    "    float blur = 2.0 * path.z + (moves ? max(min(2.0 * r, way) / float(samples), 1.0) : 1.0);\n"
-    "    vec3 sum = vec3(0.0);\n"
-    "    for (int j = 0; j < samples; j++)\n"
-    "        sum += shade(trace(at - along * mix(from, to, (float(j) + 0.5) / float(samples))).ray, blur);\n"
-    "    colour.rgb = sum / float(samples);\n"
-    "}\n"
+    SAT__GLSL(
+        float mean_chord(float r, float w, float width) {
+            vec2 x = clamp(vec2(w - 0.5 * width, w + 0.5 * width) / r, -1.0, 1.0),
+                s = x * sqrt((1.0 - x) * (1.0 + x)) + asin(x);
+            return r * r * 0.5 * (s.y - s.x) / width;
+        })
+    SAT__GLSL(
+        float mean_clamp(float v, float way, float w) {
+            vec2 e = vec2(0.5 * way, -0.5 * way), a = clamp(v + 0.5 * w + e, 0.0, w), b = max(v - 0.5 * w + e, 0.0);
+            return 0.5 * (a.x * a.x - a.y * a.y) / w + b.x - b.y;
+        })
+    SAT__GLSL(
+        float path_cover(vec2 at, vec2 along, float way, float u, float w) {
+            vec2 apart = 0.288675 * way * along;
+            if (way < SHORT) return 0.5 * (disc_cover(path.w, at - apart) + disc_cover(path.w, at + apart));
+            float width = 1.0 / max(abs(along.x), abs(along.y)), h = mean_chord(path.w, w, width);
+            return h > 0.0 ? (mean_clamp(u + h, way, width) - mean_clamp(u - h, way, width)) / way : 0.0;
+        })
+    SAT__GLSL(
+        void draw_soft(vec2 at) {
+            float r = place.z, way = length(path.xy);
+            bool is_far = far_colour.w > 0.5, moves = way > 0.25;
+            vec2 along = way > 1e-6 ? path.xy / way : vec2(1.0, 0.0);
+            float u = dot(at, along), w = along.x * at.y - along.y * at.x, h = sqrt(max(path.w * path.w - w * w, 0.0));
+            float from = clamp(u - h, -0.5 * way, 0.5 * way), to = clamp(u + h, -0.5 * way, 0.5 * way), alpha;
+            if (moves || is_far) alpha = path_cover(at, along, way, u, w) * r * r / (path.w * path.w);
+            else alpha = lens_share(r, max(path.z, LEAST_BLUR), length(at)), from = to = 0.0;
+            if (alpha <= 0.0) discard;
+            colour = vec4(far_colour.rgb, alpha);
+            if (is_far) return;
+            int samples = !moves ? 1 : r < 6.0 ? 4 : r < 24.0 ? 8 : 16;
+            float blur = 2.0 * path.z + (moves ? max(min(2.0 * r, way) / float(samples), 1.0) : 1.0);
+            vec3 sum = vec3(0.0);
+            for (int j = 0; j < samples; j++)
+                sum += shade(trace(at - along * mix(from, to, (float(j) + 0.5) / float(samples))).ray, blur);
+            colour.rgb = sum / float(samples);
+        })
     "#endif\n";
 
 static const char raindrop__glsl_draw_ray[] =
-    "void main() {\n"
-    "    vec2 at = here() - place.xy;\n"
+    SAT__GLSL(
+        void main() {
+            vec2 at = here() - place.xy;)
     "#ifdef SOFT\n"
-    "    if (path.w > 0.0) {\n"
-    "        draw_soft(at);\n"
-    "        return;\n"
-    "    }\n"
+    SAT__GLSL(
+            if (path.w > 0.0) {
+                draw_soft(at);
+                return;
+            })
     "#endif\n"
-    "    if (far_colour.w > 0.5) {\n"
-    "        colour = vec4(far_colour.rgb, far_cover(at));\n"
-    "        if (colour.a <= 0.0) discard;\n"
-    "        return;\n"
-    "    }\n"
-    "    fragment f = trace(at);\n"
-    "    if (f.cover <= 0.0) discard;\n"
+    SAT__GLSL(
+            if (far_colour.w > 0.5) {
+                colour = vec4(far_colour.rgb, far_cover(at));
+                if (colour.a <= 0.0) discard;
+                return;
+            }
+            fragment f = trace(at);
+            if (f.cover <= 0.0) discard;)
     "#if defined ORDERS && defined FLAT\n"
-    "    colour = vec4(seen.w < 1.0 ? shade(f.ray, 1.0) : still_colour(f.d, f.p, f.one_minus_b2), f.cover);\n"
+    SAT__GLSL(colour = vec4(seen.w < 1.0 ? shade(f.ray, 1.0) : still_colour(f.d, f.p, f.one_minus_b2), f.cover);)
     "#elif defined ORDERS\n"
-    "    colour = vec4(still_colour(f.d, f.p, f.one_minus_b2), f.cover);\n"
+    SAT__GLSL(colour = vec4(still_colour(f.d, f.p, f.one_minus_b2), f.cover);)
     "#else\n"
-    "    colour = vec4(shade(f.ray, 1.0), f.cover);\n"
+    SAT__GLSL(colour = vec4(shade(f.ray, 1.0), f.cover);)
     "#endif\n"
-    "}\n";
+    SAT__GLSL(});
 
 /* raindrop__step and raindrop__reenter in floats. */
 static const char raindrop__glsl_step[] =
-    "float decay(float x) { return x < 1e-3 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x); }\n"
-    "float log_1p(float x) { return abs(x) < 1e-3 ? x * (1.0 - x * (0.5 - x / 3.0)) : log(1.0 + x); }\n"
-    "float terminal(float mm) {\n"
-    "    float stokes = GRAVITY * DENSITY * mm * mm * 1e-6 / (18.0 * VISCOSITY), best = 9.32 * decay(pow(mm / 1.77, 1.147));\n"
-    "    float slow = min(stokes, best), s = slow / stokes, t = slow / best;\n"
-    "    return slow * inversesqrt(sqrt(s * s * s * s + t * t * t * t));\n"
-    "}\n"
+    SAT__GLSL(float decay(float x) { return x < 1e-3 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x); })
+    SAT__GLSL(float log_1p(float x) { return abs(x) < 1e-3 ? x * (1.0 - x * (0.5 - x / 3.0)) : log(1.0 + x); })
+    SAT__GLSL(
+        float terminal(float mm) {
+            float stokes = GRAVITY * DENSITY * mm * mm * 1e-6 / (18.0 * VISCOSITY),
+                best = 9.32 * decay(pow(mm / 1.77, 1.147));
+            float slow = min(stokes, best), s = slow / stokes, t = slow / best;
+            return slow * inversesqrt(sqrt(s * s * s * s + t * t * t * t));
+        })
     /* speed downwards, way downwards, integral of a + b|v| */
-    "vec3 sink(float v, float vt, float a, float b, float h) {\n"
-    "    float u = v - vt, k = a + 2.0 * b * vt, lost = decay(k * h), q = b * u / k * lost;\n"
-    "    return vec3(vt + u * (1.0 - lost) / (1.0 + q), vt * h + u * lost / k * (abs(q) > 1e-3 ? log_1p(q) / q : 1.0 - q * (0.5 - q / 3.0)),\n"
-    "                (a + b * vt) * h + log_1p(q));\n"
-    "}\n"
-    "vec3 rise(float s, float a, float b, inout float h) {\n"
-    "    float d = a * a - 4.0 * b * GRAVITY, apex, t, end, way;\n"
-    "    if (d > 0.0) {\n"
-    "        float root = sqrt(d), sum = a + root, r1 = 2.0 * GRAVITY / sum, start = (s + r1) / (2.0 * b * s + sum);\n"
-    "        apex = log(start * sum / r1) / root;\n"
-    "        t = min(h, apex);\n"
-    "        start *= exp(-root * t);\n"
-    "        end = h < apex ? (start * sum - r1) / (1.0 - 2.0 * b * start) : 0.0;\n"
-    "        way = (r1 * log((end + r1) / (s + r1)) - sum / (2.0 * b) * log_1p(2.0 * b * (end - s) / (2.0 * b * s + sum))) / root;\n"
-    "    } else {\n"
-    "        float root = sqrt(-d) + 1e-12, phase = atan((2.0 * b * s + a) / root), last = atan(a / root);\n"
-    "        apex = 2.0 * (phase - last) / root;\n"
-    "        t = min(h, apex);\n"
-    "        last = phase - 0.5 * root * t;\n"
-    "        end = h < apex ? (root * tan(last) - a) / (2.0 * b) : 0.0;\n"
-    "        way = log(cos(last) / cos(phase)) / b - a * t / (2.0 * b);\n"
-    "    }\n"
-    "    h -= t;\n"
-    "    return vec3(-max(end, 0.0), -way, a * t + b * way);\n"
-    "}\n"
-    "void drift(inout vec2 speed, inout vec2 way, float damping, float h) {\n"
-    "    way += speed * h * (damping > 1e-6 ? decay(damping) / damping : 1.0);\n"
-    "    speed *= exp(-damping);\n"
-    "}\n"
-    "void fall(inout vec3 velocity, out vec3 way, float radius, vec3 wind, float h) {\n"
-    "    float mm = 2e3 * radius, vt = terminal(mm), a = 18.0 * VISCOSITY / (DENSITY * mm * mm * 1e-6), b = max(GRAVITY - a * vt, 1e-6) / (vt * vt);\n"
-    "    float v = wind.y - velocity.y, left = h;\n"
-    "    vec2 side = velocity.xz - wind.xz, side_way = wind.xz * h;\n"
-    "    way = wind * h;\n"
-    "    if (v < 0.0) {\n"
-    "        vec3 up_phase = rise(-v, a, b, left);\n"
-    "        drift(side, side_way, up_phase.z, h - left);\n"
-    "        way.y -= up_phase.y;\n"
-    "        v = up_phase.x;\n"
-    "    }\n"
-    "    if (left > 0.0) {\n"
-    "        vec3 down_phase = sink(v, vt, a, b, left);\n"
-    "        drift(side, side_way, down_phase.z, left);\n"
-    "        way.y -= down_phase.y;\n"
-    "        v = down_phase.x;\n"
-    "    }\n"
-    "    way.xz = side_way;\n"
-    "    velocity = vec3(side.x + wind.x, wind.y - v, side.y + wind.z);\n"
-    "}\n";
+    SAT__GLSL(
+        vec3 sink(float v, float vt, float a, float b, float h) {
+            float u = v - vt, k = a + 2.0 * b * vt, lost = decay(k * h), q = b * u / k * lost;
+            return vec3(vt + u * (1.0 - lost) / (1.0 + q),
+                vt * h + u * lost / k * (abs(q) > 1e-3 ? log_1p(q) / q : 1.0 - q * (0.5 - q / 3.0)),
+                        (a + b * vt) * h + log_1p(q));
+        })
+    SAT__GLSL(
+        vec3 rise(float s, float a, float b, inout float h) {
+            float d = a * a - 4.0 * b * GRAVITY, apex, t, end, way;
+            if (d > 0.0) {
+                float root = sqrt(d), sum = a + root, r1 = 2.0 * GRAVITY / sum, start = (s + r1) / (2.0 * b * s + sum);
+                apex = log(start * sum / r1) / root;
+                t = min(h, apex);
+                start *= exp(-root * t);
+                end = h < apex ? (start * sum - r1) / (1.0 - 2.0 * b * start) : 0.0;
+                way = (r1 * log((end + r1) / (s + r1)) - sum / (2.0 * b)
+                    * log_1p(2.0 * b * (end - s) / (2.0 * b * s + sum))) / root;
+            } else {
+                float root = sqrt(-d) + 1e-12, phase = atan((2.0 * b * s + a) / root), last = atan(a / root);
+                apex = 2.0 * (phase - last) / root;
+                t = min(h, apex);
+                last = phase - 0.5 * root * t;
+                end = h < apex ? (root * tan(last) - a) / (2.0 * b) : 0.0;
+                way = log(cos(last) / cos(phase)) / b - a * t / (2.0 * b);
+            }
+            h -= t;
+            return vec3(-max(end, 0.0), -way, a * t + b * way);
+        })
+    SAT__GLSL(
+        void drift(inout vec2 speed, inout vec2 way, float damping, float h) {
+            way += speed * h * (damping > 1e-6 ? decay(damping) / damping : 1.0);
+            speed *= exp(-damping);
+        })
+    SAT__GLSL(
+        void fall(inout vec3 velocity, out vec3 way, float radius, vec3 wind, float h) {
+            float mm = 2e3 * radius, vt = terminal(mm), a = 18.0 * VISCOSITY / (DENSITY * mm * mm * 1e-6),
+                b = max(GRAVITY - a * vt, 1e-6) / (vt * vt);
+            float v = wind.y - velocity.y, left = h;
+            vec2 side = velocity.xz - wind.xz, side_way = wind.xz * h;
+            way = wind * h;
+            if (v < 0.0) {
+                vec3 up_phase = rise(-v, a, b, left);
+                drift(side, side_way, up_phase.z, h - left);
+                way.y -= up_phase.y;
+                v = up_phase.x;
+            }
+            if (left > 0.0) {
+                vec3 down_phase = sink(v, vt, a, b, left);
+                drift(side, side_way, down_phase.z, left);
+                way.y -= down_phase.y;
+                v = down_phase.x;
+            }
+            way.xz = side_way;
+            velocity = vec3(side.x + wind.x, wind.y - v, side.y + wind.z);
+        });
 
 static const char raindrop__glsl_advance[] =
-    "layout(location = 0) in vec4 drop;\n"
-    "layout(location = 1) in vec4 motion;\n"
-    "uniform vec3 wind, centre, box;\n"
-    "uniform vec4 sizes;\n"      /* lambda, smallest, largest diameter in mm, the fixed one or 0 */
-    "uniform vec4 step_and;\n"   /* dt, settled, own drops, published speed */
-    "uniform vec2 fastest;\n"    /* terminal velocity of the largest, oblate */
-    "uniform uint seed, stream;\n"
-    "const uint TURN = 0x2545f491u;\n" /* RAINDROP__TURN */
-    "out vec4 next_drop, next_motion;\n"
-    "uint mix_bits(uint v) {\n"
-    "    v = (v ^ (v >> 16)) * 0x7feb352du;\n"
-    "    v = (v ^ (v >> 15)) * 0x846ca68bu;\n"
-    "    return v ^ (v >> 16);\n"
-    "}\n"
-    "uint hash(uint s, uint i) { return mix_bits(i ^ mix_bits(s ^ mix_bits(seed ^ 0x9e3779b9u))); }\n"
-    "float uniform_of(uint bits) { return (float(bits >> 9) + 0.5) / 8388608.0; }\n"
-    "float diameter(uint stream, uint i, bool at_plane) {\n"
-    "    float span = sizes.z - sizes.y, all = 1.0 - exp(-sizes.x * span), d = sizes.y;\n"
-    "    for (uint attempt = 0u; attempt < 256u; attempt++) {\n"
-    "        uint bits = hash(stream + 16u + attempt, i);\n"
-    "        d = sizes.y - log_1p(-uniform_of(bits) * all) / sizes.x;\n"
-    "        if (!at_plane || step_and.w > 0.0 || uniform_of(mix_bits(bits)) * fastest.x < terminal(d)) break;\n"
-    "    }\n"
-    "    return d;\n"
-    "}\n"
-    "float oblateness(float d) { return min(1.0, 1.0048 + d * (5.7e-4 + d * (-2.628e-2 + d * (3.682e-3 - d * 1.677e-4)))); }\n"
-    "void main() {\n"
-    "    vec3 velocity = motion.xyz, way = velocity * step_and.x, low = centre - 0.5 * box, at;\n"
-    "    float radius = drop.w, ratio = motion.w;\n"
-    "    if (step_and.y < 0.5 && radius > 0.0) fall(velocity, way, radius, wind, step_and.x);\n"
-    "    at = drop.xyz + way;\n"
-    "    if (step_and.z < 0.5) {\n"
-    "        float below = low.y - at.y;\n"
-    "        bool leaves = way.y < 0.0 && below > 0.0;\n"
-    "        if (leaves && sizes.w <= 0.0) {\n"
-    "            uint i = uint(gl_VertexID);\n"
-    "            uint s = stream;\n"
-    "            float mm, speed, left = velocity.y < 0.0 ? below / -velocity.y : 0.0;\n"
-    "            if (left > 64.0 * box.y / (step_and.w > 0.0 ? step_and.w : fastest.x)) {\n" /* raindrop__forgets */
-    "                mm = diameter(s, i, false);\n"
-    "                below = uniform_of(hash(s + 1u, i)) * box.y;\n"
-    "            } else {\n"
-    "                for (int turn = 0; turn < 256; turn++, s += TURN) {\n"
-    "                    mm = diameter(s, i, true);\n"
-    "                    speed = (step_and.w > 0.0 ? step_and.w : terminal(mm)) - wind.y;\n"
-    "                    if (!(left * speed >= box.y) || turn == 255) break;\n"
-    "                    left -= box.y / speed;\n"
-    "                }\n"
-    "                below = max(left * speed, 0.0);\n"
-    "            }\n"
-    "            radius = 0.5e-3 * mm;\n"
-    "            ratio = fastest.y > 0.5 ? oblateness(mm) : 1.0;\n"
-    "            velocity = wind - vec3(0.0, step_and.w > 0.0 ? step_and.w : terminal(mm), 0.0);\n"
-    "            at.x = centre.x + (uniform_of(hash(s, i)) - 0.5) * box.x;\n"
-    "            at.z = centre.z + (uniform_of(hash(s + 2u, i)) - 0.5) * box.z;\n"
-    "        }\n"
-    "        if (leaves) at.y = low.y + box.y - mod(below, box.y);\n"
-    "        vec3 turns = floor((at - low) / box);\n"
-    "        if (any(notEqual(turns, vec3(0.0)))) at -= turns * box;\n"
-    "    }\n"
-    "    next_drop = vec4(at, radius);\n"
-    "    next_motion = vec4(velocity, ratio);\n"
-    "    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);\n"
-    "    gl_PointSize = 1.0;\n"
-    "}\n";
+    SAT__GLSL(
+        layout(location = 0) in vec4 drop;
+        layout(location = 1) in vec4 motion;
+        uniform vec3 wind, centre, box;
+        uniform vec4 sizes; /* lambda, smallest, largest diameter in mm, the fixed one or 0 */
+        uniform vec4 step_and; /* dt, settled, own drops, published speed */
+        uniform vec2 fastest; /* terminal velocity of the largest, oblate */
+        uniform uint seed, stream;
+        const uint TURN = 0x2545f491u; /* RAINDROP__TURN */
+        out vec4 next_drop, next_motion;
+        uint mix_bits(uint v) {
+            v = (v ^ (v >> 16)) * 0x7feb352du;
+            v = (v ^ (v >> 15)) * 0x846ca68bu;
+            return v ^ (v >> 16);
+        })
+    SAT__GLSL(uint hash(uint s, uint i) { return mix_bits(i ^ mix_bits(s ^ mix_bits(seed ^ 0x9e3779b9u))); })
+    SAT__GLSL(float uniform_of(uint bits) { return (float(bits >> 9) + 0.5) / 8388608.0; })
+    SAT__GLSL(
+        float diameter(uint stream, uint i, bool at_plane) {
+            float span = sizes.z - sizes.y, all = 1.0 - exp(-sizes.x * span), d = sizes.y;
+            for (uint attempt = 0u; attempt < 256u; attempt++) {
+                uint bits = hash(stream + 16u + attempt, i);
+                d = sizes.y - log_1p(-uniform_of(bits) * all) / sizes.x;
+                if (!at_plane || step_and.w > 0.0 || uniform_of(mix_bits(bits)) * fastest.x < terminal(d)) break;
+            }
+            return d;
+        })
+    SAT__GLSL(
+        float oblateness(float d) {
+            return min(1.0, 1.0048 + d * (5.7e-4 + d * (-2.628e-2 + d * (3.682e-3 - d * 1.677e-4))));
+        })
+    SAT__GLSL(
+        void main() {
+            vec3 velocity = motion.xyz, way = velocity * step_and.x, low = centre - 0.5 * box, at;
+            float radius = drop.w, ratio = motion.w;
+            if (step_and.y < 0.5 && radius > 0.0) fall(velocity, way, radius, wind, step_and.x);
+            at = drop.xyz + way;
+            if (step_and.z < 0.5) {
+                float below = low.y - at.y;
+                bool leaves = way.y < 0.0 && below > 0.0;
+                if (leaves && sizes.w <= 0.0) {
+                    uint i = uint(gl_VertexID);
+                    uint s = stream;
+                    float mm, speed, left = velocity.y < 0.0 ? below / -velocity.y : 0.0;
+                    if (left > 64.0 * box.y / (step_and.w > 0.0 ? step_and.w : fastest.x)) { /* raindrop__forgets */
+                        mm = diameter(s, i, false);
+                        below = uniform_of(hash(s + 1u, i)) * box.y;
+                    } else {
+                        for (int turn = 0; turn < 256; turn++, s += TURN) {
+                            mm = diameter(s, i, true);
+                            speed = (step_and.w > 0.0 ? step_and.w : terminal(mm)) - wind.y;
+                            if (!(left * speed >= box.y) || turn == 255) break;
+                            left -= box.y / speed;
+                        }
+                        below = max(left * speed, 0.0);
+                    }
+                    radius = 0.5e-3 * mm;
+                    ratio = fastest.y > 0.5 ? oblateness(mm) : 1.0;
+                    velocity = wind - vec3(0.0, step_and.w > 0.0 ? step_and.w : terminal(mm), 0.0);
+                    at.x = centre.x + (uniform_of(hash(s, i)) - 0.5) * box.x;
+                    at.z = centre.z + (uniform_of(hash(s + 2u, i)) - 0.5) * box.z;
+                }
+                if (leaves) at.y = low.y + box.y - mod(below, box.y);
+                vec3 turns = floor((at - low) / box);
+                if (any(notEqual(turns, vec3(0.0)))) at -= turns * box;
+            }
+            next_drop = vec4(at, radius);
+            next_motion = vec4(velocity, ratio);
+            gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+            gl_PointSize = 1.0;
+        });
 
 /* ------------------------------------------------------------------------------------------------
    >> OpenGL   the object and its calls

@@ -1320,6 +1320,10 @@ SAT__IEEE_END
 #define SAT__GL_CALL
 #endif
 
+/* GLSL as a string: a macro a function, its directives (#if ...) beside it in quotes. Comments and line ends go; what
+   is in the macro has as many ( as ) and is not expanded. */
+#define SAT__GLSL(...) #__VA_ARGS__ "\n"
+
 /* The names and numbers of the OpenGL registry, as far as the six headers use them. */
 enum {
     SAT__GL_NO_ERROR = 0,
@@ -1757,9 +1761,10 @@ static inline sat_result sat__gl_link(sat__gl *gl, unsigned program, const sat__
 static inline sat_result sat__gl_build(sat__gl *gl, unsigned *program, const sat__gl_shaders *shaders)
 {
     static const char *const triangle[] = {
-        "void main() {\n"
-        "    gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);\n"
-        "}\n", NULL};
+        SAT__GLSL(
+            void main() {
+                gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+            }), NULL};
     static const char *const nothing[] = {"void main() {}\n", NULL};
     sat__gl_shaders plain = *shaders;
     unsigned stage[2] = {0, 0};
@@ -1932,11 +1937,12 @@ static inline void sat__gl_pass(sat__gl *gl, unsigned program, unsigned framebuf
 /* What a shader that draws to a sat_gl_target has instead of gl_FragCoord: the pixel of the picture. */
 static inline const char *sat__gl_pixel(void)
 {
-    return "uniform ivec3 sat_corner_of;\n" /* x, y; with flip the height, else 0 */
-           "ivec2 sat_pixel() {\n"
-           "    ivec2 p = ivec2(gl_FragCoord.xy) - sat_corner_of.xy;\n"
-           "    return sat_corner_of.z > 0 ? ivec2(p.x, sat_corner_of.z - 1 - p.y) : p;\n"
-           "}\n";
+    return SAT__GLSL(
+        uniform ivec3 sat_corner_of; /* x, y; with flip the height, else 0 */
+        ivec2 sat_pixel() {
+            ivec2 p = ivec2(gl_FragCoord.xy) - sat_corner_of.xy;
+            return sat_corner_of.z > 0 ? ivec2(p.x, sat_corner_of.z - 1 - p.y) : p;
+        });
 }
 
 static inline int sat__gl_target_is_valid(const sat_gl_target *target)
@@ -5726,87 +5732,99 @@ static const char sat__glsl_lookups[] =
     "#ifndef SAT_GLSL\n"
     "#define SAT_GLSL\n"
     "#ifdef GL_ES\n"
-    "precision highp float;\n"
-    "precision highp int;\n"
-    "precision highp sampler2D;\n"
-    "precision highp usampler2D;\n"
+    SAT__GLSL(
+        precision highp float;
+        precision highp int;
+        precision highp sampler2D;
+        precision highp usampler2D;)
     "#endif\n"
-    "vec2 sat_add(vec2 a, vec2 b, float one) {\n"
-    "    bool swap = abs(a.x) < abs(b.x);\n"
-    "    float big = swap ? b.x : a.x, small = swap ? a.x : b.x;\n"
-    "    float sum = (big + small) * one;\n"
-    "    float low = (small - (sum - big)) + (a.y + b.y);\n"
-    "    float high = (sum + low) * one;\n"
-    "    return vec2(high, low - (high - sum));\n"
-    "}\n"
-    "vec2 sat_corner(sampler2D table, int x, int y) {\n"
-    "    return x < 1 || y < 1 ? vec2(0.0) : texelFetch(table, ivec2(x, y) - 1, 0).xy;\n"
-    "}\n"
-    "uint sat_corner(usampler2D table, int x, int y) {\n"
-    "    return x < 1 || y < 1 ? 0u : texelFetch(table, ivec2(x, y) - 1, 0).x;\n"
-    "}\n"
-    "float sat_sum(sampler2D table, ivec2 low, ivec2 high) {\n"
-    "    ivec2 size = textureSize(table, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size);\n"
-    "    float one = size.x > 0 ? 1.0 : 0.0;\n"
-    "    if (any(lessThanEqual(b, a))) return 0.0;\n"
-    "    vec2 right = sat_add(sat_corner(table, b.x, b.y), -sat_corner(table, b.x, a.y), one);\n"
-    "    vec2 left = sat_add(sat_corner(table, a.x, b.y), -sat_corner(table, a.x, a.y), one);\n"
-    "    right = sat_add(right, -left, one);\n"
-    "    return right.x + right.y;\n"
-    "}\n"
-    "float sat_sum(usampler2D table, float quantum, ivec2 low, ivec2 high) {\n"
-    "    ivec2 size = textureSize(table, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size);\n"
-    "    if (any(lessThanEqual(b, a))) return 0.0;\n"
-    "    return quantum * float(int(sat_corner(table, b.x, b.y) - sat_corner(table, b.x, a.y) -\n"
-    "                               sat_corner(table, a.x, b.y) + sat_corner(table, a.x, a.y)));\n"
-    "}\n"
-    "float sat_area(ivec2 size, ivec2 low, ivec2 high) {\n"
-    "    ivec2 side = clamp(high, ivec2(0), size) - clamp(low, ivec2(0), size);\n"
-    "    return side.x > 0 && side.y > 0 ? float(side.x) * float(side.y) : 1.0;\n"
-    "}\n"
-    "float sat_mean(sampler2D table, ivec2 low, ivec2 high) {\n"
-    "    return sat_sum(table, low, high) / sat_area(textureSize(table, 0), low, high);\n"
-    "}\n"
-    "float sat_mean(usampler2D table, float quantum, ivec2 low, ivec2 high) {\n"
-    "    return sat_sum(table, quantum, low, high) / sat_area(textureSize(table, 0), low, high);\n"
-    "}\n"
-    "float sat_sum_fractional(sampler2D table, vec2 low, vec2 high) {\n"
-    "    ivec2 size = textureSize(table, 0);\n"
-    "    vec2 a = clamp(low, vec2(0.0), vec2(size)), b = clamp(high, vec2(0.0), vec2(size));\n"
-    "    float one = size.x > 0 ? 1.0 : 0.0, sum = 0.0;\n"
-    "    if (!all(lessThan(a, b))) return 0.0;\n"
-    "    ivec4 x = min(ivec4(int(a.x), int(a.x) + 1, int(b.x), int(b.x) + 1), size.x);\n"
-    "    ivec4 y = min(ivec4(int(a.y), int(a.y) + 1, int(b.y), int(b.y) + 1), size.y);\n"
-    "    vec3 u = vec3(1.0 - fract(a.x), 1.0, fract(b.x)), v = vec3(1.0 - fract(a.y), 1.0, fract(b.y));\n"
-    "    for (int i = 0; i < 3; i++) {\n"
-    "        vec2 left = sat_add(sat_corner(table, x[0], y[i + 1]), -sat_corner(table, x[0], y[i]), one);\n"
-    "        for (int j = 0; j < 3; j++) {\n"
-    "            vec2 right = sat_add(sat_corner(table, x[j + 1], y[i + 1]), -sat_corner(table, x[j + 1], y[i]), one);\n"
-    "            vec2 box = sat_add(right, -left, one);\n"
-    "            sum += v[i] * u[j] * (box.x + box.y);\n"
-    "            left = right;\n"
-    "        }\n"
-    "    }\n"
-    "    return sum;\n"
-    "}\n"
-    "float sat_sum_fractional(usampler2D table, float quantum, vec2 low, vec2 high) {\n"
-    "    ivec2 size = textureSize(table, 0);\n"
-    "    vec2 a = clamp(low, vec2(0.0), vec2(size)), b = clamp(high, vec2(0.0), vec2(size));\n"
-    "    float sum = 0.0;\n"
-    "    if (!all(lessThan(a, b))) return 0.0;\n"
-    "    ivec4 x = min(ivec4(int(a.x), int(a.x) + 1, int(b.x), int(b.x) + 1), size.x);\n"
-    "    ivec4 y = min(ivec4(int(a.y), int(a.y) + 1, int(b.y), int(b.y) + 1), size.y);\n"
-    "    vec3 u = vec3(1.0 - fract(a.x), 1.0, fract(b.x)), v = vec3(1.0 - fract(a.y), 1.0, fract(b.y));\n"
-    "    for (int i = 0; i < 3; i++) {\n"
-    "        uint left = sat_corner(table, x[0], y[i + 1]) - sat_corner(table, x[0], y[i]);\n"
-    "        for (int j = 0; j < 3; j++) {\n"
-    "            uint right = sat_corner(table, x[j + 1], y[i + 1]) - sat_corner(table, x[j + 1], y[i]);\n"
-    "            sum += v[i] * u[j] * float(int(right - left));\n"
-    "            left = right;\n"
-    "        }\n"
-    "    }\n"
-    "    return quantum * sum;\n"
-    "}\n"
+    SAT__GLSL(
+        vec2 sat_add(vec2 a, vec2 b, float one) {
+            bool swap = abs(a.x) < abs(b.x);
+            float big = swap ? b.x : a.x, small = swap ? a.x : b.x;
+            float sum = (big + small) * one;
+            float low = (small - (sum - big)) + (a.y + b.y);
+            float high = (sum + low) * one;
+            return vec2(high, low - (high - sum));
+        })
+    SAT__GLSL(
+        vec2 sat_corner(sampler2D table, int x, int y) {
+            return x < 1 || y < 1 ? vec2(0.0) : texelFetch(table, ivec2(x, y) - 1, 0).xy;
+        })
+    SAT__GLSL(
+        uint sat_corner(usampler2D table, int x, int y) {
+            return x < 1 || y < 1 ? 0u : texelFetch(table, ivec2(x, y) - 1, 0).x;
+        })
+    SAT__GLSL(
+        float sat_sum(sampler2D table, ivec2 low, ivec2 high) {
+            ivec2 size = textureSize(table, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size);
+            float one = size.x > 0 ? 1.0 : 0.0;
+            if (any(lessThanEqual(b, a))) return 0.0;
+            vec2 right = sat_add(sat_corner(table, b.x, b.y), -sat_corner(table, b.x, a.y), one);
+            vec2 left = sat_add(sat_corner(table, a.x, b.y), -sat_corner(table, a.x, a.y), one);
+            right = sat_add(right, -left, one);
+            return right.x + right.y;
+        })
+    SAT__GLSL(
+        float sat_sum(usampler2D table, float quantum, ivec2 low, ivec2 high) {
+            ivec2 size = textureSize(table, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size);
+            if (any(lessThanEqual(b, a))) return 0.0;
+            return quantum * float(int(sat_corner(table, b.x, b.y) - sat_corner(table, b.x, a.y) -
+                                       sat_corner(table, a.x, b.y) + sat_corner(table, a.x, a.y)));
+        })
+    SAT__GLSL(
+        float sat_area(ivec2 size, ivec2 low, ivec2 high) {
+            ivec2 side = clamp(high, ivec2(0), size) - clamp(low, ivec2(0), size);
+            return side.x > 0 && side.y > 0 ? float(side.x) * float(side.y) : 1.0;
+        })
+    SAT__GLSL(
+        float sat_mean(sampler2D table, ivec2 low, ivec2 high) {
+            return sat_sum(table, low, high) / sat_area(textureSize(table, 0), low, high);
+        })
+    SAT__GLSL(
+        float sat_mean(usampler2D table, float quantum, ivec2 low, ivec2 high) {
+            return sat_sum(table, quantum, low, high) / sat_area(textureSize(table, 0), low, high);
+        })
+    SAT__GLSL(
+        float sat_sum_fractional(sampler2D table, vec2 low, vec2 high) {
+            ivec2 size = textureSize(table, 0);
+            vec2 a = clamp(low, vec2(0.0), vec2(size)), b = clamp(high, vec2(0.0), vec2(size));
+            float one = size.x > 0 ? 1.0 : 0.0, sum = 0.0;
+            if (!all(lessThan(a, b))) return 0.0;
+            ivec4 x = min(ivec4(int(a.x), int(a.x) + 1, int(b.x), int(b.x) + 1), size.x);
+            ivec4 y = min(ivec4(int(a.y), int(a.y) + 1, int(b.y), int(b.y) + 1), size.y);
+            vec3 u = vec3(1.0 - fract(a.x), 1.0, fract(b.x)), v = vec3(1.0 - fract(a.y), 1.0, fract(b.y));
+            for (int i = 0; i < 3; i++) {
+                vec2 left = sat_add(sat_corner(table, x[0], y[i + 1]), -sat_corner(table, x[0], y[i]), one);
+                for (int j = 0; j < 3; j++) {
+                    vec2 right = sat_add(sat_corner(table, x[j + 1], y[i + 1]), -sat_corner(table, x[j + 1], y[i]),
+                        one);
+                    vec2 box = sat_add(right, -left, one);
+                    sum += v[i] * u[j] * (box.x + box.y);
+                    left = right;
+                }
+            }
+            return sum;
+        })
+    SAT__GLSL(
+        float sat_sum_fractional(usampler2D table, float quantum, vec2 low, vec2 high) {
+            ivec2 size = textureSize(table, 0);
+            vec2 a = clamp(low, vec2(0.0), vec2(size)), b = clamp(high, vec2(0.0), vec2(size));
+            float sum = 0.0;
+            if (!all(lessThan(a, b))) return 0.0;
+            ivec4 x = min(ivec4(int(a.x), int(a.x) + 1, int(b.x), int(b.x) + 1), size.x);
+            ivec4 y = min(ivec4(int(a.y), int(a.y) + 1, int(b.y), int(b.y) + 1), size.y);
+            vec3 u = vec3(1.0 - fract(a.x), 1.0, fract(b.x)), v = vec3(1.0 - fract(a.y), 1.0, fract(b.y));
+            for (int i = 0; i < 3; i++) {
+                uint left = sat_corner(table, x[0], y[i + 1]) - sat_corner(table, x[0], y[i]);
+                for (int j = 0; j < 3; j++) {
+                    uint right = sat_corner(table, x[j + 1], y[i + 1]) - sat_corner(table, x[j + 1], y[i]);
+                    sum += v[i] * u[j] * float(int(right - left));
+                    left = right;
+                }
+            }
+            return quantum * sum;
+        })
     "#endif\n";
 
 SAT_DEF const char *sat_gl_glsl(void) { return sat__glsl_lookups; }
@@ -5837,119 +5855,127 @@ static const char sat__glsl_values[] =
     "#define SUMS sampler2D\n"
     "#endif\n"
     "#if INPUT == 1\n"
-    "uniform sampler2D source;\n"
+    SAT__GLSL(uniform sampler2D source;)
     "#elif INPUT == 2\n"
-    "uniform usampler2D source;\n"
+    SAT__GLSL(uniform usampler2D source;)
     "#else\n"
-    "uniform SUMS source;\n"
+    SAT__GLSL(uniform SUMS source;)
     "#endif\n"
-    "uniform float limit, scale;\n"
-    "uniform ivec2 axis;\n"
-    "uniform int size;\n"
-    "float one;\n"
+    SAT__GLSL(
+        uniform float limit, scale;
+        uniform ivec2 axis;
+        uniform int size;
+        float one;)
     "#if INPUT == 1\n"
-    "VALUE load(ivec2 p) {\n"
-    "    float v = texelFetch(source, p, 0)[CHANNEL];\n"
-    "    v = (floatBitsToUint(v) & 0x7fffffffu) > 0x7f800000u ? 0.0 : clamp(v, -limit, limit);\n"
+    SAT__GLSL(
+        VALUE load(ivec2 p) {
+            float v = texelFetch(source, p, 0)[CHANNEL];
+            v = (floatBitsToUint(v) & 0x7fffffffu) > 0x7f800000u ? 0.0 : clamp(v, -limit, limit);)
     "#if FORMAT == 0\n"
-    "    return vec2(v, 0.0);\n"
+    SAT__GLSL(return vec2(v, 0.0);)
     "#elif FORMAT == 1\n"
-    "    return v;\n"
+    SAT__GLSL(return v;)
     "#else\n"
-    "    uint n = uint(roundEven(abs(v) * scale));\n"
-    "    return v < 0.0 ? 0u - n : n;\n"
+    SAT__GLSL(
+            uint n = uint(roundEven(abs(v) * scale));
+            return v < 0.0 ? 0u - n : n;)
     "#endif\n"
-    "}\n"
+    SAT__GLSL(})
     "#elif INPUT == 2\n"
-    "uint load(ivec2 p) { return texelFetch(source, p, 0)[CHANNEL]; }\n"
+    SAT__GLSL(uint load(ivec2 p) { return texelFetch(source, p, 0)[CHANNEL]; })
     "#else\n"
-    "VALUE load(ivec2 p) { return FETCH(source, p); }\n"
+    SAT__GLSL(VALUE load(ivec2 p) { return FETCH(source, p); })
     "#endif\n"
-    "void start() { one = textureSize(source, 0).x > 0 ? 1.0 : 0.0; }\n";
+    SAT__GLSL(void start() { one = textureSize(source, 0).x > 0 ? 1.0 : 0.0; });
 
 static const char sat__glsl_output[] =
     "#if FORMAT == 2\n"
-    "layout(location = 0) out uvec4 result;\n"
+    SAT__GLSL(layout(location = 0) out uvec4 result;)
     "#else\n"
-    "layout(location = 0) out vec4 result;\n"
+    SAT__GLSL(layout(location = 0) out vec4 result;)
     "#endif\n";
 
 /* Slomp 2012, section 4.4: `size` is the distance k^(i-1) of the neighbours; those left of the border are zero. */
 static const char sat__glsl_double[] =
-    "void main() {\n"
-    "    start();\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
-    "    int x = p.x * axis.x + p.y * axis.y;\n"
-    "    VALUE sum = load(p);\n"
-    "    for (int j = 1; j < K; j++)\n"
-    "        if (x >= j * size) sum = ADD(sum, load(p - j * size * axis));\n"
-    "    result = STORED(sum);\n"
-    "}\n";
+    SAT__GLSL(
+        void main() {
+            start();
+            ivec2 p = ivec2(gl_FragCoord.xy);
+            int x = p.x * axis.x + p.y * axis.y;
+            VALUE sum = load(p);
+            for (int j = 1; j < K; j++)
+                if (x >= j * size) sum = ADD(sum, load(p - j * size * axis));
+            result = STORED(sum);
+        });
 
 /* Slomp 2012, section 4.5, towards the root: the sum of k neighbours; `size` is the length that is read. */
 static const char sat__glsl_reduce[] =
-    "void main() {\n"
-    "    start();\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy) * (1 + (K - 1) * axis);\n"
-    "    int x = p.x * axis.x + p.y * axis.y;\n"
-    "    VALUE sum = load(p);\n"
-    "    for (int j = 1; j < K; j++)\n"
-    "        if (x + j < size) sum = ADD(sum, load(p + j * axis));\n"
-    "    result = STORED(sum);\n"
-    "}\n";
+    SAT__GLSL(
+        void main() {
+            start();
+            ivec2 p = ivec2(gl_FragCoord.xy) * (1 + (K - 1) * axis);
+            int x = p.x * axis.x + p.y * axis.y;
+            VALUE sum = load(p);
+            for (int j = 1; j < K; j++)
+                if (x + j < size) sum = ADD(sum, load(p + j * axis));
+            result = STORED(sum);
+        });
 
 /* The same section, towards the leaves, inclusive: the uncle to the left, which holds the sum of all before this group,
    plus the node itself and its siblings to the left. The root's children have no uncle. */
 static const char sat__glsl_expand[] =
-    "uniform SUMS uncles;\n"
-    "void main() {\n"
-    "    start();\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
-    "    int x = p.x * axis.x + p.y * axis.y, group = x / K;\n"
-    "    VALUE sum = load(p - (x - group * K) * axis);\n"
-    "    for (int j = 1; j < K; j++)\n"
-    "        if (group * K + j <= x) sum = ADD(sum, load(p + (group * K + j - x) * axis));\n"
-    "    if (group > 0) sum = ADD(FETCH(uncles, p + (group - 1 - x) * axis), sum);\n"
-    "    result = STORED(sum);\n"
-    "}\n";
+    SAT__GLSL(
+        uniform SUMS uncles;
+        void main() {
+            start();
+            ivec2 p = ivec2(gl_FragCoord.xy);
+            int x = p.x * axis.x + p.y * axis.y, group = x / K;
+            VALUE sum = load(p - (x - group * K) * axis);
+            for (int j = 1; j < K; j++)
+                if (group * K + j <= x) sum = ADD(sum, load(p + (group * K + j - x) * axis));
+            if (group > 0) sum = ADD(FETCH(uncles, p + (group - 1 - x) * axis), sum);
+            result = STORED(sum);
+        });
 
 /* The same by compute shader: an invocation writes a whole group and adds k times instead of k (k + 1) / 2. */
 static const char sat__glsl_expand_groups[] =
-    "layout(local_size_x = 64) in;\n"
+    SAT__GLSL(layout(local_size_x = 64) in;)
     "#if FORMAT == 0\n"
-    "layout(binding = 0, rg32f) writeonly uniform image2D target;\n"
+    SAT__GLSL(layout(binding = 0, rg32f) writeonly uniform image2D target;)
     "#elif FORMAT == 1\n"
-    "layout(binding = 0, r32f) writeonly uniform image2D target;\n"
+    SAT__GLSL(layout(binding = 0, r32f) writeonly uniform image2D target;)
     "#else\n"
-    "layout(binding = 0, r32ui) writeonly uniform uimage2D target;\n"
+    SAT__GLSL(layout(binding = 0, r32ui) writeonly uniform uimage2D target;)
     "#endif\n"
-    "uniform SUMS uncles;\n"
-    "uniform int across;\n"
-    "void main() {\n"
-    "    start();\n"
-    "    int group = int(gl_GlobalInvocationID.y);\n"
-    "    ivec2 line = int(gl_GlobalInvocationID.x) * (1 - axis);\n"
-    "    if (int(gl_GlobalInvocationID.x) >= across) return;\n"
-    "    VALUE sum = VALUE(0);\n"
-    "    if (group > 0) sum = FETCH(uncles, line + (group - 1) * axis);\n"
-    "    for (int x = group * K; x < min(group * K + K, size); x++) {\n"
-    "        sum = ADD(sum, load(line + x * axis));\n"
-    "        imageStore(target, line + x * axis, STORED(sum));\n"
-    "    }\n"
-    "}\n";
+    SAT__GLSL(
+        uniform SUMS uncles;
+        uniform int across;
+        void main() {
+            start();
+            int group = int(gl_GlobalInvocationID.y);
+            ivec2 line = int(gl_GlobalInvocationID.x) * (1 - axis);
+            if (int(gl_GlobalInvocationID.x) >= across) return;
+            VALUE sum = VALUE(0);
+            if (group > 0) sum = FETCH(uncles, line + (group - 1) * axis);
+            for (int x = group * K; x < min(group * K + K, size); x++) {
+                sum = ADD(sum, load(line + x * axis));
+                imageStore(target, line + x * axis, STORED(sum));
+            }
+        });
 
 /* The mean: k x k texels a step, always two-float. `bounds` is the size that is read. */
 static const char sat__glsl_mean[] =
-    "uniform ivec2 bounds;\n"
-    "uniform float factor;\n"
-    "void main() {\n"
-    "    start();\n"
-    "    ivec2 first = ivec2(gl_FragCoord.xy) * K, last = min(first + K, bounds);\n"
-    "    vec2 sum = vec2(0.0);\n"
-    "    for (int y = first.y; y < last.y; y++)\n"
-    "        for (int x = first.x; x < last.x; x++) sum = sat_add(sum, load(ivec2(x, y)), one);\n"
-    "    result = STORED(sum * factor);\n"
-    "}\n";
+    SAT__GLSL(
+        uniform ivec2 bounds;
+        uniform float factor;
+        void main() {
+            start();
+            ivec2 first = ivec2(gl_FragCoord.xy) * K, last = min(first + K, bounds);
+            vec2 sum = vec2(0.0);
+            for (int y = first.y; y < last.y; y++)
+                for (int x = first.x; x < last.x; x++) sum = sat_add(sum, load(ivec2(x, y)), one);
+            result = STORED(sum * factor);
+        });
 
 /* ---- >> shaders of tiles
 
@@ -5966,357 +5992,380 @@ static const char sat__glsl_tile_lookups[] =
     "#ifndef SAT_GLSL_TILES\n"
     "#define SAT_GLSL_TILES\n"
     "#ifdef GL_ES\n"
-    "precision highp usampler2DArray;\n"
+    SAT__GLSL(precision highp usampler2DArray;)
     "#endif\n"
-    "vec2 sat_tile_part(usampler2D cells, usampler2DArray tiles, int plane, ivec2 tile, ivec2 a,\n"
-    "  ivec2 b, float one) {\n"
-    " ivec2 first = tile * 64;\n"
-    " uint d = texelFetch(cells, b - 1, 0)[plane];\n"
-    " if (a.x > first.x) d -= texelFetch(cells, ivec2(a.x, b.y) - 1, 0)[plane];\n"
-    " if (a.y > first.y) d -= texelFetch(cells, ivec2(b.x, a.y) - 1, 0)[plane];\n"
-    " if (a.x > first.x && a.y > first.y) d += texelFetch(cells, a - 1, 0)[plane];\n"
-    " ivec2 at = ivec2(tile.x + plane * ((textureSize(cells, 0).x + 63) / 64), tile.y);\n"
-    " uvec4 record = texelFetch(tiles, ivec3(at, 0), 0);\n"
-    " float quantum = uintBitsToFloat(record.x);\n"
-    " int n = int(d), low = n & 4095;\n"
-    " vec2 sum = sat_add(vec2(float(n - low) * quantum, 0.0), vec2(float(low) * quantum, 0.0), one);\n"
-    " int count = int(record.z & 15u);\n"
-    " for (int i = 0; i < count; i++) {\n"
-    "  uint word = texelFetch(tiles, ivec3(at, 1), 0)[i / 2] >> (14 * (i & 1));\n"
-    "  ivec2 p = first + ivec2(int(word & 127u), int(word >> 7 & 127u));\n"
-    "  if (all(greaterThanEqual(p, a)) && all(lessThan(p, b)))\n"
-    "   sum = sat_add(sum, vec2(uintBitsToFloat(texelFetch(tiles, ivec3(at, 2 + i / 4), 0)[i & 3]), 0.0), one);\n"
-    " }\n"
-    " return sum;\n"
-    "}\n"
-    "vec2 sat_strip(usampler2D strips, int width, int index) {\n"
-    " uvec2 v = texelFetch(strips, ivec2(index % width, index / width), 0).xy;\n"
-    " return vec2(uintBitsToFloat(v.x), uintBitsToFloat(v.y));\n"
-    "}\n"
-    "vec2 sat_super_corner(usampler2D cells, usampler2DArray tiles, usampler2D strips, int plane, ivec2 first,\n"
-    "  ivec2 p,\n"
-    "     float one) {\n"
-    " ivec2 size = textureSize(cells, 0), t = p >> 6, inside = p & 63;\n"
-    " int across = (size.x + 63) / 64, planes = textureSize(tiles, 0).x / across;\n"
-    " int above = across * planes * size.y, whole = above + size.x * planes * textureSize(tiles, 0).y;\n"
-    " bool x = t.x > first.x, y = t.y > first.y;\n"
-    " vec2 sum = vec2(0.0);\n"
-    " if (x && y) sum = sat_strip(strips, size.x, whole + ((t.y - 1) * planes + plane) * across + t.x - 1);\n"
-    " if (y && inside.x > 0)\n"
-    "  sum = sat_add(sum, sat_strip(strips, size.x, above + ((t.y - 1) * planes + plane) * size.x + p.x - 1), one);\n"
-    " if (x && inside.y > 0)\n"
-    "  sum = sat_add(sum, sat_strip(strips, size.x, ((p.y - 1) * planes + plane) * across + t.x - 1), one);\n"
-    " if (inside.x > 0 && inside.y > 0)\n"
-    "  sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 64, p, one), one);\n"
-    " return sum;\n"
-    "}\n"
-    "float sat_sum(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high) {\n"
-    " ivec2 size = textureSize(cells, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size), p, q;\n"
-    " float one = size.x > 0 ? 1.0 : 0.0;\n"
-    " if (any(lessThanEqual(b, a))) return 0.0;\n"
-    " ivec2 s = a >> 6, e = (b - 1) >> 6;\n"
-    " vec2 sum = vec2(0.0);\n"
-    " if (all(lessThan(e - s, ivec2(3)))) {\n"
-    "  for (int y = s.y; y <= e.y; y++)\n"
-    "   for (int x = s.x; x <= e.x; x++)\n"
-    "    sum = sat_add(sum, sat_tile_part(cells, tiles, channel, ivec2(x, y), max(a, ivec2(x, y) * 64), min(b, ivec2(x + 1, y + 1) * 64), one),\n"
-    "    one);\n"
-    "  return sum.x + sum.y;\n"
-    " }\n"
-    " for (p.y = a.y; p.y < b.y; p.y = q.y) {\n"
-    "  q.y = min(b.y, (p.y | 1023) + 1);\n"
-    "  for (p.x = a.x; p.x < b.x; p.x = q.x) {\n"
-    "   q.x = min(b.x, (p.x | 1023) + 1);\n"
-    "   ivec2 f = (p >> 10) << 4;\n"
-    "   vec2 v = sat_super_corner(cells, tiles, strips, channel, f, q, one);\n"
-    "   v = sat_add(v, -sat_super_corner(cells, tiles, strips, channel, f, ivec2(p.x, q.y), one), one);\n"
-    "   vec2 u = sat_super_corner(cells, tiles, strips, channel, f, ivec2(q.x, p.y), one);\n"
-    "   u = sat_add(u, -sat_super_corner(cells, tiles, strips, channel, f, p, one), one);\n"
-    "   sum = sat_add(sum, sat_add(v, -u, one), one);\n"
-    "  }\n"
-    " }\n"
-    " return sum.x + sum.y;\n"
-    "}\n"
-    "float sat_mean(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high) {\n"
-    " return sat_sum(cells, tiles, strips, channel, low, high) / sat_area(textureSize(cells, 0), low, high);\n"
-    "}\n"
+    SAT__GLSL(
+        vec2 sat_tile_part(usampler2D cells, usampler2DArray tiles, int plane, ivec2 tile, ivec2 a,
+          ivec2 b, float one) {
+         ivec2 first = tile * 64;
+         uint d = texelFetch(cells, b - 1, 0)[plane];
+         if (a.x > first.x) d -= texelFetch(cells, ivec2(a.x, b.y) - 1, 0)[plane];
+         if (a.y > first.y) d -= texelFetch(cells, ivec2(b.x, a.y) - 1, 0)[plane];
+         if (a.x > first.x && a.y > first.y) d += texelFetch(cells, a - 1, 0)[plane];
+         ivec2 at = ivec2(tile.x + plane * ((textureSize(cells, 0).x + 63) / 64), tile.y);
+         uvec4 record = texelFetch(tiles, ivec3(at, 0), 0);
+         float quantum = uintBitsToFloat(record.x);
+         int n = int(d), low = n & 4095;
+         vec2 sum = sat_add(vec2(float(n - low) * quantum, 0.0), vec2(float(low) * quantum, 0.0), one);
+         int count = int(record.z & 15u);
+         for (int i = 0; i < count; i++) {
+          uint word = texelFetch(tiles, ivec3(at, 1), 0)[i / 2] >> (14 * (i & 1));
+          ivec2 p = first + ivec2(int(word & 127u), int(word >> 7 & 127u));
+          if (all(greaterThanEqual(p, a)) && all(lessThan(p, b)))
+           sum = sat_add(sum, vec2(uintBitsToFloat(texelFetch(tiles, ivec3(at, 2 + i / 4), 0)[i & 3]), 0.0), one);
+         }
+         return sum;
+        })
+    SAT__GLSL(
+        vec2 sat_strip(usampler2D strips, int width, int index) {
+         uvec2 v = texelFetch(strips, ivec2(index % width, index / width), 0).xy;
+         return vec2(uintBitsToFloat(v.x), uintBitsToFloat(v.y));
+        })
+    SAT__GLSL(
+        vec2 sat_super_corner(usampler2D cells, usampler2DArray tiles, usampler2D strips, int plane, ivec2 first,
+          ivec2 p,
+             float one) {
+         ivec2 size = textureSize(cells, 0), t = p >> 6, inside = p & 63;
+         int across = (size.x + 63) / 64, planes = textureSize(tiles, 0).x / across;
+         int above = across * planes * size.y, whole = above + size.x * planes * textureSize(tiles, 0).y;
+         bool x = t.x > first.x, y = t.y > first.y;
+         vec2 sum = vec2(0.0);
+         if (x && y) sum = sat_strip(strips, size.x, whole + ((t.y - 1) * planes + plane) * across + t.x - 1);
+         if (y && inside.x > 0)
+          sum = sat_add(sum, sat_strip(strips, size.x, above + ((t.y - 1) * planes + plane) * size.x + p.x - 1), one);
+         if (x && inside.y > 0)
+          sum = sat_add(sum, sat_strip(strips, size.x, ((p.y - 1) * planes + plane) * across + t.x - 1), one);
+         if (inside.x > 0 && inside.y > 0)
+          sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 64, p, one), one);
+         return sum;
+        })
+    SAT__GLSL(
+        float sat_sum(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high) {
+         ivec2 size = textureSize(cells, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size), p, q;
+         float one = size.x > 0 ? 1.0 : 0.0;
+         if (any(lessThanEqual(b, a))) return 0.0;
+         ivec2 s = a >> 6, e = (b - 1) >> 6;
+         vec2 sum = vec2(0.0);
+         if (all(lessThan(e - s, ivec2(3)))) {
+          for (int y = s.y; y <= e.y; y++)
+           for (int x = s.x; x <= e.x; x++)
+            sum = sat_add(sum, sat_tile_part(cells, tiles, channel, ivec2(x, y), max(a, ivec2(x, y) * 64),
+                min(b, ivec2(x + 1, y + 1) * 64), one),
+            one);
+          return sum.x + sum.y;
+         }
+         for (p.y = a.y; p.y < b.y; p.y = q.y) {
+          q.y = min(b.y, (p.y | 1023) + 1);
+          for (p.x = a.x; p.x < b.x; p.x = q.x) {
+           q.x = min(b.x, (p.x | 1023) + 1);
+           ivec2 f = (p >> 10) << 4;
+           vec2 v = sat_super_corner(cells, tiles, strips, channel, f, q, one);
+           v = sat_add(v, -sat_super_corner(cells, tiles, strips, channel, f, ivec2(p.x, q.y), one), one);
+           vec2 u = sat_super_corner(cells, tiles, strips, channel, f, ivec2(q.x, p.y), one);
+           u = sat_add(u, -sat_super_corner(cells, tiles, strips, channel, f, p, one), one);
+           sum = sat_add(sum, sat_add(v, -u, one), one);
+          }
+         }
+         return sum.x + sum.y;
+        })
+    SAT__GLSL(
+        float sat_mean(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high) {
+         return sat_sum(cells, tiles, strips, channel, low, high) / sat_area(textureSize(cells, 0), low, high);
+        })
     "#endif\n";
 
 static const char sat__glsl_tile_values[] =
-    "uniform sampler2D source;\n"
-    "uniform usampler2D cells, gauges, facts, means;\n"
-    "uniform usampler2DArray tiles;\n"
-    "uniform ivec2 size;\n"
-    "uniform float limit;\n"
-    "int across() { return (size.x + 63) / 64; }\n"
-    "float pixel(ivec2 p, int plane, out int kind) {\n"
-    "    float v = texelFetch(source, p, 0)[CHANNEL + plane % CHANNELS];\n"
-    "    uint bits = floatBitsToUint(v) & 0x7fffffffu;\n"
-    "    kind = bits > 0x7f800000u ? 1 : bits == 0x7f800000u ? 2 : bits > floatBitsToUint(limit) ? 3 : 0;\n"
-    "    v = kind == 1 ? 0.0 : clamp(v, -limit, limit);\n"
-    "    return v;\n"
-    "}\n"
+    SAT__GLSL(
+        uniform sampler2D source;
+        uniform usampler2D cells, gauges, facts, means;
+        uniform usampler2DArray tiles;
+        uniform ivec2 size;
+        uniform float limit;
+        int across() { return (size.x + 63) / 64; })
+    SAT__GLSL(
+        float pixel(ivec2 p, int plane, out int kind) {
+            float v = texelFetch(source, p, 0)[CHANNEL + plane % CHANNELS];
+            uint bits = floatBitsToUint(v) & 0x7fffffffu;
+            kind = bits > 0x7f800000u ? 1 : bits == 0x7f800000u ? 2 : bits > floatBitsToUint(limit) ? 3 : 0;
+            v = kind == 1 ? 0.0 : clamp(v, -limit, limit);
+            return v;
+        })
     "#if MOMENTS\n"
-    "float value(ivec2 p, int plane, out int kind) {\n"
-    "    float v = pixel(p, plane, kind);\n"
-    "    v -= uintBitsToFloat(texelFetch(means, ivec2(p.x / 64 + across() * (plane % CHANNELS), p.y / 64), 0).x);\n"
-    "    if (kind == 1 || kind == 2 || abs(v) > 1e18) v = 0.0;\n"
-    "    return plane < CHANNELS ? v : v * v;\n"
-    "}\n"
+    SAT__GLSL(
+        float value(ivec2 p, int plane, out int kind) {
+            float v = pixel(p, plane, kind);
+            v -= uintBitsToFloat(texelFetch(means, ivec2(p.x / 64 + across() * (plane % CHANNELS), p.y / 64), 0).x);
+            if (kind == 1 || kind == 2 || abs(v) > 1e18) v = 0.0;
+            return plane < CHANNELS ? v : v * v;
+        })
     "#else\n"
     "#define value pixel\n"
     "#endif\n";
 
 static const char sat__glsl_tile_means[] =
-    "layout(location = 0) out uvec4 result;\n"
-    "void main() {\n"
-    "    ivec2 at = ivec2(gl_FragCoord.xy), first = ivec2(at.x % across(), at.y) * 64, last = min(first + 64, size);\n"
-    "    int kind;\n"
-    "    float sum = 0.0, count = 0.0;\n"
-    "    for (int y = first.y; y < last.y; y++) {\n"
-    "        float row = 0.0;\n"
-    "        for (int x = first.x; x < last.x; x++) {\n"
-    "            float v = pixel(ivec2(x, y), at.x / across(), kind);\n"
-    "            if (kind == 1 || kind == 2) continue;\n"
-    "            row += v;\n"
-    "            count += 1.0;\n"
-    "        }\n"
-    "        sum += row;\n"
-    "    }\n"
-    "    result = uvec4(floatBitsToUint(count > 0.0 ? sum / count : 0.0), 0u, 0u, 0u);\n"
-    "}\n";
+    SAT__GLSL(
+        layout(location = 0) out uvec4 result;
+        void main() {
+            ivec2 at = ivec2(gl_FragCoord.xy), first = ivec2(at.x % across(), at.y) * 64, last = min(first + 64, size);
+            int kind;
+            float sum = 0.0, count = 0.0;
+            for (int y = first.y; y < last.y; y++) {
+                float row = 0.0;
+                for (int x = first.x; x < last.x; x++) {
+                    float v = pixel(ivec2(x, y), at.x / across(), kind);
+                    if (kind == 1 || kind == 2) continue;
+                    row += v;
+                    count += 1.0;
+                }
+                sum += row;
+            }
+            result = uvec4(floatBitsToUint(count > 0.0 ? sum / count : 0.0), 0u, 0u, 0u);
+        });
 
 /* A row of a tile: sums and the largest of |value|, pixels beyond 1e20, and how many were replaced. */
 static const char sat__glsl_gauge[] =
-    "layout(location = 0) out uvec4 sums;\n"
-    "layout(location = 1) out uvec4 fact;\n"
-    "void main() {\n"
-    "    ivec2 at = ivec2(gl_FragCoord.xy);\n"
-    "    int plane = at.x / across(), first = at.x % across() * 64, kind, giants = 0;\n"
-    "    ivec3 counts = ivec3(0);\n"
-    "    float largest = 0.0;\n"
-    "    vec4 lanes = vec4(0.0);\n"
-    "    for (int i = 0; i < 64; i += 4)\n"
-    "        for (int j = 0; j < 4; j++) {\n"
-    "            if (first + i + j >= size.x) continue;\n"
-    "            float v = abs(value(ivec2(first + i + j, at.y), plane, kind));\n"
-    "            if (kind > 0) counts[kind - 1]++;\n"
-    "            if (v > 1e20) {\n"
-    "                giants++;\n"
-    "                if (kind == 0) counts[2]++;\n"
-    "                continue;\n"
-    "            }\n"
-    "            lanes[j] += v;\n"
-    "            largest = max(largest, v);\n"
-    "        }\n"
-    "    sums = floatBitsToUint(lanes);\n"
-    "    fact = uvec4(floatBitsToUint(largest), uint(giants), uint(counts.x | counts.y << 8 | counts.z << 16), 0u);\n"
-    "}\n";
+    SAT__GLSL(
+        layout(location = 0) out uvec4 sums;
+        layout(location = 1) out uvec4 fact;
+        void main() {
+            ivec2 at = ivec2(gl_FragCoord.xy);
+            int plane = at.x / across(), first = at.x % across() * 64, kind, giants = 0;
+            ivec3 counts = ivec3(0);
+            float largest = 0.0;
+            vec4 lanes = vec4(0.0);
+            for (int i = 0; i < 64; i += 4)
+                for (int j = 0; j < 4; j++) {
+                    if (first + i + j >= size.x) continue;
+                    float v = abs(value(ivec2(first + i + j, at.y), plane, kind));
+                    if (kind > 0) counts[kind - 1]++;
+                    if (v > 1e20) {
+                        giants++;
+                        if (kind == 0) counts[2]++;
+                        continue;
+                    }
+                    lanes[j] += v;
+                    largest = max(largest, v);
+                }
+            sums = floatBitsToUint(lanes);
+            fact = uvec4(floatBitsToUint(largest), uint(giants), uint(counts.x | counts.y << 8 | counts.z << 16), 0u);
+        });
 
 /* sat__take_spikes and sat__tile_quantum of the CPU; 8386931 is where sum * 1.0001 reaches the next power of two. */
 static const char sat__glsl_settle[] =
-    "layout(location = 0) out uvec4 record;\n"
-    "layout(location = 1) out uvec4 places;\n"
-    "layout(location = 2) out uvec4 low_values;\n"
-    "layout(location = 3) out uvec4 high_values;\n"
-    "int count, rows, plane;\n"
-    "ivec2 at, first;\n"
-    "float full;\n"
-    "ivec2 place[8];\n"
-    "float held[8];\n"
-    "bool is_spike(ivec2 p) {\n"
-    "    for (int i = 0; i < count; i++)\n"
-    "        if (place[i] == p) return true;\n"
-    "    return false;\n"
-    "}\n"
-    "float rest(ivec2 p) {\n"
-    "    int kind;\n"
-    "    if (p.x >= size.x || is_spike(p)) return 0.0;\n"
-    "    float v = value(p, plane, kind);\n"
-    "    return abs(v) > 1e20 ? sign(v) * full : v;\n"
-    "}\n"
-    "vec2 extent(float giants) {\n"
-    "    vec4 lanes = vec4(0.0);\n"
-    "    float largest = giants > 0.0 ? full : 0.0;\n"
-    "    for (int y = 0; y < rows; y++) {\n"
-    "        bool fresh = false;\n"
-    "        for (int i = 0; i < count; i++) fresh = fresh || place[i].y == first.y + y;\n"
-    "        if (!fresh) {\n"
-    "            lanes += uintBitsToFloat(texelFetch(gauges, ivec2(at.x, first.y + y), 0));\n"
-    "            largest = max(largest, uintBitsToFloat(texelFetch(facts, ivec2(at.x, first.y + y), 0).x));\n"
-    "            continue;\n"
-    "        }\n"
-    "        vec4 row = vec4(0.0);\n"
-    "        for (int i = 0; i < 64; i += 4)\n"
-    "            for (int j = 0; j < 4; j++) {\n"
-    "                float v = abs(rest(first + ivec2(i + j, y)));\n"
-    "                row[j] += v;\n"
-    "                largest = max(largest, v);\n"
-    "            }\n"
-    "        lanes += row;\n"
-    "    }\n"
-    "    return vec2(((lanes.x + lanes.y) + lanes.z) + lanes.w + giants * full, largest);\n"
-    "}\n"
-    "void main() {\n"
-    "    at = ivec2(gl_FragCoord.xy);\n"
-    "    plane = at.x / across();\n"
-    "    first = ivec2(at.x % across(), at.y) * 64;\n"
-    "    rows = min(64, size.y - first.y);\n"
-    "    count = 0;\n"
-    "    full = 0.0;\n"
-    "    int giants = 0;\n"
-    "    ivec3 counts = ivec3(0);\n"
-    "    for (int y = 0; y < rows; y++) {\n"
-    "        uvec4 f = texelFetch(facts, ivec2(at.x, first.y + y), 0);\n"
-    "        full = max(full, uintBitsToFloat(f.x));\n"
-    "        giants += int(f.y);\n"
-    "        counts += ivec3(int(f.z & 255u), int(f.z >> 8 & 255u), int(f.z >> 16));\n"
-    "    }\n"
-    "    if (!(full > 0.0)) full = 1e20;\n"
-    "    vec2 e = extent(float(giants));\n"
-    "    while (giants == 0 && e.y > e.x * 0.0625 && count < 8) {\n"
-    "        int found = 0, room = 8 - count;\n"
-    "        ivec2 p;\n"
-    "        for (p.y = first.y; p.y < first.y + rows && found <= room; p.y++) {\n"
-    "            if (!(uintBitsToFloat(texelFetch(facts, ivec2(at.x, p.y), 0).x) > e.x * 0.0625)) continue;\n"
-    "            for (p.x = first.x; p.x < min(first.x + 64, size.x) && found <= room; p.x++) {\n"
-    "                float v = rest(p);\n"
-    "                if (!(abs(v) > e.x * 0.0625)) continue;\n"
-    "                if (found < room) {\n"
-    "                    place[count + found] = p;\n"
-    "                    held[count + found] = v;\n"
-    "                }\n"
-    "                found++;\n"
-    "            }\n"
-    "        }\n"
-    "        if (found > room) break;\n"
-    "        count += found;\n"
-    "        vec2 less = extent(0.0);\n"
-    "        if (less.x > e.x * 0.25) {\n"
-    "            count -= found;\n"
-    "            break;\n"
-    "        }\n"
-    "        e = less;\n"
-    "    }\n"
-    "    uint bits = floatBitsToUint(e.x), exponent = (bits >> 23) + ((bits & 0x7fffffu) >= 8386931u ? 1u : 0u);\n"
-    "    record = uvec4(e.x > 0.0 ? max(exponent, 31u) - 30u << 23 : 0u, floatBitsToUint(full),\n"
-    "                   uint(count | counts.x << 4 | counts.y << 17), uint(counts.z));\n"
-    "    uvec4 words = uvec4(0u), low = uvec4(0u), high = uvec4(0u);\n"
-    "    for (int i = 0; i < count; i++) {\n"
-    "        ivec2 p = place[i] - first;\n"
-    "        words[i / 2] |= uint(p.x | p.y << 7) << (14 * (i & 1));\n"
-    "        if (i < 4) low[i] = floatBitsToUint(held[i]);\n"
-    "        else high[i - 4] = floatBitsToUint(held[i]);\n"
-    "    }\n"
-    "    places = words;\n"
-    "    low_values = low;\n"
-    "    high_values = high;\n"
-    "}\n";
+    SAT__GLSL(
+        layout(location = 0) out uvec4 record;
+        layout(location = 1) out uvec4 places;
+        layout(location = 2) out uvec4 low_values;
+        layout(location = 3) out uvec4 high_values;
+        int count, rows, plane;
+        ivec2 at, first;
+        float full;
+        ivec2 place[8];
+        float held[8];
+        bool is_spike(ivec2 p) {
+            for (int i = 0; i < count; i++)
+                if (place[i] == p) return true;
+            return false;
+        })
+    SAT__GLSL(
+        float rest(ivec2 p) {
+            int kind;
+            if (p.x >= size.x || is_spike(p)) return 0.0;
+            float v = value(p, plane, kind);
+            return abs(v) > 1e20 ? sign(v) * full : v;
+        })
+    SAT__GLSL(
+        vec2 extent(float giants) {
+            vec4 lanes = vec4(0.0);
+            float largest = giants > 0.0 ? full : 0.0;
+            for (int y = 0; y < rows; y++) {
+                bool fresh = false;
+                for (int i = 0; i < count; i++) fresh = fresh || place[i].y == first.y + y;
+                if (!fresh) {
+                    lanes += uintBitsToFloat(texelFetch(gauges, ivec2(at.x, first.y + y), 0));
+                    largest = max(largest, uintBitsToFloat(texelFetch(facts, ivec2(at.x, first.y + y), 0).x));
+                    continue;
+                }
+                vec4 row = vec4(0.0);
+                for (int i = 0; i < 64; i += 4)
+                    for (int j = 0; j < 4; j++) {
+                        float v = abs(rest(first + ivec2(i + j, y)));
+                        row[j] += v;
+                        largest = max(largest, v);
+                    }
+                lanes += row;
+            }
+            return vec2(((lanes.x + lanes.y) + lanes.z) + lanes.w + giants * full, largest);
+        })
+    SAT__GLSL(
+        void main() {
+            at = ivec2(gl_FragCoord.xy);
+            plane = at.x / across();
+            first = ivec2(at.x % across(), at.y) * 64;
+            rows = min(64, size.y - first.y);
+            count = 0;
+            full = 0.0;
+            int giants = 0;
+            ivec3 counts = ivec3(0);
+            for (int y = 0; y < rows; y++) {
+                uvec4 f = texelFetch(facts, ivec2(at.x, first.y + y), 0);
+                full = max(full, uintBitsToFloat(f.x));
+                giants += int(f.y);
+                counts += ivec3(int(f.z & 255u), int(f.z >> 8 & 255u), int(f.z >> 16));
+            }
+            if (!(full > 0.0)) full = 1e20;
+            vec2 e = extent(float(giants));
+            while (giants == 0 && e.y > e.x * 0.0625 && count < 8) {
+                int found = 0, room = 8 - count;
+                ivec2 p;
+                for (p.y = first.y; p.y < first.y + rows && found <= room; p.y++) {
+                    if (!(uintBitsToFloat(texelFetch(facts, ivec2(at.x, p.y), 0).x) > e.x * 0.0625)) continue;
+                    for (p.x = first.x; p.x < min(first.x + 64, size.x) && found <= room; p.x++) {
+                        float v = rest(p);
+                        if (!(abs(v) > e.x * 0.0625)) continue;
+                        if (found < room) {
+                            place[count + found] = p;
+                            held[count + found] = v;
+                        }
+                        found++;
+                    }
+                }
+                if (found > room) break;
+                count += found;
+                vec2 less = extent(0.0);
+                if (less.x > e.x * 0.25) {
+                    count -= found;
+                    break;
+                }
+                e = less;
+            }
+            uint bits = floatBitsToUint(e.x), exponent = (bits >> 23) + ((bits & 0x7fffffu) >= 8386931u ? 1u : 0u);
+            record = uvec4(e.x > 0.0 ? max(exponent, 31u) - 30u << 23 : 0u, floatBitsToUint(full),
+                           uint(count | counts.x << 4 | counts.y << 17), uint(counts.z));
+            uvec4 words = uvec4(0u), low = uvec4(0u), high = uvec4(0u);
+            for (int i = 0; i < count; i++) {
+                ivec2 p = place[i] - first;
+                words[i / 2] |= uint(p.x | p.y << 7) << (14 * (i & 1));
+                if (i < 4) low[i] = floatBitsToUint(held[i]);
+                else high[i - 4] = floatBitsToUint(held[i]);
+            }
+            places = words;
+            low_values = low;
+            high_values = high;
+        });
 
 static const char sat__glsl_tile_scan[] =
-    "layout(location = 0) out uvec4 result;\n"
-    "uniform ivec2 axis;\n"
+    SAT__GLSL(
+        layout(location = 0) out uvec4 result;
+        uniform ivec2 axis;)
     "#if INPUT\n"
-    "uint integer(ivec2 p, int plane) {\n"
-    "    ivec3 at = ivec3(p.x / 64 + plane * across(), p.y / 64, 0);\n"
-    "    uvec4 record = texelFetch(tiles, at, 0);\n"
-    "    int kind, count = int(record.z & 15u);\n"
-    "    float v = value(p, plane, kind), full = uintBitsToFloat(record.y);\n"
-    "    if (record.x == 0u) return 0u;\n"
-    "    if (abs(v) > 1e20) v = sign(v) * full;\n"
-    "    for (int i = 0; i < count; i++) {\n"
-    "        uint word = texelFetch(tiles, at + ivec3(0, 0, 1), 0)[i / 2] >> (14 * (i & 1));\n"
-    "        if (ivec2(int(word & 127u), int(word >> 7 & 127u)) == p % 64) return 0u;\n"
-    "    }\n"
-    "    return uint(int(roundEven(v * uintBitsToFloat((254u << 23) - record.x))));\n"
-    "}\n"
-    "uvec4 load(ivec2 p) {\n"
-    "    uvec4 v = uvec4(0u);\n"
-    "    for (int plane = 0; plane < PLANES; plane++) v[plane] = integer(p, plane);\n"
-    "    return v;\n"
-    "}\n"
+    SAT__GLSL(
+        uint integer(ivec2 p, int plane) {
+            ivec3 at = ivec3(p.x / 64 + plane * across(), p.y / 64, 0);
+            uvec4 record = texelFetch(tiles, at, 0);
+            int kind, count = int(record.z & 15u);
+            float v = value(p, plane, kind), full = uintBitsToFloat(record.y);
+            if (record.x == 0u) return 0u;
+            if (abs(v) > 1e20) v = sign(v) * full;
+            for (int i = 0; i < count; i++) {
+                uint word = texelFetch(tiles, at + ivec3(0, 0, 1), 0)[i / 2] >> (14 * (i & 1));
+                if (ivec2(int(word & 127u), int(word >> 7 & 127u)) == p % 64) return 0u;
+            }
+            return uint(int(roundEven(v * uintBitsToFloat((254u << 23) - record.x))));
+        })
+    SAT__GLSL(
+        uvec4 load(ivec2 p) {
+            uvec4 v = uvec4(0u);
+            for (int plane = 0; plane < PLANES; plane++) v[plane] = integer(p, plane);
+            return v;
+        })
     "#else\n"
-    "uvec4 load(ivec2 p) { return texelFetch(cells, p, 0); }\n"
+    SAT__GLSL(uvec4 load(ivec2 p) { return texelFetch(cells, p, 0); })
     "#endif\n"
-    "void main() {\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
-    "    int step = axis.x + axis.y, from = ((axis.x > 0 ? p.x : p.y) & 63);\n"
-    "    uvec4 sum = uvec4(0u);\n"
-    "    for (int d = 0; d < 8 * step && d <= from; d += step)\n"
-    "        sum += load(p - (axis.x > 0 ? ivec2(d, 0) : ivec2(0, d)));\n"
-    "    result = sum;\n"
-    "}\n";
+    SAT__GLSL(
+        void main() {
+            ivec2 p = ivec2(gl_FragCoord.xy);
+            int step = axis.x + axis.y, from = ((axis.x > 0 ? p.x : p.y) & 63);
+            uvec4 sum = uvec4(0u);
+            for (int d = 0; d < 8 * step && d <= from; d += step)
+                sum += load(p - (axis.x > 0 ? ivec2(d, 0) : ivec2(0, d)));
+            result = sum;
+        });
 
 static const char sat__glsl_strips[] =
-    "layout(location = 0) out uvec4 result;\n"
-    "void main() {\n"
-    "    int i = int(gl_FragCoord.y) * size.x + int(gl_FragCoord.x), n = across(),\n"
-    "        down = (size.y + 63) / 64, x, y, plane;\n"
-    "    int left = n * PLANES * size.y, above = size.x * PLANES * down, row, side;\n"
-    "    float one = size.x > 0 ? 1.0 : 0.0;\n"
-    "    ivec2 low, high;\n"
-    "    if (i < left) {\n"
-    "        side = n, row = i / n;\n"
-    "        plane = row % PLANES, y = row / PLANES, x = i % n;\n"
-    "        low = ivec2(x & ~15, y / 64), high = ivec2(min(size.x, (x + 1) * 64), y + 1);\n"
-    "    } else if (i < left + above) {\n"
-    "        i -= left;\n"
-    "        row = i / size.x;\n"
-    "        plane = row % PLANES, y = row / PLANES, x = i % size.x;\n"
-    "        low = ivec2(x / 64, y & ~15), high = ivec2(x + 1, min(size.y, (y + 1) * 64));\n"
-    "    } else {\n"
-    "        i -= left + above;\n"
-    "        row = i / n;\n"
-    "        plane = row % PLANES, y = row / PLANES, x = i % n;\n"
-    "        low = ivec2(x, y) & ~15, high = min(size, (ivec2(x, y) + 1) * 64);\n"
-    "    }\n"
-    "    vec2 sum = vec2(0.0);\n"
-    "    if (y < (size.y + 63) / 64 || i < left)\n"
-    "        for (ivec2 t = low; t.y * 64 < high.y; t.y++)\n"
-    "            for (t.x = low.x; t.x * 64 < high.x; t.x++)\n"
-    "                sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 64,\n"
-    "                                    min(high, (t + 1) * 64), one), one);\n"
-    "    result = uvec4(floatBitsToUint(sum), 0u, 0u);\n"
-    "}\n";
+    SAT__GLSL(
+        layout(location = 0) out uvec4 result;
+        void main() {
+            int i = int(gl_FragCoord.y) * size.x + int(gl_FragCoord.x), n = across(),
+                down = (size.y + 63) / 64, x, y, plane;
+            int left = n * PLANES * size.y, above = size.x * PLANES * down, row, side;
+            float one = size.x > 0 ? 1.0 : 0.0;
+            ivec2 low, high;
+            if (i < left) {
+                side = n, row = i / n;
+                plane = row % PLANES, y = row / PLANES, x = i % n;
+                low = ivec2(x & ~15, y / 64), high = ivec2(min(size.x, (x + 1) * 64), y + 1);
+            } else if (i < left + above) {
+                i -= left;
+                row = i / size.x;
+                plane = row % PLANES, y = row / PLANES, x = i % size.x;
+                low = ivec2(x / 64, y & ~15), high = ivec2(x + 1, min(size.y, (y + 1) * 64));
+            } else {
+                i -= left + above;
+                row = i / n;
+                plane = row % PLANES, y = row / PLANES, x = i % n;
+                low = ivec2(x, y) & ~15, high = min(size, (ivec2(x, y) + 1) * 64);
+            }
+            vec2 sum = vec2(0.0);
+            if (y < (size.y + 63) / 64 || i < left)
+                for (ivec2 t = low; t.y * 64 < high.y; t.y++)
+                    for (t.x = low.x; t.x * 64 < high.x; t.x++)
+                        sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 64,
+                                            min(high, (t + 1) * 64), one), one);
+            result = uvec4(floatBitsToUint(sum), 0u, 0u);
+        });
 
 static const char sat__glsl_tile_filter[] =
-    "layout(location = 0) out vec4 result;\n"
-    "uniform usampler2D strips;\n"
-    "uniform int radius;\n"
-    "void main() {\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
-    "    vec4 means = vec4(0.0, 0.0, 0.0, 1.0);\n"
-    "    for (int c = 0; c < CHANNELS; c++) means[c] = sat_mean(cells, tiles, strips, c, p - radius, p + radius + 1);\n"
-    "    result = means;\n"
-    "}\n";
+    SAT__GLSL(
+        layout(location = 0) out vec4 result;
+        uniform usampler2D strips;
+        uniform int radius;
+        void main() {
+            ivec2 p = ivec2(gl_FragCoord.xy);
+            vec4 means = vec4(0.0, 0.0, 0.0, 1.0);
+            for (int c = 0; c < CHANNELS; c++) means[c] = sat_mean(cells, tiles, strips, c, p - radius, p + radius + 1);
+            result = means;
+        });
 
 /* Chan, Golub, LeVeque 1983, as sat__moment_join. */
 static const char sat__glsl_tile_variance[] =
-    "layout(location = 0) out vec4 result;\n"
-    "uniform int radius;\n"
-    "vec2 moments(int c, ivec2 a, ivec2 b, float one) {\n"
-    "    float n = 0.0, mean = 0.0, squares = 0.0;\n"
-    "    ivec2 s = a >> 6, e = (b - 1) >> 6, t;\n"
-    "    for (t.y = s.y; t.y <= e.y; t.y++)\n"
-    "        for (t.x = s.x; t.x <= e.x; t.x++) {\n"
-    "            ivec2 low = max(a, t * 64), high = min(b, (t + 1) * 64);\n"
-    "            float m = uintBitsToFloat(texelFetch(means, ivec2(t.x + across() * c, t.y), 0).x);\n"
-    "            vec2 d = sat_tile_part(cells, tiles, c, t, low, high, one),\n"
-    "                 q = sat_tile_part(cells, tiles, CHANNELS + c, t, low, high, one);\n"
-    "            float k = float((high.x - low.x) * (high.y - low.y)), both = n + k, sum = d.x + d.y;\n"
-    "            float here = max(0.0, (q.x + q.y) - sum * sum / k), delta = m + sum / k - mean;\n"
-    "            squares += here + delta * delta * (n / both * k);\n"
-    "            mean += delta * (k / both);\n"
-    "            n = both;\n"
-    "        }\n"
-    "    return vec2(mean, squares / n);\n"
-    "}\n"
-    "void main() {\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy), a = max(p - radius, 0), b = min(p + radius + 1, size);\n"
-    "    float one = size.x > 0 ? 1.0 : 0.0;\n"
-    "    result = vec4(moments(0, a, b, one), 0.0, 0.0);\n"
-    "    if (CHANNELS > 1) result.zw = moments(CHANNELS - 1, a, b, one);\n"
-    "}\n";
+    SAT__GLSL(
+        layout(location = 0) out vec4 result;
+        uniform int radius;
+        vec2 moments(int c, ivec2 a, ivec2 b, float one) {
+            float n = 0.0, mean = 0.0, squares = 0.0;
+            ivec2 s = a >> 6, e = (b - 1) >> 6, t;
+            for (t.y = s.y; t.y <= e.y; t.y++)
+                for (t.x = s.x; t.x <= e.x; t.x++) {
+                    ivec2 low = max(a, t * 64), high = min(b, (t + 1) * 64);
+                    float m = uintBitsToFloat(texelFetch(means, ivec2(t.x + across() * c, t.y), 0).x);
+                    vec2 d = sat_tile_part(cells, tiles, c, t, low, high, one),
+                         q = sat_tile_part(cells, tiles, CHANNELS + c, t, low, high, one);
+                    float k = float((high.x - low.x) * (high.y - low.y)), both = n + k, sum = d.x + d.y;
+                    float here = max(0.0, (q.x + q.y) - sum * sum / k), delta = m + sum / k - mean;
+                    squares += here + delta * delta * (n / both * k);
+                    mean += delta * (k / both);
+                    n = both;
+                }
+            return vec2(mean, squares / n);
+        })
+    SAT__GLSL(
+        void main() {
+            ivec2 p = ivec2(gl_FragCoord.xy), a = max(p - radius, 0), b = min(p + radius + 1, size);
+            float one = size.x > 0 ? 1.0 : 0.0;
+            result = vec4(moments(0, a, b, one), 0.0, 0.0);
+            if (CHANNELS > 1) result.zw = moments(CHANNELS - 1, a, b, one);
+        });
 
 SAT_DEF const char *sat_gl_glsl_tiles(void) { return sat__glsl_tile_lookups; }
 

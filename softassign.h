@@ -4286,118 +4286,132 @@ SOFTASSIGN_DEF const char *softassign_gl_glsl(void)
 {
     return "#ifndef SOFTASSIGN_GLSL\n"
            "#define SOFTASSIGN_GLSL\n"
-           "vec2 softassign_join(vec2 a, vec2 b, float inverse_temperature) {\n"
-           "    float least = min(a.x, b.x);\n"
-           "    float left = a.y > 0.0 ? a.y * exp((least - a.x) * inverse_temperature) : 0.0;\n"
-           "    float right = b.y > 0.0 ? b.y * exp((least - b.x) * inverse_temperature) : 0.0;\n"
-           "    return vec2(least, left + right);\n"
-           "}\n"
+           SAT__GLSL(
+               vec2 softassign_join(vec2 a, vec2 b, float inverse_temperature) {
+                   float least = min(a.x, b.x);
+                   float left = a.y > 0.0 ? a.y * exp((least - a.x) * inverse_temperature) : 0.0;
+                   float right = b.y > 0.0 ? b.y * exp((least - b.x) * inverse_temperature) : 0.0;
+                   return vec2(least, left + right);
+               })
            "#endif\n";
 }
 
 static const char softassign__glsl_inputs[] =
-    "uniform sampler2D source, first, second;\n" /* second: per column, first: per row, as the pass says */
-    "uniform ivec2 size;\n"                       /* of the source */
-    "uniform float alpha, inverse_t, factor, scale;\n"
-    "out vec4 result;\n"
-    "ivec2 here() { return ivec2(gl_FragCoord.xy); }\n"
-    "float at(sampler2D s, ivec2 p) { return texelFetch(s, p, 0).x; }\n";
+    SAT__GLSL(
+        uniform sampler2D source, first, second; /* second: per column, first: per row, as the pass says */
+        uniform ivec2 size; /* of the source */
+        uniform float alpha, inverse_t, factor, scale;
+        out vec4 result;
+        ivec2 here() { return ivec2(gl_FragCoord.xy); })
+    SAT__GLSL(float at(sampler2D s, ivec2 p) { return texelFetch(s, p, 0).x; });
 
 /* D from features, four to a texel: first = rows, second = columns (eq 3.1). */
 static const char softassign__glsl_distance[] =
-    "void main() {\n"
-    "    float sum = 0.0;\n"
-    "    for (int k = 0; k < size.x; k++) {\n"
-    "        vec4 d = texelFetch(first, ivec2(k, here().y), 0) - texelFetch(second, ivec2(k, here().x), 0);\n"
-    "        sum += dot(d, d);\n"
-    "    }\n"
-    "    result = vec4(sqrt(sum));\n"
-    "}\n";
+    SAT__GLSL(
+        void main() {
+            float sum = 0.0;
+            for (int k = 0; k < size.x; k++) {
+                vec4 d = texelFetch(first, ivec2(k, here().y), 0) - texelFetch(second, ivec2(k, here().x), 0);
+                sum += dot(d, d);
+            }
+            result = vec4(sqrt(sum));
+        });
 
 /* source = M, first = D: Q, or M = exp(clamp(-Q / t)) / sqrt(t). */
 static const char softassign__glsl_update[] =
-    "void main() {\n"
-    "    float d = at(first, here()), q = at(source, here()) * (d * scale - alpha);\n"
-    "    bool allowed = d < 1e37;\n"
+    SAT__GLSL(
+        void main() {
+            float d = at(first, here()), q = at(source, here()) * (d * scale - alpha);
+            bool allowed = d < 1e37;)
     "#if WRITES_Q\n"
-    "    result = vec4(allowed ? q : 0.0);\n"
+    SAT__GLSL(result = vec4(allowed ? q : 0.0);)
     "#else\n"
-    "    result = vec4(allowed ? exp(clamp(-q * inverse_t, -70.0, 70.0)) * factor : 0.0);\n"
+    SAT__GLSL(result = vec4(allowed ? exp(clamp(-q * inverse_t, -70.0, 70.0)) * factor : 0.0);)
     "#endif\n"
-    "}\n";
+    SAT__GLSL(});
 
 /* The sum of K texels along an axis, or their largest finite |value|. */
 static const char softassign__glsl_reduce[] =
-    "void main() {\n"
-    "    float sum = 0.0;\n"
-    "    ivec2 p = VERTICAL == 1 ? ivec2(here().x, here().y * K) : ivec2(here().x * K, here().y);\n"
-    "    for (int k = 0; k < K; k++) {\n"
-    "        float x = p.x < size.x && p.y < size.y ? at(source, p) : 0.0;\n"
+    SAT__GLSL(
+        void main() {
+            float sum = 0.0;
+            ivec2 p = VERTICAL == 1 ? ivec2(here().x, here().y * K) : ivec2(here().x * K, here().y);
+            for (int k = 0; k < K; k++) {
+                float x = p.x < size.x && p.y < size.y ? at(source, p) : 0.0;)
     "#if TAKES_MAX\n"
-    "        if (abs(x) < 1e37) sum = max(sum, abs(x));\n"
+    SAT__GLSL(if (abs(x) < 1e37) sum = max(sum, abs(x));)
     "#else\n"
-    "        sum += x;\n"
+    SAT__GLSL(sum += x;)
     "#endif\n"
-    "        p += VERTICAL == 1 ? ivec2(0, 1) : ivec2(1, 0);\n"
-    "    }\n"
-    "    result = vec4(sum);\n"
-    "}\n";
+    SAT__GLSL(
+                p += VERTICAL == 1 ? ivec2(0, 1) : ivec2(1, 0);
+            }
+            result = vec4(sum);
+        });
 
 /* source = M, first = sums of columns or of rows. */
 static const char softassign__glsl_divide[] =
-    "void main() {\n"
-    "    float sum = VERTICAL == 1 ? at(first, ivec2(here().x, 0)) + at(second, ivec2(here().x, 0)) : at(first, ivec2(0, here().y));\n"
-    "    result = vec4(sum > 0.0 ? at(source, here()) / sum : 0.0);\n"
-    "}\n";
+    SAT__GLSL(
+        void main() {
+            float sum = VERTICAL == 1 ? at(first, ivec2(here().x, 0)) + at(second, ivec2(here().x, 0))
+                : at(first, ivec2(0, here().y));
+            result = vec4(sum > 0.0 ? at(source, here()) / sum : 0.0);
+        });
 
 /* The outlier row of the next iteration: o / (sum + o) where it evolves. source = outliers, first = sums of columns. */
 static const char softassign__glsl_outlier[] =
-    "void main() {\n"
-    "    float o = at(source, ivec2(here().x, 0)), sum = at(first, ivec2(here().x, 0)) + o;\n"
-    "    result = vec4(sum > 0.0 ? o / sum : 0.0);\n"
-    "}\n";
+    SAT__GLSL(
+        void main() {
+            float o = at(source, ivec2(here().x, 0)), sum = at(first, ivec2(here().x, 0)) + o;
+            result = vec4(sum > 0.0 ? o / sum : 0.0);
+        });
 
 /* Entropic rows: (minimum, sum of weights) of K columns; the first level reads D and the prices (second). */
 static const char softassign__glsl_rows[] =
-    "void main() {\n"
-    "    vec2 both = vec2(3e38, 0.0);\n"
-    "    for (int k = 0; k < K; k++) {\n"
-    "        int x = here().x * K + k;\n"
-    "        if (x >= size.x) break;\n"
+    SAT__GLSL(
+        void main() {
+            vec2 both = vec2(3e38, 0.0);
+            for (int k = 0; k < K; k++) {
+                int x = here().x * K + k;
+                if (x >= size.x) break;)
     "#if FIRST_LEVEL\n"
-    "        float d = at(source, ivec2(x, here().y));\n"
-    "        vec2 other = d < 1e37 ? vec2(d - at(second, ivec2(x, 0)), 1.0) : vec2(3e38, 0.0);\n"
+    SAT__GLSL(
+                float d = at(source, ivec2(x, here().y));
+                vec2 other = d < 1e37 ? vec2(d - at(second, ivec2(x, 0)), 1.0) : vec2(3e38, 0.0);)
     "#else\n"
-    "        vec2 other = texelFetch(source, ivec2(x, here().y), 0).xy;\n"
+    SAT__GLSL(vec2 other = texelFetch(source, ivec2(x, here().y), 0).xy;)
     "#endif\n"
-    "        both = softassign_join(both, other, inverse_t);\n"
-    "    }\n"
-    "    result = vec4(both, 0.0, 0.0);\n"
-    "}\n";
+    SAT__GLSL(
+                both = softassign_join(both, other, inverse_t);
+            }
+            result = vec4(both, 0.0, 0.0);
+        });
 
 /* Entropic columns, first level: weights of K rows. source = D, first = (minimum, sum) per row, second = prices. */
 static const char softassign__glsl_columns[] =
-    "void main() {\n"
-    "    float sum = 0.0, price = at(second, ivec2(here().x, 0));\n"
-    "    for (int k = 0; k < K; k++) {\n"
-    "        int y = here().y * K + k;\n"
-    "        if (y >= size.y) break;\n"
-    "        vec2 row = texelFetch(first, ivec2(0, y), 0).xy;\n"
-    "        float d = at(source, ivec2(here().x, y));\n"
-    "        if (d < 1e37) sum += exp((row.x - (d - price)) * inverse_t) / row.y;\n"
-    "    }\n"
-    "    result = vec4(sum);\n"
-    "}\n";
+    SAT__GLSL(
+        void main() {
+            float sum = 0.0, price = at(second, ivec2(here().x, 0));
+            for (int k = 0; k < K; k++) {
+                int y = here().y * K + k;
+                if (y >= size.y) break;
+                vec2 row = texelFetch(first, ivec2(0, y), 0).xy;
+                float d = at(source, ivec2(here().x, y));
+                if (d < 1e37) sum += exp((row.x - (d - price)) * inverse_t) / row.y;
+            }
+            result = vec4(sum);
+        });
 
 /* v <- min(0, v - t ln s). source = prices, first = column sums; factor = t. */
 static const char softassign__glsl_prices[] =
-    "void main() {\n"
-    "    float v = at(source, ivec2(here().x, 0)), s = at(first, ivec2(here().x, 0));\n"
-    "    result = vec4(min(0.0, s < 1e-36 ? v + 82.0 * factor : v - factor * log(s)));\n"
-    "}\n";
+    SAT__GLSL(
+        void main() {
+            float v = at(source, ivec2(here().x, 0)), s = at(first, ivec2(here().x, 0));
+            result = vec4(min(0.0, s < 1e-36 ? v + 82.0 * factor : v - factor * log(s)));
+        });
 
 /* A plain copy. */
-static const char softassign__glsl_copy[] = "void main() { result = vec4(at(source, here())); }\n";
+static const char softassign__glsl_copy[] = SAT__GLSL(void main() { result = vec4(at(source, here())); });
 
 /* ---- the object */
 

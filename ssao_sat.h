@@ -2721,397 +2721,463 @@ SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void)
     return
         "#ifndef SSAO_SAT_GLSL\n"
         "#define SSAO_SAT_GLSL\n"
-        "float ssao_sat_distance(vec4 view[3], ivec2 pixel, float d) {\n"
-        "    float z = d;\n"
-        "    if (isnan(d) || isinf(d)) return 0.0;\n"
-        "    if (view[1].z > 0.5) {\n"
-        "        if (view[1].z < 1.5 ? d < 0.0 || d >= 1.0 : d <= 0.0 || d > 1.0) return 0.0;\n"
-        "        z = view[1].x * d + view[1].y + dot(view[2].yz, vec2(pixel));\n"
-        "        if (!(z > 1e-30)) return 0.0;\n"
-        "        if (view[1].w < 0.5) z = 1.0 / z;\n"
-        "    } else if (view[2].x > 0.0 && d >= view[2].x) return 0.0;\n"
-        "    return z > 1e-18 && z < 1e18 ? z : 0.0;\n"
-        "}\n"
-        "float ssao_sat_distance(vec4 view[3], float d) { return ssao_sat_distance(view, ivec2(0), d); }\n"
-        "vec3 ssao_sat_position(vec4 view[3], ivec2 pixel, float z) {\n"
-        "    return vec3((view[0].xz * (vec2(pixel) + 0.5) + view[0].yw) * (view[1].w > 0.5 ? 1.0 : z), z);\n"
-        "}\n"
-        "vec3 ssao_sat_tangent(vec4 view[3], sampler2D depth, ivec2 pixel, float z, ivec2 along) {\n"
-        "    vec3 p = ssao_sat_position(view, pixel, z), t = vec3(0.0);\n"
-        "    float nearest = 0.0;\n"
-        "    bool found = false;\n"
-        "    for (int side = -1; side <= 1; side += 2) {\n"
-        "        ivec2 q = pixel + side * along;\n"
-        "        if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, textureSize(depth, 0)))) continue;\n"
-        "        float zq = ssao_sat_distance(view, q, texelFetch(depth, q, 0).r);\n"
-        "        if (!(zq > 0.0)) continue;\n"
-        "        float off = abs(view[1].w > 0.5 ? zq - z : 1.0 / zq - 1.0 / z);\n"
-        "        if (found && off >= nearest) continue;\n"
-        "        found = true;\n"
-        "        nearest = off;\n"
-        "        t = (ssao_sat_position(view, q, zq) - p) * float(side);\n"
-        "    }\n"
-        "    return t;\n"
-        "}\n"
-        "vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z) {\n"
-        "    vec3 u = ssao_sat_tangent(view, depth, pixel, z, ivec2(1, 0)), v = ssao_sat_tangent(view, depth, pixel, z, ivec2(0, 1));\n"
-        "    float facing = view[1].w > 0.5 ? 1.0 : 0.0;\n"
-        "    if (dot(u, u) * dot(v, v) <= 0.0) return vec3(0.0, 0.0, -1.0);\n"
-        "    vec3 n = cross(normalize(u), normalize(v));\n"
-        "    if (!(dot(n, n) > 1e-24)) return vec3(0.0, 0.0, -1.0);\n"
-        "    n = normalize(n);\n"
-        "    facing = facing > 0.5 ? n.z : dot(n, ssao_sat_position(view, pixel, z));\n"
-        "    return facing > 0.0 ? -n : n;\n"
-        "}\n"
+        SAT__GLSL(
+            float ssao_sat_distance(vec4 view[3], ivec2 pixel, float d) {
+                float z = d;
+                if (isnan(d) || isinf(d)) return 0.0;
+                if (view[1].z > 0.5) {
+                    if (view[1].z < 1.5 ? d < 0.0 || d >= 1.0 : d <= 0.0 || d > 1.0) return 0.0;
+                    z = view[1].x * d + view[1].y + dot(view[2].yz, vec2(pixel));
+                    if (!(z > 1e-30)) return 0.0;
+                    if (view[1].w < 0.5) z = 1.0 / z;
+                } else if (view[2].x > 0.0 && d >= view[2].x) return 0.0;
+                return z > 1e-18 && z < 1e18 ? z : 0.0;
+            })
+        SAT__GLSL(float ssao_sat_distance(vec4 view[3], float d) { return ssao_sat_distance(view, ivec2(0), d); })
+        SAT__GLSL(
+            vec3 ssao_sat_position(vec4 view[3], ivec2 pixel, float z) {
+                return vec3((view[0].xz * (vec2(pixel) + 0.5) + view[0].yw) * (view[1].w > 0.5 ? 1.0 : z), z);
+            })
+        SAT__GLSL(
+            vec3 ssao_sat_tangent(vec4 view[3], sampler2D depth, ivec2 pixel, float z, ivec2 along) {
+                vec3 p = ssao_sat_position(view, pixel, z), t = vec3(0.0);
+                float nearest = 0.0;
+                bool found = false;
+                for (int side = -1; side <= 1; side += 2) {
+                    ivec2 q = pixel + side * along;
+                    if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, textureSize(depth, 0)))) continue;
+                    float zq = ssao_sat_distance(view, q, texelFetch(depth, q, 0).r);
+                    if (!(zq > 0.0)) continue;
+                    float off = abs(view[1].w > 0.5 ? zq - z : 1.0 / zq - 1.0 / z);
+                    if (found && off >= nearest) continue;
+                    found = true;
+                    nearest = off;
+                    t = (ssao_sat_position(view, q, zq) - p) * float(side);
+                }
+                return t;
+            })
+        SAT__GLSL(
+            vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z) {
+                vec3 u = ssao_sat_tangent(view, depth, pixel, z, ivec2(1, 0)),
+                    v = ssao_sat_tangent(view, depth, pixel, z, ivec2(0, 1));
+                float facing = view[1].w > 0.5 ? 1.0 : 0.0;
+                if (dot(u, u) * dot(v, v) <= 0.0) return vec3(0.0, 0.0, -1.0);
+                vec3 n = cross(normalize(u), normalize(v));
+                if (!(dot(n, n) > 1e-24)) return vec3(0.0, 0.0, -1.0);
+                n = normalize(n);
+                facing = facing > 0.5 ? n.z : dot(n, ssao_sat_position(view, pixel, z));
+                return facing > 0.0 ? -n : n;
+            })
         "#endif\n";
 }
 
 /* What the passes share. `work` is a pixel of the tables; size their columns and rows. */
 static const char ssao_sat__gl_common[] =
-    "uniform sampler2D depth, normals, edges;\n"
-    "uniform vec4 view[3];\n"
-    "uniform ivec2 size, picture;\n"
-    "float distance_at(ivec2 pixel) { return ssao_sat_distance(view, pixel, texelFetch(depth, min(pixel, picture - 1), 0).r); }\n"
-    "vec3 normal_at(ivec2 pixel, float z) {\n"
+    SAT__GLSL(
+        uniform sampler2D depth, normals, edges;
+        uniform vec4 view[3];
+        uniform ivec2 size, picture;
+        float distance_at(ivec2 pixel) {
+            return ssao_sat_distance(view, pixel, texelFetch(depth, min(pixel, picture - 1), 0).r);
+        })
+    SAT__GLSL(vec3 normal_at(ivec2 pixel, float z) {)
     "#if NORMALS\n"
-    "    vec3 n = texelFetch(normals, pixel, 0).xyz * vec3(1.0, 1.0, view[2].w);\n"
-    "    float square = dot(n, n);\n"
-    "    if (!isnan(square) && !isinf(square) && square > 1e-20) return n / sqrt(square);\n"
+    SAT__GLSL(
+            vec3 n = texelFetch(normals, pixel, 0).xyz * vec3(1.0, 1.0, view[2].w);
+            float square = dot(n, n);
+            if (!isnan(square) && !isinf(square) && square > 1e-20) return n / sqrt(square);)
     "#endif\n"
-    "    return ssao_sat_depth_normal(view, depth, pixel, z);\n"
-    "}\n"
-    "vec2 ray(vec2 work) { return view[0].xz * (work * float(STEP) + 0.5) + view[0].yw; }\n" /* the same in orthographic views */
-    "float pixels() { return 1.0 / (abs(view[0].x) * float(STEP)); }\n"
-    "float aspect() { return abs(view[0].x / view[0].z); }\n"
-    "bool orthographic() { return view[1].w > 0.5; }\n";
+    SAT__GLSL(
+            return ssao_sat_depth_normal(view, depth, pixel, z);
+        })
+    SAT__GLSL(
+        /* the same in orthographic views */
+        vec2 ray(vec2 work) { return view[0].xz * (work * float(STEP) + 0.5) + view[0].yw; })
+    SAT__GLSL(float pixels() { return 1.0 / (abs(view[0].x) * float(STEP)); })
+    SAT__GLSL(float aspect() { return abs(view[0].x / view[0].z); })
+    SAT__GLSL(bool orthographic() { return view[1].w > 0.5; });
 
 /* First nearest and farthest distance in 2 x 2 of the sample, then the range without the TRIM blocks at its ends, as in
    C. Where the sample meets nothing the range is that of nothing: 1 to 1. */
 static const char ssao_sat__gl_range[] =
-    "uniform sampler2D finer;\n"
-    "out vec4 result;\n"
-    "void main() {\n"
+    SAT__GLSL(
+        uniform sampler2D finer;
+        out vec4 result;
+        void main() {)
     "#if FIRST\n"
-    "    ivec2 block = ivec2(gl_FragCoord.xy);\n"
-    "    vec2 r = vec2(3e38, 0.0);\n"
-    "    for (int k = 0; k < 4; k++) {\n"
-    "        float z = distance_at(STEP * ((2 * (2 * block + ivec2(k % 2, k / 2)) + 1) * size / (2 * GRID)));\n"
-    "        if (z > 0.0) r = vec2(min(r.x, z), max(r.y, z));\n"
-    "    }\n"
+    SAT__GLSL(
+            ivec2 block = ivec2(gl_FragCoord.xy);
+            vec2 r = vec2(3e38, 0.0);
+            for (int k = 0; k < 4; k++) {
+                float z = distance_at(STEP * ((2 * (2 * block + ivec2(k % 2, k / 2)) + 1) * size / (2 * GRID)));
+                if (z > 0.0) r = vec2(min(r.x, z), max(r.y, z));
+            })
     "#else\n"
-    "    float least[2 * TRIM + 1], most[2 * TRIM + 1];\n"
-    "    int blocks = 0, trim;\n"
-    "    for (int i = 0; i <= 2 * TRIM; i++) least[i] = most[i] = 3e38;\n"
-    "    for (int k = 0; k < GRID * GRID / 4; k++) {\n"
-    "        vec2 v = texelFetch(finer, ivec2(k % (GRID / 2), k / (GRID / 2)), 0).xy;\n"
-    "        if (!(v.y > 0.0)) continue;\n"
-    "        blocks++;\n"
-    "        v.y = -v.y;\n"
-    "        for (int i = 0; i <= 2 * TRIM; i++) {\n"
-    "            float a = least[i], b = most[i];\n"
-    "            least[i] = min(a, v.x);\n"
-    "            v.x = max(a, v.x);\n"
-    "            most[i] = min(b, v.y);\n"
-    "            v.y = max(b, v.y);\n"
-    "        }\n"
-    "    }\n"
-    "    trim = min(TRIM, blocks / 16);\n"
-    "    vec2 r = vec2(0.0);\n"
-    "    for (int i = trim; i <= 2 * trim; i++) r += vec2(least[i], -most[i]) / float(trim + 1);\n"
-    "    if (blocks == 0) r = vec2(1.0);\n"
-    "    r.y = max(r.x, r.y);\n"
+    SAT__GLSL(
+            float least[2 * TRIM + 1], most[2 * TRIM + 1];
+            int blocks = 0, trim;
+            for (int i = 0; i <= 2 * TRIM; i++) least[i] = most[i] = 3e38;
+            for (int k = 0; k < GRID * GRID / 4; k++) {
+                vec2 v = texelFetch(finer, ivec2(k % (GRID / 2), k / (GRID / 2)), 0).xy;
+                if (!(v.y > 0.0)) continue;
+                blocks++;
+                v.y = -v.y;
+                for (int i = 0; i <= 2 * TRIM; i++) {
+                    float a = least[i], b = most[i];
+                    least[i] = min(a, v.x);
+                    v.x = max(a, v.x);
+                    most[i] = min(b, v.y);
+                    v.y = max(b, v.y);
+                }
+            }
+            trim = min(TRIM, blocks / 16);
+            vec2 r = vec2(0.0);
+            for (int i = trim; i <= 2 * trim; i++) r += vec2(least[i], -most[i]) / float(trim + 1);
+            if (blocks == 0) r = vec2(1.0);
+            r.y = max(r.x, r.y);)
     "#endif\n"
-    "    result = vec4(r, 0.0, 0.0);\n"
-    "}\n";
+    SAT__GLSL(
+            result = vec4(r, 0.0, 0.0);
+        });
 
 /* Texel b: share of the 32 x 32 sample in the first b of the bins of the depth range. */
 static const char ssao_sat__gl_shares[] =
-    "uniform sampler2D finer;\n"
-    "out vec4 result;\n"
-    "float scaled(float z) { return orthographic() ? z : log(z); }\n"
-    "void main() {\n"
-    "    vec2 range = texelFetch(finer, ivec2(0), 0).xy;\n"
-    "    float low = scaled(range.x), width = scaled(range.y) - low, below = 0.0, all = 0.0, bin = floor(gl_FragCoord.x);\n"
-    "    for (int j = 0; j < GRID * GRID; j++) {\n"
-    "        float z = distance_at(STEP * ((2 * ivec2(j % GRID, j / GRID) + 1) * size / (2 * GRID)));\n"
-    "        if (!(z > 0.0)) continue;\n"
-    "        all += 1.0;\n"
-    "        if ((width > 0.0 ? clamp(floor((scaled(z) - low) / width * float(BINS)), 0.0, float(BINS - 1)) : 0.0) < bin) below += 1.0;\n"
-    "    }\n"
-    "    result = vec4(all > 0.0 ? below / all : bin / float(BINS));\n"
-    "}\n";
+    SAT__GLSL(
+        uniform sampler2D finer;
+        out vec4 result;
+        float scaled(float z) { return orthographic() ? z : log(z); })
+    SAT__GLSL(
+        void main() {
+            vec2 range = texelFetch(finer, ivec2(0), 0).xy;
+            float low = scaled(range.x), width = scaled(range.y) - low, below = 0.0, all = 0.0,
+                bin = floor(gl_FragCoord.x);
+            for (int j = 0; j < GRID * GRID; j++) {
+                float z = distance_at(STEP * ((2 * ivec2(j % GRID, j / GRID) + 1) * size / (2 * GRID)));
+                if (!(z > 0.0)) continue;
+                all += 1.0;
+                if ((width > 0.0 ? clamp(floor((scaled(z) - low) / width * float(BINS)), 0.0, float(BINS - 1)) : 0.0)
+                    < bin) below += 1.0;
+            }
+            result = vec4(all > 0.0 ? below / all : bin / float(BINS));
+        });
 
 /* Texel k: edge k; low value, quantum and highest level of slab k. The last has the farthest distance and the number of
    slabs. As in C. */
 static const char ssao_sat__gl_edges[] =
-    "uniform sampler2D finer, shares;\n"
-    "uniform vec4 region;\n" /* radius, reach, limit */
-    "out vec4 result;\n"
-    "float filled(int bin) { return 0.5 * float(bin) / float(BINS) + 0.5 * texelFetch(shares, ivec2(bin, 0), 0).r; }\n"
-    "float cut(int k, int slabs, vec2 range) {\n"
-    "    vec2 ends = orthographic() ? range : log(range);\n"
-    "    float target = float(k) / float(slabs), z;\n"
-    "    int a = 0, b = BINS;\n"
-    "    if (k <= 0) return range.x;\n"
-    "    if (k >= slabs) return range.y;\n"
-    "    while (b - a > 1) {\n" /* filled(a) < target <= filled(b) */
-    "        int middle = (a + b) / 2;\n"
-    "        if (filled(middle) < target) a = middle; else b = middle;\n"
-    "    }\n"
-    "    z = mix(ends.x, ends.y, (float(a) + (target - filled(a)) / (filled(b) - filled(a))) / float(BINS));\n"
-    "    return clamp(orthographic() ? z : exp(z), range.x, range.y);\n"
-    "}\n"
-    "void main() {\n"
-    "    vec2 range = texelFetch(finer, ivec2(0), 0).xy, ends = vec2(0.0);\n"
-    "    float thin = min(region.x, region.z / pixels() * (orthographic() ? 1.0 : range.x));\n"
-    "    int k = int(gl_FragCoord.x), slabs = METHOD == 0 ? int(min(float(SLABS), floor((range.y - range.x) / thin) + 1.0)) : 1, bits = 31;\n"
-    "    float largest = max(min(region.y * pixels() / (orthographic() ? 1.0 : range.x / MARGIN), region.z), 2.0) * max(aspect(), 1.0);\n"
-    "    float side = 2.0 * largest / (METHOD == 0 ? 3.0 : 1.0) + 2.0, first = cut(k, slabs, range), second = cut(k + 1, slabs, range);\n"
-    "    float spare = orthographic() ? min(range.y - range.x + MARGIN * region.x, 1e15) : 0.0, low = first, high = second;\n"
-    "    if (METHOD == 0) side *= float(STEP);\n"
-    "    if (k == 0) low = orthographic() ? low - spare : low / MARGIN;\n"
-    "    if (k == slabs - 1) high += spare;\n"
-    "    while (bits > 1 && side * side * exp2(float(bits)) > 2147483648.0) bits--;\n"
-    "    bits = min(bits, 20);\n"
-    "    if (METHOD == 0) ends = orthographic() ? vec2(low, high) : vec2(k == slabs - 1 ? 0.0 : 1.0 / high, 1.0 / low);\n"
-    "    else if (METHOD == 1) ends.y = orthographic() ? range.y - range.x + MARGIN * min(region.x, 1e15) : MARGIN / range.x;\n"
-    "    else ends.y = INVERTED == 1 ? MARGIN / range.x : 1.05 * range.y;\n"
-    "    float top = exp2(float(bits)) - 1.0;\n"
-    "    result = vec4(first, ends.x, (ends.y - ends.x) / top, k == SLABS ? float(slabs) : top);\n"
-    "}\n";
+    SAT__GLSL(
+        uniform sampler2D finer, shares;
+        uniform vec4 region; /* radius, reach, limit */
+        out vec4 result;
+        float filled(int bin) { return 0.5 * float(bin) / float(BINS) + 0.5 * texelFetch(shares, ivec2(bin, 0), 0).r; })
+    SAT__GLSL(
+        float cut(int k, int slabs, vec2 range) {
+            vec2 ends = orthographic() ? range : log(range);
+            float target = float(k) / float(slabs), z;
+            int a = 0, b = BINS;
+            if (k <= 0) return range.x;
+            if (k >= slabs) return range.y;
+            while (b - a > 1) { /* filled(a) < target <= filled(b) */
+                int middle = (a + b) / 2;
+                if (filled(middle) < target) a = middle; else b = middle;
+            }
+            z = mix(ends.x, ends.y, (float(a) + (target - filled(a)) / (filled(b) - filled(a))) / float(BINS));
+            return clamp(orthographic() ? z : exp(z), range.x, range.y);
+        })
+    SAT__GLSL(
+        void main() {
+            vec2 range = texelFetch(finer, ivec2(0), 0).xy, ends = vec2(0.0);
+            float thin = min(region.x, region.z / pixels() * (orthographic() ? 1.0 : range.x));
+            int k = int(gl_FragCoord.x), slabs = METHOD == 0
+                ? int(min(float(SLABS), floor((range.y - range.x) / thin) + 1.0)) : 1, bits = 31;
+            float largest = max(min(region.y * pixels() / (orthographic() ? 1.0 : range.x / MARGIN), region.z), 2.0)
+                * max(aspect(), 1.0);
+            float side = 2.0 * largest / (METHOD == 0 ? 3.0 : 1.0) + 2.0, first = cut(k, slabs, range),
+                second = cut(k + 1, slabs, range);
+            float spare = orthographic() ? min(range.y - range.x + MARGIN * region.x, 1e15) : 0.0, low = first,
+                high = second;
+            if (METHOD == 0) side *= float(STEP);
+            if (k == 0) low = orthographic() ? low - spare : low / MARGIN;
+            if (k == slabs - 1) high += spare;
+            while (bits > 1 && side * side * exp2(float(bits)) > 2147483648.0) bits--;
+            bits = min(bits, 20);
+            if (METHOD == 0) ends = orthographic() ? vec2(low, high)
+                : vec2(k == slabs - 1 ? 0.0 : 1.0 / high, 1.0 / low);
+            else if (METHOD == 1) ends.y = orthographic() ? range.y - range.x + MARGIN * min(region.x, 1e15)
+                : MARGIN / range.x;
+            else ends.y = INVERTED == 1 ? MARGIN / range.x : 1.05 * range.y;
+            float top = exp2(float(bits)) - 1.0;
+            result = vec4(first, ends.x, (ends.y - ends.x) / top, k == SLABS ? float(slabs) : top);
+        });
 
 /* One word or four for every pixel and slab. */
 static const char ssao_sat__gl_words[] =
-    "out uvec4 result;\n"
-    "uint level(float v, vec4 edge) { return edge.z > 0.0 ? uint(clamp((v - edge.y) / edge.z + 0.5, 0.0, edge.w)) : 0u; }\n"
-    "void main() {\n"
-    "    ivec2 at = ivec2(gl_FragCoord.xy), tile = at / size, work = at - tile * size;\n"
-    "    vec4 first = texelFetch(edges, ivec2(0), 0);\n"
-    "    result = uvec4(0u);\n"
+    SAT__GLSL(
+        out uvec4 result;
+        uint level(float v, vec4 edge) {
+            return edge.z > 0.0 ? uint(clamp((v - edge.y) / edge.z + 0.5, 0.0, edge.w)) : 0u;
+        })
+    SAT__GLSL(
+        void main() {
+            ivec2 at = ivec2(gl_FragCoord.xy), tile = at / size, work = at - tile * size;
+            vec4 first = texelFetch(edges, ivec2(0), 0);
+            result = uvec4(0u);)
     "#if METHOD == 0\n"
-    "    int k = tile.y * TILES + tile.x, slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);\n"
-    "    if (k >= slabs) return;\n"
-    "    vec4 edge = texelFetch(edges, ivec2(k, 0), 0);\n"
-    "    float next = texelFetch(edges, ivec2(k + 1, 0), 0).x;\n"
-    "    for (int i = 0; i < STEP * STEP; i++) {\n" /* all pixels of the picture */
-    "        ivec2 pixel = STEP * work + ivec2(i % STEP, i / STEP);\n"
-    "        float z = all(lessThan(pixel, picture)) ? distance_at(pixel) : 0.0;\n"
-    "        if (z > 0.0 && (k == 0 || z >= edge.x) && (k == slabs - 1 || z < next))\n"
-    "            result += uvec4(1u, level(orthographic() ? z : 1.0 / z, edge), uvec2(pixel));\n"
-    "    }\n"
+    SAT__GLSL(
+            int k = tile.y * TILES + tile.x, slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);
+            if (k >= slabs) return;
+            vec4 edge = texelFetch(edges, ivec2(k, 0), 0);
+            float next = texelFetch(edges, ivec2(k + 1, 0), 0).x;
+            for (int i = 0; i < STEP * STEP; i++) { /* all pixels of the picture */
+                ivec2 pixel = STEP * work + ivec2(i % STEP, i / STEP);
+                float z = all(lessThan(pixel, picture)) ? distance_at(pixel) : 0.0;
+                if (z > 0.0 && (k == 0 || z >= edge.x) && (k == slabs - 1 || z < next))
+                    result += uvec4(1u, level(orthographic() ? z : 1.0 / z, edge), uvec2(pixel));
+            })
     "#else\n"
-    "    float z = distance_at(STEP * work);\n"
-    "    float nearest = first.x, farthest = texelFetch(edges, ivec2(SLABS, 0), 0).x, v;\n"
-    "    if (METHOD == 1) v = z > 0.0 ? (orthographic() ? farthest - z : 1.0 / z) : 0.0;\n"
-    "    else if (INVERTED == 1) v = z > 0.0 ? 1.0 / z : 0.0;\n"
-    "    else v = z > 0.0 ? z : 1.05 * farthest;\n"
-    "    result.x = level(v, first);\n"
+    SAT__GLSL(
+            float z = distance_at(STEP * work);
+            float nearest = first.x, farthest = texelFetch(edges, ivec2(SLABS, 0), 0).x, v;
+            if (METHOD == 1) v = z > 0.0 ? (orthographic() ? farthest - z : 1.0 / z) : 0.0;
+            else if (INVERTED == 1) v = z > 0.0 ? 1.0 / z : 0.0;
+            else v = z > 0.0 ? z : 1.05 * farthest;
+            result.x = level(v, first);)
     "#endif\n"
-    "}\n";
+    SAT__GLSL(});
 
 /* Four texels `reach` apart, within the tile. */
 static const char ssao_sat__gl_scan[] =
-    "uniform usampler2D table;\n"
-    "uniform ivec2 reach, size;\n"
-    "out uvec4 result;\n"
-    "void main() {\n"
-    "    ivec2 at = ivec2(gl_FragCoord.xy), work = at - at / size * size;\n"
-    "    result = texelFetch(table, at, 0);\n"
-    "    for (int i = 1; i < 4; i++)\n"
-    "        if (all(greaterThanEqual(work, i * reach))) result += texelFetch(table, at - i * reach, 0);\n"
-    "}\n";
+    SAT__GLSL(
+        uniform usampler2D table;
+        uniform ivec2 reach, size;
+        out uvec4 result;
+        void main() {
+            ivec2 at = ivec2(gl_FragCoord.xy), work = at - at / size * size;
+            result = texelFetch(table, at, 0);
+            for (int i = 1; i < 4; i++)
+                if (all(greaterThanEqual(work, i * reach))) result += texelFetch(table, at - i * reach, 0);
+        });
 
 static const char ssao_sat__gl_tone[] =
-    "uniform usampler2D table;\n"
-    "uniform vec4 fit, region, tone;\n" /* reach, range, bias, gain; radius, limit, min_pixels, pixels of a fixed
+    SAT__GLSL(
+        uniform usampler2D table;
+        uniform vec4 fit, region, tone; /* reach, range, bias, gain; radius, limit, min_pixels, pixels of a fixed
                                            region; power, power of the caller */
-    "out vec4 result;\n"
-    "float open(float occlusion, float gain) {\n"
-    "    return pow(clamp(1.0 - gain * occlusion, 0.0, 1.0), tone.x * tone.y);\n"
-    "}\n"
-    "float half_side(float z) {\n"
-    "    float r = region.w > 0.0 ? region.w / float(STEP) : fit.x * pixels() / (orthographic() ? 1.0 : z);\n"
-    "    return min(r, region.y);\n"
-    "}\n"
-    "float fade(float side) { return region.w > 0.0 ? 1.0 : clamp(side / region.z - 1.0, 0.0, 1.0); }\n";
+        out vec4 result;
+        float open(float occlusion, float gain) {
+            return pow(clamp(1.0 - gain * occlusion, 0.0, 1.0), tone.x * tone.y);
+        })
+    SAT__GLSL(
+        float half_side(float z) {
+            float r = region.w > 0.0 ? region.w / float(STEP) : fit.x * pixels() / (orthographic() ? 1.0 : z);
+            return min(r, region.y);
+        })
+    SAT__GLSL(float fade(float side) { return region.w > 0.0 ? 1.0 : clamp(side / region.z - 1.0, 0.0, 1.0); });
 
 static const char ssao_sat__gl_slabs[] =
-    "uvec4 corner(ivec2 tile, int x, int y) {\n"
-    "    return x > 0 && y > 0 ? texelFetch(table, tile + ivec2(x - 1, y - 1), 0) : uvec4(0u);\n"
-    "}\n"
-    "uniform vec4 kernel[13];\n" /* three a ring, then the factors by n.v: see ssao_sat__kernel */
-    "float occluder(uvec4 sums, vec4 edge, vec3 p, vec3 n, int ring) {\n" /* of one slab in one cell, times its pixels */
-    "    vec4 s = vec4(ivec4(sums));\n"
-    "    if (s.x < 0.5) return 0.0;\n"
-    "    float mean = (edge.y * s.x + edge.z * s.y) / s.x, z = orthographic() ? mean : 1.0 / max(mean, 1e-30);\n"
-    "    vec3 d = vec3((view[0].xz * (s.zw / s.x + 0.5) + view[0].yw) * (orthographic() ? 1.0 : z), z) - p;\n"
-    "    float square = dot(d, d), height = dot(d, n), share = 1.0 - square / (fit.y * fit.y);\n"
-    "    if (height <= 0.0 || share <= 0.0) return 0.0;\n"
-    "    float away = sqrt(max(square, p.z * p.z * 1e-12 + 1e-37)), sine = max(height / away - fit.z, 0.0), r = min(away / region.x, 2.0);\n"
-    "    vec4 powers = vec4(1.0, r, r * r, r * r * r);\n"
-    "    vec3 k = vec3(dot(kernel[3 * ring], powers), dot(kernel[3 * ring + 1], powers), dot(kernel[3 * ring + 2], powers));\n"
-    "    return sine * (k.x + sine * (k.y + sine * k.z)) * share * s.x;\n"
-    "}\n"
+    SAT__GLSL(
+        uvec4 corner(ivec2 tile, int x, int y) {
+            return x > 0 && y > 0 ? texelFetch(table, tile + ivec2(x - 1, y - 1), 0) : uvec4(0u);
+        })
+    SAT__GLSL(
+        uniform vec4 kernel[13]; /* three a ring, then the factors by n.v: see ssao_sat__kernel */
+        /* of one slab in one cell, times its pixels */
+        float occluder(uvec4 sums, vec4 edge, vec3 p, vec3 n, int ring) {
+            vec4 s = vec4(ivec4(sums));
+            if (s.x < 0.5) return 0.0;
+            float mean = (edge.y * s.x + edge.z * s.y) / s.x, z = orthographic() ? mean : 1.0 / max(mean, 1e-30);
+            vec3 d = vec3((view[0].xz * (s.zw / s.x + 0.5) + view[0].yw) * (orthographic() ? 1.0 : z), z) - p;
+            float square = dot(d, d), height = dot(d, n), share = 1.0 - square / (fit.y * fit.y);
+            if (height <= 0.0 || share <= 0.0) return 0.0;
+            float away = sqrt(max(square, p.z * p.z * 1e-12 + 1e-37)), sine = max(height / away - fit.z, 0.0),
+                r = min(away / region.x, 2.0);
+            vec4 powers = vec4(1.0, r, r * r, r * r * r);
+            vec3 k = vec3(dot(kernel[3 * ring], powers), dot(kernel[3 * ring + 1], powers),
+                dot(kernel[3 * ring + 2], powers));
+            return sine * (k.x + sine * (k.y + sine * k.z)) * share * s.x;
+        })
     /* What a pixel weighs in each third of an axis: see ssao_sat__cut_axis. */
-    "vec3 cut(ivec4 border, int outer, int inner, bool whole, int pixels) {\n"
-    "    vec3 share = vec3(1.0), count = vec3(min(STEP * border.yzw, ivec3(pixels)) - STEP * border.xyz);\n"
-    "    float a = float(border.y - border.x) / float(outer - inner), b = float(border.w - border.z) / float(outer - inner);\n"
-    "    if (!whole) share = vec3(a, 1.0 + BEYOND * (2.0 - a - b), b);\n"
-    "    return vec3(count.x > 0.0 ? share.x / count.x : 0.0, count.y > 0.0 ? share.y / count.y : 0.0, count.z > 0.0 ? share.z / count.z : 0.0);\n"
-    "}\n"
-    "float slab(int k, ivec2 x[4], vec3 u, vec3 v, vec3 p, vec3 n, int ring) {\n" /* x[t] = borders along both axes; weights of
-                                                                           the thirds */
-    "    ivec2 tile = ivec2(k % TILES, k / TILES) * size;\n"
-    "    vec4 edge = texelFetch(edges, ivec2(k, 0), 0);\n"
-    "    uvec4 row[4];\n"
-    "    float sum = 0.0;\n"
-    "    if (corner(tile, x[3].x, x[3].y).x - corner(tile, x[0].x, x[3].y).x == corner(tile, x[3].x, x[0].y).x - corner(tile, x[0].x, x[0].y).x) return 0.0;\n"
-    "    for (int t = 0; t < 4; t++) row[t] = corner(tile, x[t].x, x[0].y);\n"
-    "    for (int j = 0; j < 3; j++) {\n"
-    "        uvec4 last = uvec4(0u);\n"
-    "        for (int t = 0; t < 4; t++) {\n"
-    "            uvec4 below = corner(tile, x[t].x, x[j + 1].y), band = below - row[t];\n"
-    "            row[t] = below;\n"
-    "            if (t > 0 && !(t == 2 && j == 1)) sum += occluder(band - last, edge, p, n, ring) * u[t - 1] * v[j];\n"
-    "            last = band;\n"
-    "        }\n"
-    "    }\n"
-    "    return sum;\n"
-    "}\n"
-    "void main() {\n"
-    "    ivec2 work = ivec2(gl_FragCoord.xy), x[4];\n"
-    "    float z = distance_at(STEP * work), side = half_side(z), strength = fade(side), sum = 0.0, r = side;\n"
-    "    result = vec4(1.0);\n"
-    "    if (!(z > 0.0) || !(strength > 0.0)) return;\n"
-    "    vec3 n = normal_at(STEP * work, z), p = vec3(ray(vec2(work)) * (orthographic() ? 1.0 : z), z);\n"
-    "    int slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);\n"
-    "    for (int ring = 0; ring < RINGS; ring++, r /= 3.0) {\n"
-    "        ivec2 inner = max(ivec2(vec2(r, r * aspect()) / 3.0 + 0.5), 1), outer = max(ivec2(vec2(r, r * aspect()) + 0.5), inner + 1);\n"
-    "        x[0] = max(work - outer, 0);\n"
-    "        x[1] = max(work - inner, 0);\n"
-    "        x[2] = min(work + inner + 1, size);\n"
-    "        x[3] = min(work + outer + 1, size);\n"
-    "        vec3 u = cut(ivec4(x[0].x, x[1].x, x[2].x, x[3].x), outer.x, inner.x, x[0].x == work.x - outer.x && x[3].x == work.x + outer.x + 1, picture.x);\n"
-    "        vec3 v = cut(ivec4(x[0].y, x[1].y, x[2].y, x[3].y), outer.y, inner.y, x[0].y == work.y - outer.y && x[3].y == work.y + outer.y + 1, picture.y);\n"
-    "        for (int k = 0; k < slabs; k++) {\n"
-    "            float low = texelFetch(edges, ivec2(k, 0), 0).x, high = texelFetch(edges, ivec2(k + 1, 0), 0).x;\n"
-    "            if ((k < slabs - 1 && high < z - fit.y) || (k > 0 && low > z + fit.y)) continue;\n"
-    "            sum += slab(k, x, u, v, p, n, ring);\n"
-    "        }\n"
-    "    }\n"
-    "    float cosine = clamp(-dot(n, orthographic() ? vec3(0.0, 0.0, 1.0) : normalize(p)), 0.0, 1.0);\n"
-    "    strength *= cosine < 0.5 ? mix(1.0, kernel[12].x, 1.0 - 2.0 * cosine) : mix(1.0, kernel[12].y, 2.0 * cosine - 1.0);\n"
-    "    result.r = open(sum, strength * fit.w);\n"
-    "}\n";
+    SAT__GLSL(
+        vec3 cut(ivec4 border, int outer, int inner, bool whole, int pixels) {
+            vec3 share = vec3(1.0), count = vec3(min(STEP * border.yzw, ivec3(pixels)) - STEP * border.xyz);
+            float a = float(border.y - border.x) / float(outer - inner),
+                b = float(border.w - border.z) / float(outer - inner);
+            if (!whole) share = vec3(a, 1.0 + BEYOND * (2.0 - a - b), b);
+            return vec3(count.x > 0.0 ? share.x / count.x : 0.0, count.y > 0.0 ? share.y / count.y : 0.0,
+                count.z > 0.0 ? share.z / count.z : 0.0);
+        })
+    SAT__GLSL(
+        /* x[t] = borders along both axes; weights of the thirds */
+        float slab(int k, ivec2 x[4], vec3 u, vec3 v, vec3 p, vec3 n, int ring) {
+            ivec2 tile = ivec2(k % TILES, k / TILES) * size;
+            vec4 edge = texelFetch(edges, ivec2(k, 0), 0);
+            uvec4 row[4];
+            float sum = 0.0;
+            if (corner(tile, x[3].x, x[3].y).x - corner(tile, x[0].x, x[3].y).x == corner(tile, x[3].x, x[0].y).x
+                - corner(tile, x[0].x, x[0].y).x) return 0.0;
+            for (int t = 0; t < 4; t++) row[t] = corner(tile, x[t].x, x[0].y);
+            for (int j = 0; j < 3; j++) {
+                uvec4 last = uvec4(0u);
+                for (int t = 0; t < 4; t++) {
+                    uvec4 below = corner(tile, x[t].x, x[j + 1].y), band = below - row[t];
+                    row[t] = below;
+                    if (t > 0 && !(t == 2 && j == 1)) sum += occluder(band - last, edge, p, n, ring) * u[t - 1] * v[j];
+                    last = band;
+                }
+            }
+            return sum;
+        })
+    SAT__GLSL(
+        void main() {
+            ivec2 work = ivec2(gl_FragCoord.xy), x[4];
+            float z = distance_at(STEP * work), side = half_side(z), strength = fade(side), sum = 0.0, r = side;
+            result = vec4(1.0);
+            if (!(z > 0.0) || !(strength > 0.0)) return;
+            vec3 n = normal_at(STEP * work, z), p = vec3(ray(vec2(work)) * (orthographic() ? 1.0 : z), z);
+            int slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);
+            for (int ring = 0; ring < RINGS; ring++, r /= 3.0) {
+                ivec2 inner = max(ivec2(vec2(r, r * aspect()) / 3.0 + 0.5), 1),
+                    outer = max(ivec2(vec2(r, r * aspect()) + 0.5), inner + 1);
+                x[0] = max(work - outer, 0);
+                x[1] = max(work - inner, 0);
+                x[2] = min(work + inner + 1, size);
+                x[3] = min(work + outer + 1, size);
+                vec3 u = cut(ivec4(x[0].x, x[1].x, x[2].x, x[3].x), outer.x, inner.x,
+                    x[0].x == work.x - outer.x && x[3].x == work.x + outer.x + 1, picture.x);
+                vec3 v = cut(ivec4(x[0].y, x[1].y, x[2].y, x[3].y), outer.y, inner.y,
+                    x[0].y == work.y - outer.y && x[3].y == work.y + outer.y + 1, picture.y);
+                for (int k = 0; k < slabs; k++) {
+                    float low = texelFetch(edges, ivec2(k, 0), 0).x, high = texelFetch(edges, ivec2(k + 1, 0), 0).x;
+                    if ((k < slabs - 1 && high < z - fit.y) || (k > 0 && low > z + fit.y)) continue;
+                    sum += slab(k, x, u, v, p, n, ring);
+                }
+            }
+            float cosine = clamp(-dot(n, orthographic() ? vec3(0.0, 0.0, 1.0) : normalize(p)), 0.0, 1.0);
+            strength *= cosine < 0.5 ? mix(1.0, kernel[12].x, 1.0 - 2.0 * cosine)
+                : mix(1.0, kernel[12].y, 2.0 * cosine - 1.0);
+            result.r = open(sum, strength * fit.w);
+        });
 
 static const char ssao_sat__gl_single[] =
-    "uniform vec4 published;\n" /* offset, refine threshold, depth gain, - */
-    "ivec4 box;\n" /* low and high corner of the region */
-    "uint corner(ivec2 at) { return at.x > 0 && at.y > 0 ? texelFetch(table, at - 1, 0).x : 0u; }\n"
-    "float mean(ivec4 b, vec4 edge) {\n"
-    "    uint sum = corner(b.zw) - corner(b.xw) - corner(b.zy) + corner(b.xy);\n"
-    "    return edge.y + edge.z * float(sum) / float((b.z - b.x) * (b.w - b.y));\n"
-    "}\n"
-    "float deficit(float m, float z) { return INVERTED == 1 ? (m * z - 1.0) * z : z - m; }\n";
+    SAT__GLSL(
+        uniform vec4 published; /* offset, refine threshold, depth gain, - */
+        ivec4 box; /* low and high corner of the region */
+        uint corner(ivec2 at) { return at.x > 0 && at.y > 0 ? texelFetch(table, at - 1, 0).x : 0u; })
+    SAT__GLSL(
+        float mean(ivec4 b, vec4 edge) {
+            uint sum = corner(b.zw) - corner(b.xw) - corner(b.zy) + corner(b.xy);
+            return edge.y + edge.z * float(sum) / float((b.z - b.x) * (b.w - b.y));
+        })
+    SAT__GLSL(float deficit(float m, float z) { return INVERTED == 1 ? (m * z - 1.0) * z : z - m; });
 
 /* Eq 5.4 over four children. GLSL has no recursion: the text is there once for each level, under two names. */
 static const char ssao_sat__gl_refine[] =
-    "float NAME(ivec4 b, float z, vec4 edge) {\n"
-    "    float parent_mean = mean(b, edge), parent = deficit(parent_mean, z), sum = 0.0, weight = 0.0;\n"
-    "    ivec2 x[3];\n"
-    "    x[0] = b.xy; x[1] = (b.xy + b.zw) / 2; x[2] = b.zw;\n"
-    "    if (LEVEL >= LEVELS || abs(parent) >= published.y * z || any(lessThan(b.zw - b.xy, ivec2(2)))) return parent;\n"
-    "    for (int i = 0; i < 4; i++) {\n"
-    "        int u = i % 2, v = i / 2;\n"
-    "        ivec4 c = ivec4(x[u].x, x[v].y, x[u + 1].x, x[v + 1].y);\n"
-    "        float m = mean(c, edge), child = deficit(m, z), area = float((c.z - c.x) * (c.w - c.y));\n"
-    "        if (!(PRINTED == 1 ? m > parent_mean : child > parent)) continue;\n"
-    "        CHILD\n"
-    "        sum += area * child;\n"
-    "        weight += area;\n"
-    "    }\n"
-    "    return weight > 0.0 ? sum / weight : parent;\n"
-    "}\n";
+    SAT__GLSL(
+        float NAME(ivec4 b, float z, vec4 edge) {
+            float parent_mean = mean(b, edge), parent = deficit(parent_mean, z), sum = 0.0, weight = 0.0;
+            ivec2 x[3];
+            x[0] = b.xy; x[1] = (b.xy + b.zw) / 2; x[2] = b.zw;
+            if (LEVEL >= LEVELS || abs(parent) >= published.y * z || any(lessThan(b.zw - b.xy, ivec2(2))))
+                return parent;
+            for (int i = 0; i < 4; i++) {
+                int u = i % 2, v = i / 2;
+                ivec4 c = ivec4(x[u].x, x[v].y, x[u + 1].x, x[v + 1].y);
+                float m = mean(c, edge), child = deficit(m, z), area = float((c.z - c.x) * (c.w - c.y));
+                if (!(PRINTED == 1 ? m > parent_mean : child > parent)) continue;
+                CHILD
+                sum += area * child;
+                weight += area;
+            }
+            return weight > 0.0 ? sum / weight : parent;
+        });
 
 static const char ssao_sat__gl_single_main[] =
-    "float over_plane(vec3 n, vec2 at, float z, vec2 r, vec4 edge, float farthest) {\n"
-    "    vec2 g;\n"
-    "    float own, height, sum = 0.0;\n"
-    "    ivec2 x[3];\n"
-    "    if (orthographic()) {\n"
-    "        float facing = min(n.z, -1e-3);\n"
-    "        g = n.xy / facing * view[0].xz * float(STEP);\n"
-    "        own = farthest - z;\n"
-    "        height = -facing / region.x;\n"
-    "    } else {\n"
-    "        float facing = min(dot(n.xy, r) + n.z, -1e-3);\n"
-    "        g = n.xy * view[0].xz * float(STEP) / (facing * z);\n"
-    "        own = 1.0 / z;\n"
-    "        height = -facing * z * z / region.x;\n"
-    "    }\n"
-    "    x[0] = box.xy; x[1] = BOXES == 2 ? (box.xy + box.zw) / 2 : box.zw; x[2] = box.zw;\n"
-    "    for (int j = 0; j < BOXES; j++)\n"
-    "        for (int i = 0; i < BOXES; i++) {\n"
-    "            ivec4 c = ivec4(x[i].x, x[j].y, x[i + 1].x, x[j + 1].y);\n"
-    "            if (c.z <= c.x || c.w <= c.y) continue;\n"
-    "            float spread = 0.5 * dot(abs(g), vec2(c.zw - c.xy)), centre = own + dot(g, 0.5 * vec2(c.xy + c.zw) - at);\n"
-    "            if (centre < spread) centre = centre > -spread ? (centre + spread) * (centre + spread) / (4.0 * spread) : 0.0;\n" /* see ssao_sat__plane_mean */
-    "            float h = (mean(c, edge) - centre) * height;\n"
-    "            if (h > 0.0) sum += h / (1.0 + fit.y * h * h);\n"
-    "        }\n"
-    "    return sum / float(BOXES * BOXES);\n"
-    "}\n"
-    "void main() {\n"
-    "    ivec2 work = ivec2(gl_FragCoord.xy);\n"
-    "    float z = distance_at(STEP * work), side = half_side(z), strength = fade(side), gain = 1.0, occlusion;\n"
-    "    vec4 edge = texelFetch(edges, ivec2(0), 0);\n"
-    "    float farthest = texelFetch(edges, ivec2(SLABS, 0), 0).x;\n"
-    "    vec2 c = vec2(work) + 0.5, half_box = vec2(side, side * aspect()), r = orthographic() ? vec2(0.0) : ray(vec2(work));\n"
-    "    result = vec4(1.0);\n"
-    "    if (!(z > 0.0) || !(strength > 0.0)) return;\n"
-    "    vec3 n = normal_at(STEP * work, z);\n"
-    "    vec2 shift = METHOD == 2 ? vec2(0.0) : n.xy - (METHOD == 1 || PRINTED == 1 ? vec2(0.0) : n.z * r);\n"
-    "    if (METHOD != 1) shift *= published.x / max(length(shift), 1.0);\n"
-    "    c += shift * sign(view[0].xz) * half_box;\n"
-    "    box.xy = clamp(ivec2(floor(c - half_box + 0.5)), ivec2(0), size - 1);\n"
-    "    box.zw = clamp(ivec2(floor(c + half_box + 0.5)), box.xy + 1, size);\n"
-    "    if (METHOD == 1) occlusion = over_plane(n, vec2(work) + 0.5, z, r, edge, farthest);\n"
-    "    else {\n"
-    "        occlusion = METHOD == 4 ? refine_all(box, z, edge) : deficit(mean(box, edge), z);\n"
-    "        if (farthest > edge.x) gain += published.z * (z - edge.x) / (farthest - edge.x);\n"
-    "        occlusion = max(occlusion, 0.0) * gain / region.x;\n"
-    "    }\n"
-    "    result.r = open(occlusion, strength * fit.w);\n"
-    "}\n";
+    SAT__GLSL(
+        float over_plane(vec3 n, vec2 at, float z, vec2 r, vec4 edge, float farthest) {
+            vec2 g;
+            float own, height, sum = 0.0;
+            ivec2 x[3];
+            if (orthographic()) {
+                float facing = min(n.z, -1e-3);
+                g = n.xy / facing * view[0].xz * float(STEP);
+                own = farthest - z;
+                height = -facing / region.x;
+            } else {
+                float facing = min(dot(n.xy, r) + n.z, -1e-3);
+                g = n.xy * view[0].xz * float(STEP) / (facing * z);
+                own = 1.0 / z;
+                height = -facing * z * z / region.x;
+            }
+            x[0] = box.xy; x[1] = BOXES == 2 ? (box.xy + box.zw) / 2 : box.zw; x[2] = box.zw;
+            for (int j = 0; j < BOXES; j++)
+                for (int i = 0; i < BOXES; i++) {
+                    ivec4 c = ivec4(x[i].x, x[j].y, x[i + 1].x, x[j + 1].y);
+                    if (c.z <= c.x || c.w <= c.y) continue;
+                    float spread = 0.5 * dot(abs(g), vec2(c.zw - c.xy)),
+                        centre = own + dot(g, 0.5 * vec2(c.xy + c.zw) - at);
+                    /* see ssao_sat__plane_mean */
+                    if (centre < spread) centre = centre > -spread
+                        ? (centre + spread) * (centre + spread) / (4.0 * spread) : 0.0;
+                    float h = (mean(c, edge) - centre) * height;
+                    if (h > 0.0) sum += h / (1.0 + fit.y * h * h);
+                }
+            return sum / float(BOXES * BOXES);
+        })
+    SAT__GLSL(
+        void main() {
+            ivec2 work = ivec2(gl_FragCoord.xy);
+            float z = distance_at(STEP * work), side = half_side(z), strength = fade(side), gain = 1.0, occlusion;
+            vec4 edge = texelFetch(edges, ivec2(0), 0);
+            float farthest = texelFetch(edges, ivec2(SLABS, 0), 0).x;
+            vec2 c = vec2(work) + 0.5, half_box = vec2(side, side * aspect()),
+                r = orthographic() ? vec2(0.0) : ray(vec2(work));
+            result = vec4(1.0);
+            if (!(z > 0.0) || !(strength > 0.0)) return;
+            vec3 n = normal_at(STEP * work, z);
+            vec2 shift = METHOD == 2 ? vec2(0.0) : n.xy - (METHOD == 1 || PRINTED == 1 ? vec2(0.0) : n.z * r);
+            if (METHOD != 1) shift *= published.x / max(length(shift), 1.0);
+            c += shift * sign(view[0].xz) * half_box;
+            box.xy = clamp(ivec2(floor(c - half_box + 0.5)), ivec2(0), size - 1);
+            box.zw = clamp(ivec2(floor(c + half_box + 0.5)), box.xy + 1, size);
+            if (METHOD == 1) occlusion = over_plane(n, vec2(work) + 0.5, z, r, edge, farthest);
+            else {
+                occlusion = METHOD == 4 ? refine_all(box, z, edge) : deficit(mean(box, edge), z);
+                if (farthest > edge.x) gain += published.z * (z - edge.x) / (farthest - edge.x);
+                occlusion = max(occlusion, 0.0) * gain / region.x;
+            }
+            result.r = open(occlusion, strength * fit.w);
+        });
 
 /* To the picture: the 3 x 3 table pixels around, by distance to the tangent plane and angle between normals. */
 static const char ssao_sat__gl_upsample[] =
-    "uniform sampler2D coarse;\n"
-    "out vec4 result;\n"
-    "void main() {\n"
-    "    ivec2 at = sat_pixel();\n"
-    "    float z = distance_at(at), sum = 0.0, total = 0.0;\n"
-    "    result = vec4(1.0);\n"
-    "    if (!(z > 0.0)) return;\n"
+    SAT__GLSL(
+        uniform sampler2D coarse;
+        out vec4 result;
+        void main() {
+            ivec2 at = sat_pixel();
+            float z = distance_at(at), sum = 0.0, total = 0.0;
+            result = vec4(1.0);
+            if (!(z > 0.0)) return;)
     "#if STEP == 1\n"
-    "    result.r = texelFetch(coarse, at, 0).r;\n"
+    SAT__GLSL(result.r = texelFetch(coarse, at, 0).r;)
     "#else\n"
-    "    vec3 n = normal_at(at, z), p = ssao_sat_position(view, at, z);\n"
-    "    for (int j = -1; j <= 1; j++)\n"
-    "        for (int i = -1; i <= 1; i++) {\n"
-    "            ivec2 t = at / 2 + ivec2(i, j), off = 2 * t - at;\n"
-    "            if (any(lessThan(t, ivec2(0))) || any(greaterThanEqual(t, size))) continue;\n"
-    "            float zt = distance_at(2 * t), alike;\n"
-    "            if (!(zt > 0.0)) continue;\n"
-    "            alike = max(dot(n, normal_at(2 * t, zt)), 0.0);\n"
-    "            float plane = max(0.0, 1.0 - abs(dot(n, ssao_sat_position(view, 2 * t, zt) - p)) * SHARPNESS / z);\n"
-    "            float weight = (plane * alike * alike * alike * alike + 1e-4) / float((1 + off.x * off.x) * (1 + off.y * off.y));\n"
-    "            total += weight;\n"
-    "            sum += weight * texelFetch(coarse, t, 0).r;\n"
-    "        }\n"
-    "    if (total > 0.0) result.r = sum / total;\n"
+    SAT__GLSL(
+            vec3 n = normal_at(at, z), p = ssao_sat_position(view, at, z);
+            for (int j = -1; j <= 1; j++)
+                for (int i = -1; i <= 1; i++) {
+                    ivec2 t = at / 2 + ivec2(i, j), off = 2 * t - at;
+                    if (any(lessThan(t, ivec2(0))) || any(greaterThanEqual(t, size))) continue;
+                    float zt = distance_at(2 * t), alike;
+                    if (!(zt > 0.0)) continue;
+                    alike = max(dot(n, normal_at(2 * t, zt)), 0.0);
+                    float plane = max(0.0, 1.0 - abs(dot(n, ssao_sat_position(view, 2 * t, zt) - p)) * SHARPNESS / z);
+                    float weight = (plane * alike * alike * alike * alike + 1e-4)
+                        / float((1 + off.x * off.x) * (1 + off.y * off.y));
+                    total += weight;
+                    sum += weight * texelFetch(coarse, t, 0).r;
+                }
+            if (total > 0.0) result.r = sum / total;)
     "#endif\n"
-    "}\n";
+    SAT__GLSL(});
 
 /* ------------------------------------------------------------------------------------------------
    >> passes: programs, textures, frames

@@ -2900,42 +2900,54 @@ static const char tonemap__glsl_library[] =
     "#define TONEMAP_PHI_TERM 12.8\n"
     "#define TONEMAP_SCALES 8\n"
     "#endif\n"
-    "float tonemap_sane(float y) {\n"
-    "    uint bits = floatBitsToUint(y);\n"
-    "    if (bits > 0x7f800000u || bits < 0x0d800000u) return 0.0;\n"
-    "    return bits > 0x71800000u ? uintBitsToFloat(0x71800000u) : y;\n"
-    "}\n"
-    "float tonemap_luminance(vec3 rgb) { return tonemap_sane(0.2126729 * rgb.r + 0.7151522 * rgb.g + 0.0721750 * rgb.b); }\n"
-    "float tonemap_rho(float lux) {\n"
-    "    float t = pow(clamp(lux, 1e-8, 10.0), 0.383);\n"
-    "    return lux < 10.0 ? min((t * (92.0 / 57.0) + 0.93227627) / (t + 2.41546083), 1.0) : 1.0;\n"
-    "}\n"
-    "vec3 tonemap_mesopic_in(vec3 rgb, float luminance, float rho, vec3 x, vec3 step) {\n" /* x, step: X, and colour of a step of X, of the primaries */
-    "    float y = 0.95047 * max(luminance, 7.8886e-31);\n"
-    "    float q = min(dot(rgb, x) / y, 1048576.0);\n"
-    "    if (!(q > 1.0 && rho < 1.0)) return rgb;\n"
-    "    float c = 1.0 + rho * (pow(q, 1.0 / 3.0) - 1.0);\n"
-    "    return rgb + (c * c * c - q) * y * step;\n"
-    "}\n"
-    "vec3 tonemap_mesopic(vec3 rgb, float luminance, float rho) {\n"
-    "    return tonemap_mesopic_in(rgb, luminance, rho, vec3(0.4124564, 0.3575761, 0.1804375), vec3(3.2404542, -0.9692660, 0.0556434));\n"
-    "}\n"
-    "vec3 tonemap_srgb(vec3 v) {\n"
-    "    v = clamp(v, 0.0, 1.0);\n"
-    "    return mix(12.92 * v, 1.055 * pow(max(v, 0.0031308), vec3(1.0 / 2.4)) - 0.055, greaterThan(v, vec3(0.0031308)));\n"
-    "}\n"
+    SAT__GLSL(
+        float tonemap_sane(float y) {
+            uint bits = floatBitsToUint(y);
+            if (bits > 0x7f800000u || bits < 0x0d800000u) return 0.0;
+            return bits > 0x71800000u ? uintBitsToFloat(0x71800000u) : y;
+        })
+    SAT__GLSL(
+        float tonemap_luminance(vec3 rgb) {
+            return tonemap_sane(0.2126729 * rgb.r + 0.7151522 * rgb.g + 0.0721750 * rgb.b);
+        })
+    SAT__GLSL(
+        float tonemap_rho(float lux) {
+            float t = pow(clamp(lux, 1e-8, 10.0), 0.383);
+            return lux < 10.0 ? min((t * (92.0 / 57.0) + 0.93227627) / (t + 2.41546083), 1.0) : 1.0;
+        })
+    SAT__GLSL(
+        /* x, step: X, and colour of a step of X, of the primaries */
+        vec3 tonemap_mesopic_in(vec3 rgb, float luminance, float rho, vec3 x, vec3 step) {
+            float y = 0.95047 * max(luminance, 7.8886e-31);
+            float q = min(dot(rgb, x) / y, 1048576.0);
+            if (!(q > 1.0 && rho < 1.0)) return rgb;
+            float c = 1.0 + rho * (pow(q, 1.0 / 3.0) - 1.0);
+            return rgb + (c * c * c - q) * y * step;
+        })
+    SAT__GLSL(
+        vec3 tonemap_mesopic(vec3 rgb, float luminance, float rho) {
+            return tonemap_mesopic_in(rgb, luminance, rho, vec3(0.4124564, 0.3575761, 0.1804375),
+                vec3(3.2404542, -0.9692660, 0.0556434));
+        })
+    SAT__GLSL(
+        vec3 tonemap_srgb(vec3 v) {
+            v = clamp(v, 0.0, 1.0);
+            return mix(12.92 * v, 1.055 * pow(max(v, 0.0031308), vec3(1.0 / 2.4)) - 0.055,
+                greaterThan(v, vec3(0.0031308)));
+        })
     "#ifdef SAT_GLSL\n"
-    "float tonemap_local(usampler2D table, float quantum, ivec2 pixel, float scaled, float key) {\n"
-    "    const int reach[8] = int[8](0, 1, 2, 3, 5, 8, 13, 20);\n"
-    "    float c = min(scaled, 256.0);\n"
-    "    for (int k = 1; k < TONEMAP_SCALES; k++) {\n"
-    "        float side = float(2 * reach[k - 1] + 1);\n"
-    "        float v = sat_mean(table, quantum, pixel - reach[k], pixel + reach[k] + 1);\n"
-    "        if (!(abs(c - v) < TONEMAP_EPSILON * c + TONEMAP_PHI_TERM * key / (side * side))) break;\n"
-    "        c = v;\n"
-    "    }\n"
-    "    return c;\n"
-    "}\n"
+    SAT__GLSL(
+        float tonemap_local(usampler2D table, float quantum, ivec2 pixel, float scaled, float key) {
+            const int reach[8] = int[8](0, 1, 2, 3, 5, 8, 13, 20);
+            float c = min(scaled, 256.0);
+            for (int k = 1; k < TONEMAP_SCALES; k++) {
+                float side = float(2 * reach[k - 1] + 1);
+                float v = sat_mean(table, quantum, pixel - reach[k], pixel + reach[k] + 1);
+                if (!(abs(c - v) < TONEMAP_EPSILON * c + TONEMAP_PHI_TERM * key / (side * side))) break;
+                c = v;
+            }
+            return c;
+        })
     "#endif\n"
     "#endif\n";
 
@@ -2943,384 +2955,460 @@ TONEMAP_DEF const char *tonemap_gl_glsl(void) { return tonemap__glsl_library; }
 
 /* The luminance plane. */
 static const char tonemap__glsl_luminance[] =
-    "uniform sampler2D hdr;\n"
-    "uniform vec3 luma;\n"
-    "out float value;\n"
-    "void main() {\n"
-    "    vec3 rgb = texelFetch(hdr, ivec2(gl_FragCoord.xy), 0).rgb;\n"
-    "    float y = luma.r * rgb.r + luma.g * rgb.g + luma.b * rgb.b;\n"
-    "    uint bits = floatBitsToUint(y);\n"
-    "    value = bits > 0x7f800000u && bits != 0x80000000u ? -1.0 : tonemap_sane(y);\n" /* -1: unusable */
-    "}\n";
+    SAT__GLSL(
+        uniform sampler2D hdr;
+        uniform vec3 luma;
+        out float value;
+        void main() {
+            vec3 rgb = texelFetch(hdr, ivec2(gl_FragCoord.xy), 0).rgb;
+            float y = luma.r * rgb.r + luma.g * rgb.g + luma.b * rgb.b;
+            uint bits = floatBitsToUint(y);
+            value = bits > 0x7f800000u && bits != 0x80000000u ? -1.0 : tonemap_sane(y); /* -1: unusable */
+        });
 
 /* Sums over 4 x 4 texels. Texel: whole and 2^-16 parts of the sum of log2, carried over; pixels. Integers, so that the
    log-average is the CPU's. The polynomial is the CPU's, too. */
 static const char tonemap__glsl_reduce[] =
     "#ifdef TONEMAP_FIRST\n"
-    "uniform sampler2D source, mask;\n"
-    "ivec4 tonemap_read(ivec2 p) {\n"
-    "    float y = texelFetch(source, p, 0).x;\n"
-    "    int weight = TONEMAP_MASK == 1 ? int(texelFetch(mask, p, 0).x) : 1;\n"
-    "    uint bits = floatBitsToUint(y);\n"
-    "    if (!(y > 0.0) || bits >= 0x71800000u) return ivec4(0);\n"
-    "    float t = uintBitsToFloat((bits & 0x007fffffu) | 0x3f800000u) - 1.0;\n"
-    "    float q = -0.0959564262 + t * 0.0258414329;\n"
-    "    q = 0.442544943 + t * (-0.275600307 + t * (0.18194886 + t * q));\n"
-    "    return weight * ivec4(int(bits >> 23) - 127, int((t + t * (1.0 - t) * q) * 65536.0 + 0.5), 1, 0);\n"
-    "}\n"
+    SAT__GLSL(
+        uniform sampler2D source, mask;
+        ivec4 tonemap_read(ivec2 p) {
+            float y = texelFetch(source, p, 0).x;
+            int weight = TONEMAP_MASK == 1 ? int(texelFetch(mask, p, 0).x) : 1;
+            uint bits = floatBitsToUint(y);
+            if (!(y > 0.0) || bits >= 0x71800000u) return ivec4(0);
+            float t = uintBitsToFloat((bits & 0x007fffffu) | 0x3f800000u) - 1.0;
+            float q = -0.0959564262 + t * 0.0258414329;
+            q = 0.442544943 + t * (-0.275600307 + t * (0.18194886 + t * q));
+            return weight * ivec4(int(bits >> 23) - 127, int((t + t * (1.0 - t) * q) * 65536.0 + 0.5), 1, 0);
+        })
     "#else\n"
-    "uniform highp isampler2D source;\n"
-    "ivec4 tonemap_read(ivec2 p) { return texelFetch(source, p, 0); }\n"
+    SAT__GLSL(
+        uniform highp isampler2D source;
+        ivec4 tonemap_read(ivec2 p) { return texelFetch(source, p, 0); })
     "#endif\n"
-    "uniform ivec2 size;\n"
-    "out ivec4 value;\n"
-    "void main() {\n"
-    "    ivec2 low = 4 * ivec2(gl_FragCoord.xy), high = min(low + 4, size);\n"
-    "    ivec3 sum = ivec3(0);\n"
-    "    for (int y = low.y; y < high.y; y++)\n"
-    "        for (int x = low.x; x < high.x; x++) {\n"
-    "            sum += tonemap_read(ivec2(x, y)).xyz;\n"
-    "        }\n"
-    "    value = ivec4(sum.x + (sum.y >> 16), sum.y & 65535, sum.z, 0);\n"
-    "}\n";
+    SAT__GLSL(
+        uniform ivec2 size;
+        out ivec4 value;
+        void main() {
+            ivec2 low = 4 * ivec2(gl_FragCoord.xy), high = min(low + 4, size);
+            ivec3 sum = ivec3(0);
+            for (int y = low.y; y < high.y; y++)
+                for (int x = low.x; x < high.x; x++) {
+                    sum += tonemap_read(ivec2(x, y)).xyz;
+                }
+            value = ivec4(sum.x + (sum.y >> 16), sum.y & 65535, sum.z, 0);
+        });
 
 /* The histogram: a point a pixel, added up by blending; bins as on the CPU, 64 in a row. */
 static const char tonemap__glsl_scatter[] =
-    "uniform sampler2D luminance, mask;\n"
-    "uniform int width;\n"
-    "flat out float weight;\n"
-    "void main() {\n"
-    "    weight = TONEMAP_MASK == 1 ? texelFetch(mask, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x : 1.0;\n"
-    "    float y = texelFetch(luminance, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x;\n"
-    "    uint bits = floatBitsToUint(y);\n"
-    "    int bin = int((bits - 0x0d800000u) >> 19);\n"
-    "    gl_PointSize = 1.0;\n"
-    "    gl_Position = vec4((vec2(bin % 64, bin / 64) + 0.5) / vec2(32.0, float(TONEMAP_BINS) / 128.0) - 1.0, 0.0, 1.0);\n"
-    "    if (!(y > 0.0) || bits >= 0x71800000u) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);\n"
-    "}\n";
+    SAT__GLSL(
+        uniform sampler2D luminance, mask;
+        uniform int width;
+        flat out float weight;
+        void main() {
+            weight = TONEMAP_MASK == 1 ? texelFetch(mask, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x : 1.0;
+            float y = texelFetch(luminance, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x;
+            uint bits = floatBitsToUint(y);
+            int bin = int((bits - 0x0d800000u) >> 19);
+            gl_PointSize = 1.0;
+            gl_Position = vec4((vec2(bin % 64, bin / 64) + 0.5) / vec2(32.0, float(TONEMAP_BINS) / 128.0) - 1.0, 0.0,
+                1.0);
+            if (!(y > 0.0) || bits >= 0x71800000u) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+        });
 
 static const char tonemap__glsl_count[] =
-    "flat in float weight;\n"
-    "out float value;\n"
-    "void main() { value = weight; }\n";
+    SAT__GLSL(
+        flat in float weight;
+        out float value;
+        void main() { value = weight; });
 
 /* The state, two texels: log2 of average, key and white, and 1; log2 of low and high, what the meter and what the white
    hold. An empty picture keeps the old one. */
 static const char tonemap__glsl_state[] =
-    "uniform highp isampler2D sums;\n"
-    "uniform sampler2D old, histogram;\n"
-    "uniform float weight, weight_darker, key, white, pixels, exposure, lowest, highest, dead_band;\n" /* key and white as log2; 0: estimated */
-    "out vec4 value;\n"
-    "float tonemap_value(int bin, float part) { return float(bin / 16 - 100) + log2(1.0 + (float(bin % 16) + part) / 16.0); }\n"
-    "float tonemap_count(int bin) { return texelFetch(histogram, ivec2(bin % 64, bin / 64), 0).x; }\n"
-    "float tonemap_quantile(float share, float positive) {\n"
-    "    float wanted = share * positive, seen = 0.0;\n"
-    "    for (int bin = 0; bin < TONEMAP_BINS; bin++) {\n"
-    "        float count = tonemap_count(bin);\n"
-    "        if (count > 0.0 && seen + count >= wanted) return tonemap_value(bin, max(wanted - seen, 0.0) / count);\n"
-    "        seen += count;\n"
-    "    }\n"
-    "    return 0.0;\n"
-    "}\n"
-    "float tonemap_share(int bin, float top) { return tonemap_count(bin) * clamp((tonemap_value(bin, 0.5) - top + 24.0) / 6.0, 0.0, 1.0); }\n"
-    "float tonemap_between(float low, float high, float top) {\n" /* above top */
-    "    float all = 0.0, inner = 0.0, sum = 0.0, seen = 0.0;\n"
-    "    for (int bin = 0; bin < TONEMAP_BINS; bin++) all += tonemap_share(bin, top);\n"
-    "    for (int bin = 0; bin < TONEMAP_BINS; bin++) {\n"
-    "        float next = seen + tonemap_share(bin, top), n = max(min(next, high * all) - max(seen, low * all), 0.0);\n"
-    "        inner += n;\n"
-    "        sum += n * (tonemap_value(bin, 0.5) - top);\n"
-    "        seen = next;\n"
-    "    }\n"
-    "    return sum / max(inner, 1e-30);\n"
-    "}\n"
-    "float tonemap_metered(float average, float positive, float top) {\n"
-    "    float whole = 0.0;\n"
-    "    for (int bin = 0; bin < TONEMAP_BINS; bin++) whole += tonemap_count(bin) * (tonemap_value(bin, 0.5) - top);\n"
-    "    average += tonemap_between(TONEMAP_METER_LOW, TONEMAP_METER_HIGH, top) - whole / positive;\n"
-    "    return max(average, top + tonemap_between(0.8, TONEMAP_METER_HIGH > 0.8 ? TONEMAP_METER_HIGH : 1.0, top) - 4.5);\n"
-    "}\n"
-    "float tonemap_hold(float held, bool fresh, float now, float steps) {\n"
-    "    return fresh || abs(now - held) * steps > dead_band ? floor(now * steps + 0.5) / steps : held;\n"
-    "}\n"
-    "void main() {\n"
-    "    ivec4 sum = texelFetch(sums, ivec2(0), 0);\n"
-    "    vec4 first = texelFetch(old, ivec2(0), 0), second = texelFetch(old, ivec2(1, 0), 0);\n"
-    "    bool lit = sum.z > 0;\n"
+    SAT__GLSL(
+        uniform highp isampler2D sums;
+        uniform sampler2D old, histogram;
+        /* key and white as log2; 0: estimated */
+        uniform float weight, weight_darker, key, white, pixels, exposure, lowest, highest, dead_band;
+        out vec4 value;
+        float tonemap_value(int bin, float part) {
+            return float(bin / 16 - 100) + log2(1.0 + (float(bin % 16) + part) / 16.0);
+        })
+    SAT__GLSL(float tonemap_count(int bin) { return texelFetch(histogram, ivec2(bin % 64, bin / 64), 0).x; })
+    SAT__GLSL(
+        float tonemap_quantile(float share, float positive) {
+            float wanted = share * positive, seen = 0.0;
+            for (int bin = 0; bin < TONEMAP_BINS; bin++) {
+                float count = tonemap_count(bin);
+                if (count > 0.0 && seen + count >= wanted) return tonemap_value(bin, max(wanted - seen, 0.0) / count);
+                seen += count;
+            }
+            return 0.0;
+        })
+    SAT__GLSL(
+        float tonemap_share(int bin, float top) {
+            return tonemap_count(bin) * clamp((tonemap_value(bin, 0.5) - top + 24.0) / 6.0, 0.0, 1.0);
+        })
+    SAT__GLSL(
+        float tonemap_between(float low, float high, float top) { /* above top */
+            float all = 0.0, inner = 0.0, sum = 0.0, seen = 0.0;
+            for (int bin = 0; bin < TONEMAP_BINS; bin++) all += tonemap_share(bin, top);
+            for (int bin = 0; bin < TONEMAP_BINS; bin++) {
+                float next = seen + tonemap_share(bin, top), n = max(min(next, high * all) - max(seen, low * all), 0.0);
+                inner += n;
+                sum += n * (tonemap_value(bin, 0.5) - top);
+                seen = next;
+            }
+            return sum / max(inner, 1e-30);
+        })
+    SAT__GLSL(
+        float tonemap_metered(float average, float positive, float top) {
+            float whole = 0.0;
+            for (int bin = 0; bin < TONEMAP_BINS; bin++) whole += tonemap_count(bin) * (tonemap_value(bin, 0.5) - top);
+            average += tonemap_between(TONEMAP_METER_LOW, TONEMAP_METER_HIGH, top) - whole / positive;
+            return max(average, top + tonemap_between(0.8, TONEMAP_METER_HIGH > 0.8 ? TONEMAP_METER_HIGH : 1.0, top)
+                - 4.5);
+        })
+    SAT__GLSL(
+        float tonemap_hold(float held, bool fresh, float now, float steps) {
+            return fresh || abs(now - held) * steps > dead_band ? floor(now * steps + 0.5) / steps : held;
+        })
+    SAT__GLSL(
+        void main() {
+            ivec4 sum = texelFetch(sums, ivec2(0), 0);
+            vec4 first = texelFetch(old, ivec2(0), 0), second = texelFetch(old, ivec2(1, 0), 0);
+            bool lit = sum.z > 0;)
     "#if TONEMAP_METERING == 0\n"
-    "    lit = lit && (first.w <= 0.0 || float(sum.z) * 1000.0 >= pixels);\n"
+    SAT__GLSL(lit = lit && (first.w <= 0.0 || float(sum.z) * 1000.0 >= pixels);)
     "#endif\n"
-    "    if (lit) {\n"
-    "        int whole = sum.x / sum.z;\n"
-    "        float positive = float(sum.z), average = float(whole) + (float(sum.x - whole * sum.z) + float(sum.y) / 65536.0) / positive;\n"
-    "        vec2 range = vec2(0.0);\n"
+    SAT__GLSL(
+            if (lit) {
+                int whole = sum.x / sum.z;
+                float positive = float(sum.z),
+                    average = float(whole) + (float(sum.x - whole * sum.z) + float(sum.y) / 65536.0) / positive;
+                vec2 range = vec2(0.0);)
     "#if TONEMAP_HISTOGRAM\n"
-    "        float top = tonemap_quantile(0.99, positive);\n"
+    SAT__GLSL(float top = tonemap_quantile(0.99, positive);)
     "#endif\n"
     "#if TONEMAP_METERING == 0\n"
-    "        average = second.z = tonemap_hold(second.z, first.w <= 0.0, tonemap_metered(average, positive, top), 64.0);\n"
+    SAT__GLSL(
+                average = second.z = tonemap_hold(second.z, first.w <= 0.0, tonemap_metered(average, positive, top),
+                    64.0);)
     "#endif\n"
-    "        average = max(min(average, highest), lowest);\n"
-    "        vec4 now = vec4(average, key, white, 1.0);\n"
+    SAT__GLSL(
+                average = max(min(average, highest), lowest);
+                vec4 now = vec4(average, key, white, 1.0);)
     "#if TONEMAP_HISTOGRAM\n"
-    "        float low = tonemap_quantile(0.01, positive), high = top;\n"
-    "        float place = high - low > 0.125 ? clamp((2.0 * average - low - high) / (high - low), -1.0, 1.0) : 0.0;\n"
-    "        if (TONEMAP_HISTOGRAM % 4 / 2 == 1) now.y = log2(0.18) + 2.0 * place;\n"
-    "        float scaled = top + tonemap_between(0.995, 0.9995, top) + (exposure > 0.0 ? log2(exposure) : now.y - average);\n"
-    "        float burn = max(min(log2(1.5) + high - low - 5.0, scaled), 0.0);\n"
-    "        if (TONEMAP_HISTOGRAM % 8 / 4 == 1) now.z = second.w = tonemap_hold(second.w, first.w <= 0.0, burn, 8.0);\n"
-    "        range = vec2(tonemap_quantile(0.0005, positive), tonemap_quantile(0.9995, positive));\n"
+    SAT__GLSL(
+                float low = tonemap_quantile(0.01, positive), high = top;
+                float place = high - low > 0.125 ? clamp((2.0 * average - low - high) / (high - low), -1.0, 1.0) : 0.0;
+                if (TONEMAP_HISTOGRAM % 4 / 2 == 1) now.y = log2(0.18) + 2.0 * place;
+                float scaled = top + tonemap_between(0.995, 0.9995, top)
+                    + (exposure > 0.0 ? log2(exposure) : now.y - average);
+                float burn = max(min(log2(1.5) + high - low - 5.0, scaled), 0.0);
+                if (TONEMAP_HISTOGRAM % 8 / 4 == 1)
+                    now.z = second.w = tonemap_hold(second.w, first.w <= 0.0, burn, 8.0);
+                range = vec2(tonemap_quantile(0.0005, positive), tonemap_quantile(0.9995, positive));)
     "#endif\n"
-    "        float share = first.w > 0.0 ? average < first.x ? weight_darker : weight : 1.0;\n"
-    "        first = share < 1.0 ? mix(first, now, share) : now;\n"
-    "        second.xy = share < 1.0 ? mix(second.xy, range, share) : range;\n"
-    "        first.w = 1.0;\n"
-    "    }\n"
-    "    if (exposure > 0.0) first.x = first.y - log2(exposure);\n"
-    "    if (TONEMAP_HISTOGRAM % 8 / 4 == 0) first.z = white;\n"
-    "    value = gl_FragCoord.x < 1.0 ? first : second;\n"
-    "}\n";
+    SAT__GLSL(
+                float share = first.w > 0.0 ? average < first.x ? weight_darker : weight : 1.0;
+                first = share < 1.0 ? mix(first, now, share) : now;
+                second.xy = share < 1.0 ? mix(second.xy, range, share) : range;
+                first.w = 1.0;
+            }
+            if (exposure > 0.0) first.x = first.y - log2(exposure);
+            if (TONEMAP_HISTOGRAM % 8 / 4 == 0) first.z = white;
+            value = gl_FragCoord.x < 1.0 ? first : second;
+        });
 
 /* What a pass reads from the state. Ashikhmin's unit is the octave above the upper end of its range. */
 static const char tonemap__glsl_frame[] =
-    "uniform sampler2D luminance, state;\n"
-    "float tonemap_key() { vec4 s = texelFetch(state, ivec2(0), 0); return s.w > 0.0 ? exp2(s.y) : 0.18; }\n"
-    "float tonemap_scale() {\n"
+    SAT__GLSL(
+        uniform sampler2D luminance, state;
+        float tonemap_key() { vec4 s = texelFetch(state, ivec2(0), 0); return s.w > 0.0 ? exp2(s.y) : 0.18; })
+    SAT__GLSL(float tonemap_scale() {)
     "#if TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 3\n"
-    "    return exp2(-ceil(texelFetch(state, ivec2(1, 0), 0).y));\n"
+    SAT__GLSL(return exp2(-ceil(texelFetch(state, ivec2(1, 0), 0).y));)
     "#else\n"
-    "    return tonemap_key() * exp2(-texelFetch(state, ivec2(0), 0).x);\n"
+    SAT__GLSL(return tonemap_key() * exp2(-texelFetch(state, ivec2(0), 0).x);)
     "#endif\n"
-    "}\n";
+    SAT__GLSL(});
 
 static const char tonemap__glsl_quantise[] =
-    "out uint value;\n"
-    "void main() {\n"
-    "    float v = clamp(texelFetch(luminance, ivec2(gl_FragCoord.xy), 0).x * tonemap_scale(), 0.0, TONEMAP_CAP);\n"
-    "    value = uint(v * TONEMAP_STEPS + 0.5);\n"
-    "}\n";
+    SAT__GLSL(
+        out uint value;
+        void main() {
+            float v = clamp(texelFetch(luminance, ivec2(gl_FragCoord.xy), 0).x * tonemap_scale(), 0.0, TONEMAP_CAP);
+            value = uint(v * TONEMAP_STEPS + 0.5);
+        });
 
 /* The guided filter's passes, with the CPU's integers: steps; sums of 21 columns of steps and their squares, or of a
    and b; of 21 rows of them, from which a and b come. The last sum is in the mapping pass. */
 static const char tonemap__glsl_steps[] =
-    "out float value;\n"
-    "float tonemap_next(ivec2 p, int step, int end) {\n" /* a pixel that is no measurement counts as the usable one beside it */
-    "    float y = -1.0;\n"
-    "    for (; p.x != end && y < 0.0; p.x += step) y = texelFetch(luminance, p, 0).x;\n"
-    "    return y;\n"
-    "}\n"
-    "void main() {\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
-    "    float y = tonemap_next(p, -1, -1);\n"
-    "    if (y < 0.0) y = tonemap_next(p, 1, textureSize(luminance, 0).x);\n"
-    "    value = (log2(clamp(y * tonemap_scale(), 1.0 / 1024.0, 256.0)) + 10.0) * 64.0;\n"
-    "}\n";
+    SAT__GLSL(
+        out float value;
+        /* a pixel that is no measurement counts as the usable one beside it */
+        float tonemap_next(ivec2 p, int step, int end) {
+            float y = -1.0;
+            for (; p.x != end && y < 0.0; p.x += step) y = texelFetch(luminance, p, 0).x;
+            return y;
+        })
+    SAT__GLSL(
+        void main() {
+            ivec2 p = ivec2(gl_FragCoord.xy);
+            float y = tonemap_next(p, -1, -1);
+            if (y < 0.0) y = tonemap_next(p, 1, textureSize(luminance, 0).x);
+            value = (log2(clamp(y * tonemap_scale(), 1.0 / 1024.0, 256.0)) + 10.0) * 64.0;
+        });
 
 static const char tonemap__glsl_along[] =
     "#ifdef TONEMAP_FIRST\n"
-    "uniform sampler2D source;\n"
-    "uvec2 tonemap_read(ivec2 p) { uint q = uint(texelFetch(source, p, 0).x); return uvec2(q, q * q); }\n"
+    SAT__GLSL(
+        uniform sampler2D source;
+        uvec2 tonemap_read(ivec2 p) { uint q = uint(texelFetch(source, p, 0).x); return uvec2(q, q * q); })
     "#else\n"
-    "uniform highp usampler2D source;\n"
-    "uvec2 tonemap_read(ivec2 p) { return texelFetch(source, p, 0).xy; }\n"
+    SAT__GLSL(
+        uniform highp usampler2D source;
+        uvec2 tonemap_read(ivec2 p) { return texelFetch(source, p, 0).xy; })
     "#endif\n"
-    "out uvec2 value;\n"
-    "void main() {\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
-    "    int end = min(p.x + 11, textureSize(source, 0).x);\n"
-    "    value = uvec2(0u);\n"
-    "    for (int x = max(p.x - 10, 0); x < end; x++) value += tonemap_read(ivec2(x, p.y));\n"
-    "}\n";
+    SAT__GLSL(
+        out uvec2 value;
+        void main() {
+            ivec2 p = ivec2(gl_FragCoord.xy);
+            int end = min(p.x + 11, textureSize(source, 0).x);
+            value = uvec2(0u);
+            for (int x = max(p.x - 10, 0); x < end; x++) value += tonemap_read(ivec2(x, p.y));
+        });
 
 /* The sums of 21 rows of such sums, as means. */
 static const char tonemap__glsl_down[] =
-    "vec2 tonemap_mean(highp usampler2D sums, ivec2 p) {\n"
-    "    ivec2 size = textureSize(sums, 0), low = max(p - 10, 0), high = min(p + 11, size);\n"
-    "    uvec2 sum = uvec2(0u);\n"
-    "    for (int y = low.y; y < high.y; y++) sum += texelFetch(sums, ivec2(p.x, y), 0).xy;\n"
-    "    return vec2(sum) / float((high.x - low.x) * (high.y - low.y));\n"
-    "}\n";
+    SAT__GLSL(
+        vec2 tonemap_mean(highp usampler2D sums, ivec2 p) {
+            ivec2 size = textureSize(sums, 0), low = max(p - 10, 0), high = min(p + 11, size);
+            uvec2 sum = uvec2(0u);
+            for (int y = low.y; y < high.y; y++) sum += texelFetch(sums, ivec2(p.x, y), 0).xy;
+            return vec2(sum) / float((high.x - low.x) * (high.y - low.y));
+        });
 
 static const char tonemap__glsl_fit[] =
-    "uniform highp usampler2D source;\n"
-    "out uvec2 value;\n"
-    "void main() {\n"
-    "    vec2 m = tonemap_mean(source, ivec2(gl_FragCoord.xy));\n"
-    "    float var = max(m.y - m.x * m.x, 0.0), share = var / (var + TONEMAP_EDGE2);\n"
-    "    value = uvec2(share * 1048576.0, (m.x + 0.5) * (1.0 - share) * 1024.0);\n"
-    "}\n";
+    SAT__GLSL(
+        uniform highp usampler2D source;
+        out uvec2 value;
+        void main() {
+            vec2 m = tonemap_mean(source, ivec2(gl_FragCoord.xy));
+            float var = max(m.y - m.x * m.x, 0.0), share = var / (var + TONEMAP_EDGE2);
+            value = uvec2(share * 1048576.0, (m.x + 0.5) * (1.0 - share) * 1024.0);
+        });
 
 /* La. Soft scales and Ashikhmin's search are here, the plain search in the library. */
 static const char tonemap__glsl_search[] =
-    "uniform highp usampler2D table;\n"
+    SAT__GLSL(uniform highp usampler2D table;)
     "#if TONEMAP_OPERATOR != 5\n"
-    "float tonemap_box(ivec2 p, int reach) { return sat_mean(table, 1.0 / TONEMAP_STEPS, p - reach, p + reach + 1); }\n"
+    SAT__GLSL(
+        float tonemap_box(ivec2 p, int reach) {
+            return sat_mean(table, 1.0 / TONEMAP_STEPS, p - reach, p + reach + 1);
+        })
     "#endif\n"
     "#if TONEMAP_OPERATOR == 5\n"
-    "uniform sampler2D steps;\n"
-    "float tonemap_find(ivec2 p, float own, float key) {\n"
-    "    vec2 m = tonemap_mean(table, p);\n"
-    "    return exp2((m.x / 1048576.0 * texelFetch(steps, p, 0).x + m.y / 1024.0) / 64.0 - 10.0);\n"
-    "}\n"
+    SAT__GLSL(
+        uniform sampler2D steps;
+        float tonemap_find(ivec2 p, float own, float key) {
+            vec2 m = tonemap_mean(table, p);
+            return exp2((m.x / 1048576.0 * texelFetch(steps, p, 0).x + m.y / 1024.0) / 64.0 - 10.0);
+        })
     "#elif TONEMAP_OPERATOR == 2\n"
-    "float tonemap_find(ivec2 p, float own, float key) {\n"
-    "    const int reach[20] = int[20](0, 1, 2, 3, 4, 5, 6, 6, 7, 8, 9, 10, 11, 12, 12, 13, 14, 15, 16, 17);\n"
-    "    float g = min(own, TONEMAP_CAP);\n"
-    "    for (int s = 0; s < 9; s++) {\n"
-    "        if (!(abs(g - tonemap_box(p, reach[2 * s + 1])) < 0.5 * g)) break;\n"
-    "        g = tonemap_box(p, reach[s + 1]);\n"
-    "    }\n"
-    "    return g * TONEMAP_STEPS < 1.0 ? own : g;\n"
-    "}\n"
+    SAT__GLSL(
+        float tonemap_find(ivec2 p, float own, float key) {
+            const int reach[20] = int[20](0, 1, 2, 3, 4, 5, 6, 6, 7, 8, 9, 10, 11, 12, 12, 13, 14, 15, 16, 17);
+            float g = min(own, TONEMAP_CAP);
+            for (int s = 0; s < 9; s++) {
+                if (!(abs(g - tonemap_box(p, reach[2 * s + 1])) < 0.5 * g)) break;
+                g = tonemap_box(p, reach[s + 1]);
+            }
+            return g * TONEMAP_STEPS < 1.0 ? own : g;
+        })
     "#elif TONEMAP_SOFT\n"
-    "float tonemap_find(ivec2 p, float own, float key) {\n"
-    "    const int reach[8] = int[8](0, 1, 2, 3, 5, 8, 13, 20);\n"
-    "    float c = min(own, 256.0), taken = c, weight = 1.0;\n"
-    "    for (int k = 1; k < TONEMAP_SCALES; k++) {\n"
-    "        float side = float(2 * reach[k - 1] + 1), v = tonemap_box(p, reach[k]);\n"
-    "        float limit = TONEMAP_EPSILON * c + TONEMAP_PHI_TERM * key / (side * side);\n"
-    "        weight *= clamp((1.0 + TONEMAP_SOFTNESS - abs(c - v) / limit) / (2.0 * TONEMAP_SOFTNESS), 0.0, 1.0);\n"
-    "        if (!(weight > 0.0)) break;\n"
-    "        taken += weight * (v - c);\n"
-    "        c = v;\n"
-    "    }\n"
-    "    return taken;\n"
-    "}\n"
+    SAT__GLSL(
+        float tonemap_find(ivec2 p, float own, float key) {
+            const int reach[8] = int[8](0, 1, 2, 3, 5, 8, 13, 20);
+            float c = min(own, 256.0), taken = c, weight = 1.0;
+            for (int k = 1; k < TONEMAP_SCALES; k++) {
+                float side = float(2 * reach[k - 1] + 1), v = tonemap_box(p, reach[k]);
+                float limit = TONEMAP_EPSILON * c + TONEMAP_PHI_TERM * key / (side * side);
+                weight *= clamp((1.0 + TONEMAP_SOFTNESS - abs(c - v) / limit) / (2.0 * TONEMAP_SOFTNESS), 0.0, 1.0);
+                if (!(weight > 0.0)) break;
+                taken += weight * (v - c);
+                c = v;
+            }
+            return taken;
+        })
     "#else\n"
-    "float tonemap_find(ivec2 p, float own, float key) { return tonemap_local(table, 1.0 / TONEMAP_STEPS, p, own, key); }\n"
+    SAT__GLSL(
+        float tonemap_find(ivec2 p, float own, float key) {
+            return tonemap_local(table, 1.0 / TONEMAP_STEPS, p, own, key);
+        })
     "#endif\n"
-    "float tonemap_at(ivec2 p) { return max(texelFetch(luminance, clamp(p, ivec2(0), textureSize(luminance, 0) - 1), 0).x, 0.0); }\n"
-    "bool tonemap_is_edge(ivec2 p, float scale) {\n"
-    "    float a = tonemap_at(p + ivec2(-1, -1)), b = tonemap_at(p + ivec2(0, -1)), c = tonemap_at(p + ivec2(1, -1));\n"
-    "    float d = tonemap_at(p + ivec2(-1, 0)), e = tonemap_at(p + ivec2(1, 0));\n"
-    "    float f = tonemap_at(p + ivec2(-1, 1)), g = tonemap_at(p + ivec2(0, 1)), h = tonemap_at(p + ivec2(1, 1));\n"
-    "    vec2 gradient = vec2((c + 2.0 * e + h) - (a + 2.0 * d + f), (f + 2.0 * g + h) - (a + 2.0 * b + c)) * scale;\n"
-    "    return dot(gradient, gradient) > TONEMAP_SELECTIVE * TONEMAP_SELECTIVE;\n"
-    "}\n";
+    SAT__GLSL(
+        float tonemap_at(ivec2 p) {
+            return max(texelFetch(luminance, clamp(p, ivec2(0), textureSize(luminance, 0) - 1), 0).x, 0.0);
+        })
+    SAT__GLSL(
+        bool tonemap_is_edge(ivec2 p, float scale) {
+            float a = tonemap_at(p + ivec2(-1, -1)), b = tonemap_at(p + ivec2(0, -1)), c = tonemap_at(p + ivec2(1, -1));
+            float d = tonemap_at(p + ivec2(-1, 0)), e = tonemap_at(p + ivec2(1, 0));
+            float f = tonemap_at(p + ivec2(-1, 1)), g = tonemap_at(p + ivec2(0, 1)), h = tonemap_at(p + ivec2(1, 1));
+            vec2 gradient = vec2((c + 2.0 * e + h) - (a + 2.0 * d + f), (f + 2.0 * g + h) - (a + 2.0 * b + c)) * scale;
+            return dot(gradient, gradient) > TONEMAP_SELECTIVE * TONEMAP_SELECTIVE;
+        });
 
 /* Curves of one pixel, and encodings of values in units of the peak: the CPU's. */
 static const char tonemap__glsl_curves[] =
-    "uniform float peak, peak_cd;\n"
-    "uniform vec3 display_luma;\n"
+    SAT__GLSL(
+        uniform float peak, peak_cd;
+        uniform vec3 display_luma;)
     "#if TONEMAP_OPERATOR == 6\n"
-    "vec3 tonemap_curve(vec3 v) {\n"
-    "    float x = min(min(v.r, v.g), v.b);\n"
-    "    v -= x < 0.08 ? x - 6.25 * x * x : 0.04;\n"
-    "    float most = max(max(v.r, v.g), v.b), top = 1.0 - 0.0576 / (most + 0.24 - 0.76);\n"
-    "    return most < 0.76 ? v : top + (v * (top / most) - top) / (0.15 * (most - top) + 1.0);\n"
-    "}\n"
+    SAT__GLSL(
+        vec3 tonemap_curve(vec3 v) {
+            float x = min(min(v.r, v.g), v.b);
+            v -= x < 0.08 ? x - 6.25 * x * x : 0.04;
+            float most = max(max(v.r, v.g), v.b), top = 1.0 - 0.0576 / (most + 0.24 - 0.76);
+            return most < 0.76 ? v : top + (v * (top / most) - top) / (0.15 * (most - top) + 1.0);
+        })
     "#elif TONEMAP_OPERATOR == 7\n"
-    "vec3 tonemap_curve(vec3 v) {\n"
-    "    v = mat3(0.842479062, 0.0423282422, 0.0423756549, 0.0784336, 0.878468636, 0.0784336, 0.0792237451, 0.0791661275, 0.879142974) * v;\n"
-    "    vec3 x = clamp((log2(max(v, 1e-9)) + 12.47393) / 16.5, 0.0, 1.0), x2 = x * x, x4 = x2 * x2;\n"
-    "    v = 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232;\n"
-    "    v = mat3(1.196879005, -0.0528968518, -0.0529716355, -0.0980208811, 1.15190313, -0.0980434501, -0.0990297441, -0.0989611768, 1.151073673) * v;\n"
-    "    return pow(max(v, 1e-9), vec3(2.2));\n"
-    "}\n"
+    SAT__GLSL(
+        vec3 tonemap_curve(vec3 v) {
+            v = mat3(0.842479062, 0.0423282422, 0.0423756549, 0.0784336, 0.878468636, 0.0784336, 0.0792237451,
+                0.0791661275, 0.879142974) * v;
+            vec3 x = clamp((log2(max(v, 1e-9)) + 12.47393) / 16.5, 0.0, 1.0), x2 = x * x, x4 = x2 * x2;
+            v = 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232;
+            v = mat3(1.196879005, -0.0528968518, -0.0529716355, -0.0980208811, 1.15190313, -0.0980434501, -0.0990297441,
+                -0.0989611768, 1.151073673) * v;
+            return pow(max(v, 1e-9), vec3(2.2));
+        })
     "#elif TONEMAP_OPERATOR == 8\n"
-    "vec3 tonemap_curve(vec3 v) {\n"
-    "    v = mat3(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566, 0.83777) * v / 0.6;\n"
-    "    v = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081);\n"
-    "    return mat3(1.60475, -0.10208, -0.00327, -0.53108, 1.10813, -0.07276, -0.07367, -0.00605, 1.07602) * v;\n"
-    "}\n"
+    SAT__GLSL(
+        vec3 tonemap_curve(vec3 v) {
+            v = mat3(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566, 0.83777) * v / 0.6;
+            v = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081);
+            return mat3(1.60475, -0.10208, -0.00327, -0.53108, 1.10813, -0.07276, -0.07367, -0.00605, 1.07602) * v;
+        })
     "#elif TONEMAP_OPERATOR == 9\n"
-    "vec3 tonemap_curve(vec3 v) {\n"
-    "    v *= 2.0;\n"
-    "    return ((v * (0.15 * v + 0.05) + 0.004) / (v * (0.15 * v + 0.5) + 0.06) - 1.0 / 15.0) / 0.725129270;\n"
-    "}\n"
+    SAT__GLSL(
+        vec3 tonemap_curve(vec3 v) {
+            v *= 2.0;
+            return ((v * (0.15 * v + 0.05) + 0.004) / (v * (0.15 * v + 0.5) + 0.06) - 1.0 / 15.0) / 0.725129270;
+        })
     "#endif\n"
-    "vec3 tonemap_encode(vec3 v) {\n"
+    SAT__GLSL(vec3 tonemap_encode(vec3 v) {)
     "#if TONEMAP_ENCODING == 1\n"
-    "    return clamp(v, 0.0, 1.0) * peak;\n"
+    SAT__GLSL(return clamp(v, 0.0, 1.0) * peak;)
     "#elif TONEMAP_ENCODING == 2\n"
-    "    v = pow(clamp(v, 0.0, 1.0) * peak_cd * 1e-4 + 1e-12, vec3(0.1593017578125));\n"
-    "    return pow((0.8359375 + 18.8515625 * v) / (1.0 + 18.6875 * v), vec3(78.84375));\n"
+    SAT__GLSL(
+            v = pow(clamp(v, 0.0, 1.0) * peak_cd * 1e-4 + 1e-12, vec3(0.1593017578125));
+            return pow((0.8359375 + 18.8515625 * v) / (1.0 + 18.6875 * v), vec3(78.84375));)
     "#elif TONEMAP_ENCODING == 3\n"
-    "    v = clamp(v, 0.0, 1.0);\n"
-    "    float power = 1.0 / (1.2 + 0.42 * log(peak_cd / 1000.0) / log(10.0)) - 1.0;\n"
-    "    v = min(v * pow(max(dot(display_luma, v), 1e-9), power), 1.0);\n"
-    "    return mix(sqrt(3.0 * v), 0.17883277 * log(max(12.0 * v - 0.28466892, 1e-9)) + 0.55991073, greaterThan(v, vec3(1.0 / 12.0)));\n"
+    SAT__GLSL(
+            v = clamp(v, 0.0, 1.0);
+            float power = 1.0 / (1.2 + 0.42 * log(peak_cd / 1000.0) / log(10.0)) - 1.0;
+            v = min(v * pow(max(dot(display_luma, v), 1e-9), power), 1.0);
+            return mix(sqrt(3.0 * v), 0.17883277 * log(max(12.0 * v - 0.28466892, 1e-9)) + 0.55991073,
+                greaterThan(v, vec3(1.0 / 12.0)));)
     "#else\n"
-    "    return tonemap_srgb(v);\n"
+    SAT__GLSL(return tonemap_srgb(v);)
     "#endif\n"
-    "}\n";
+    SAT__GLSL(});
 
 /* Local luminance, mesopic vision, display luminance and colour in one pass. */
 static const char tonemap__glsl_map[] =
-    "uniform sampler2D hdr;\n"
-    "uniform float cd_per_unit, lux_per_cd;\n"
-    "uniform vec3 mix_r, mix_g, mix_b, red_x, red_step;\n"
-    "uniform int mixes;\n"
-    "out vec4 value;\n"
-    "float tonemap_capacity(float cd) {\n"
-    "    float ln = log(max(cd, 7.8886e-31));\n"
-    "    if (cd < 0.0034) return cd / 0.0014;\n"
-    "    if (cd < 1.0) return 16.5431894 + ln / 0.4027;\n"
-    "    return cd < 7.2444 ? 16.5431894 + (cd - 1.0) / 0.4027 : ln / 0.0556 - 3.56579561;\n"
-    "}\n"
-    "vec3 tonemap_gamut(vec3 v, float grey) {\n"
-    "    v = min(max(v, 0.0), 5.7646075e17);\n"
-    "    float top = max(max(v.r, v.g), v.b);\n"
-    "    if (TONEMAP_GAMUT < 0.0 || !(top > 1.0)) return v;\n"
-    "    float dim = exp2(-TONEMAP_GAMUT * log2(top));\n"
-    "    grey = min(grey, 1.0) * dim;\n"
-    "    return grey + (v * dim - grey) * min((1.0 - grey) / max(top * dim - grey, 1e-20), 1.0);\n"
-    "}\n"
-    "vec3 tonemap_display(ivec2 p) {\n"
-    "    vec3 rgb = texelFetch(hdr, p, 0).rgb;\n"
-    "    vec4 first = texelFetch(state, ivec2(0), 0), second = texelFetch(state, ivec2(1, 0), 0);\n"
-    "    float y = texelFetch(luminance, p, 0).x, scale = tonemap_scale(), key = tonemap_key(), own = y * scale, la = own, beyond = 1.0;\n"
-    "    float cd = cd_per_unit > 0.0 ? cd_per_unit : 10.0 * exp2(-first.x);\n"
-    "    float lux = (cd_per_unit > 0.0 ? cd_per_unit : exp2(-first.x)) * lux_per_cd;\n"
-    "    float gain;\n"
-    "    if (!(y > 0.0)) return tonemap_encode(vec3(0.0));\n"
-    "    if (mixes > 0) {\n"
-    "        rgb = vec3(dot(mix_r, rgb), dot(mix_g, rgb), dot(mix_b, rgb));\n"
-    "        float lowest = min(min(rgb.r, rgb.g), rgb.b);\n"
-    "        if (lowest < 0.0) rgb = y + (rgb - y) * (y / (y - lowest));\n"
-    "    }\n"
+    SAT__GLSL(
+        uniform sampler2D hdr;
+        uniform float cd_per_unit, lux_per_cd;
+        uniform vec3 mix_r, mix_g, mix_b, red_x, red_step;
+        uniform int mixes;
+        out vec4 value;
+        float tonemap_capacity(float cd) {
+            float ln = log(max(cd, 7.8886e-31));
+            if (cd < 0.0034) return cd / 0.0014;
+            if (cd < 1.0) return 16.5431894 + ln / 0.4027;
+            return cd < 7.2444 ? 16.5431894 + (cd - 1.0) / 0.4027 : ln / 0.0556 - 3.56579561;
+        })
+    SAT__GLSL(
+        vec3 tonemap_gamut(vec3 v, float grey) {
+            v = min(max(v, 0.0), 5.7646075e17);
+            float top = max(max(v.r, v.g), v.b);
+            if (TONEMAP_GAMUT < 0.0 || !(top > 1.0)) return v;
+            float dim = exp2(-TONEMAP_GAMUT * log2(top));
+            grey = min(grey, 1.0) * dim;
+            return grey + (v * dim - grey) * min((1.0 - grey) / max(top * dim - grey, 1e-20), 1.0);
+        })
+    SAT__GLSL(
+        vec3 tonemap_display(ivec2 p) {
+            vec3 rgb = texelFetch(hdr, p, 0).rgb;
+            vec4 first = texelFetch(state, ivec2(0), 0), second = texelFetch(state, ivec2(1, 0), 0);
+            float y = texelFetch(luminance, p, 0).x, scale = tonemap_scale(), key = tonemap_key(), own = y * scale,
+                la = own, beyond = 1.0;
+            float cd = cd_per_unit > 0.0 ? cd_per_unit : 10.0 * exp2(-first.x);
+            float lux = (cd_per_unit > 0.0 ? cd_per_unit : exp2(-first.x)) * lux_per_cd;
+            float gain;
+            if (!(y > 0.0)) return tonemap_encode(vec3(0.0));
+            if (mixes > 0) {
+                rgb = vec3(dot(mix_r, rgb), dot(mix_g, rgb), dot(mix_b, rgb));
+                float lowest = min(min(rgb.r, rgb.g), rgb.b);
+                if (lowest < 0.0) rgb = y + (rgb - y) * (y / (y - lowest));
+            })
     "#if TONEMAP_OPERATOR == 5\n"
-    "    la = tonemap_find(p, own, key);\n"
-    "    beyond = max(own / TONEMAP_CAP, 1.0);\n"
+    SAT__GLSL(
+            la = tonemap_find(p, own, key);
+            beyond = max(own / TONEMAP_CAP, 1.0);)
     "#elif TONEMAP_OPERATOR == 0 || TONEMAP_OPERATOR == 2\n"
-    "    if (TONEMAP_SELECTIVE <= 0.0 || tonemap_is_edge(p, scale)) {\n"
-    "        la = tonemap_find(p, own, key);\n"
-    "        beyond = max(own / TONEMAP_CAP, 1.0);\n"
-    "    }\n"
+    SAT__GLSL(
+            if (TONEMAP_SELECTIVE <= 0.0 || tonemap_is_edge(p, scale)) {
+                la = tonemap_find(p, own, key);
+                beyond = max(own / TONEMAP_CAP, 1.0);
+            })
     "#endif\n"
     "#if TONEMAP_MESOPIC == 1\n"
-    "    rgb = tonemap_mesopic_in(rgb, y, tonemap_rho(exp2(first.x) * lux), red_x, red_step);\n"
+    SAT__GLSL(rgb = tonemap_mesopic_in(rgb, y, tonemap_rho(exp2(first.x) * lux), red_x, red_step);)
     "#elif TONEMAP_MESOPIC == 2\n"
-    "    rgb = tonemap_mesopic_in(rgb, y, tonemap_rho(la / scale * lux), red_x, red_step);\n"
+    SAT__GLSL(rgb = tonemap_mesopic_in(rgb, y, tonemap_rho(la / scale * lux), red_x, red_step);)
     "#endif\n"
     "#if TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 3\n"
-    "    float low = tonemap_capacity(cd * exp2(second.x)), high = tonemap_capacity(cd * exp2(second.y)), display = key;\n"
-    "    if (second.y - second.x > 0.125) display = (tonemap_capacity(la * cd / scale) - low) / (high - low);\n"
-    "    gain = max(display, 0.0) * scale / max(la, 7.8886e-31);\n"
+    SAT__GLSL(
+            float low = tonemap_capacity(cd * exp2(second.x)), high = tonemap_capacity(cd * exp2(second.y)),
+                display = key;
+            if (second.y - second.x > 0.125) display = (tonemap_capacity(la * cd / scale) - low) / (high - low);
+            gain = max(display, 0.0) * scale / max(la, 7.8886e-31);)
     "#elif TONEMAP_OPERATOR == 4\n"
-    "    gain = scale * (TONEMAP_BURN == 1 ? exp2(-first.z) : 1.0 / peak);\n"
+    SAT__GLSL(gain = scale * (TONEMAP_BURN == 1 ? exp2(-first.z) : 1.0 / peak);)
     "#elif TONEMAP_OPERATOR > 5\n"
-    "    return tonemap_encode(clamp(tonemap_curve(clamp(rgb * scale, 0.0, 1e9)), 0.0, 1.0) / peak);\n"
+    SAT__GLSL(return tonemap_encode(clamp(tonemap_curve(clamp(rgb * scale, 0.0, 1e9)), 0.0, 1.0) / peak);)
     "#else\n"
-    "    float burn = TONEMAP_BURN == 1 ? peak * exp2(-2.0 * first.z) : 0.0;\n"
-    "    gain = scale * (1.0 + min(own, 1.1529215e18) * burn) / (peak + la * beyond);\n"
+    SAT__GLSL(
+            float burn = TONEMAP_BURN == 1 ? peak * exp2(-2.0 * first.z) : 0.0;
+            gain = scale * (1.0 + min(own, 1.1529215e18) * burn) / (peak + la * beyond);)
     "#endif\n"
-    "    return tonemap_encode(tonemap_gamut(rgb * gain, y * gain));\n"
-    "}\n"
-    "void main() {\n"
-    "    ivec2 p = sat_pixel(), high = textureSize(luminance, 0) - 1;\n"
-    "    vec4 sum = vec4(0.0);\n"
-    "    int radius = texelFetch(luminance, p, 0).x < 0.0 ? 1 : 0;\n" /* an unusable pixel shows those around it */
-    "    for (int last = radius * 3; radius <= last && sum.a == 0.0; radius++)\n"
-    "        for (int y = max(p.y - radius, 0); y <= min(p.y + radius, high.y); y++)\n"
-    "            for (int x = max(p.x - radius, 0); x <= min(p.x + radius, high.x); x++)\n"
-    "                if (texelFetch(luminance, ivec2(x, y), 0).x >= 0.0) sum += vec4(tonemap_display(ivec2(x, y)), 1.0);\n"
-    "    value = vec4(sum.rgb / max(sum.a, 1.0), 1.0);\n"
+    SAT__GLSL(
+            return tonemap_encode(tonemap_gamut(rgb * gain, y * gain));
+        })
+    SAT__GLSL(
+        void main() {
+            ivec2 p = sat_pixel(), high = textureSize(luminance, 0) - 1;
+            vec4 sum = vec4(0.0);
+            int radius = texelFetch(luminance, p, 0).x < 0.0 ? 1 : 0; /* an unusable pixel shows those around it */
+            for (int last = radius * 3; radius <= last && sum.a == 0.0; radius++)
+                for (int y = max(p.y - radius, 0); y <= min(p.y + radius, high.y); y++)
+                    for (int x = max(p.x - radius, 0); x <= min(p.x + radius, high.x); x++)
+                        if (texelFetch(luminance, ivec2(x, y), 0).x >= 0.0)
+                            sum += vec4(tonemap_display(ivec2(x, y)), 1.0);
+            value = vec4(sum.rgb / max(sum.a, 1.0), 1.0);)
     "#if TONEMAP_DITHER\n"
-    "    int d = p.x ^ p.y, threshold = (d & 1) << 7 | (p.y & 1) << 6 | (d & 2) << 4 | (p.y & 2) << 3 | (d & 4) << 1 | (p.y & 4);\n"
-    "    value.rgb = floor(value.rgb * 255.0 + float(threshold + 2) / 256.0) / 255.0;\n"
+    SAT__GLSL(
+            int d = p.x ^ p.y, threshold = (d & 1) << 7 | (p.y & 1) << 6 | (d & 2) << 4 | (p.y & 2) << 3 | (d & 4) << 1
+                | (p.y & 4);
+            value.rgb = floor(value.rgb * 255.0 + float(threshold + 2) / 256.0) / 255.0;)
     "#endif\n"
-    "}\n";
+    SAT__GLSL(});
 
 /* ---- >> passes of OpenGL */
 

@@ -5,7 +5,11 @@
 lib=$1
 . "$(dirname "$0")/check.sh"
 family="sat tonemap ssao_sat fiv raindrop softassign"
-code() { ${CC:-cc} -fpreprocessed -dD -E -P -x c "$1" 2>/dev/null | sed "s/\"\([^\"\\\\]\|\\\\.\)*\"//g; s/'[^']*'//g"; }   # no comments, no texts
+# no comments, no texts, no shaders
+code() {
+    ${CC:-cc} -fpreprocessed -dD -E -P -x c "$1" 2>/dev/null | sed "s/\"\([^\"\\\\]\|\\\\.\)*\"//g; s/'[^']*'//g" |
+        perl -0pe 's/^(?!#)(.*)\bSAT__GLSL(\((?:[^()]++|(?2))*\))/$1/gm'
+}
 
 # Names. The list of words is quick and names each; then compilers prove it, the interface alone and with everything.
 check_hostile() {
