@@ -117,7 +117,8 @@
    >> tables                  interface: kinds, options, build, sums and means, filters, bounds, plans, streams
    >> moments                 interface: variance and covariance
    >> on OpenGL               interface: tables from textures, lookups in GLSL
-   >> for siblings            options and their tables, sentences, images, vectors; private
+   >> for siblings            options and their tables, sentences, images; private
+   >> for siblings, vectors   four floats or integers at a time; private
    >> for siblings, OpenGL    functions, programs; private
    >> for siblings, textures  textures, passes, state, time; private
    >> scanning                the three algorithms
@@ -657,7 +658,7 @@ SAT_DEF const char *sat_gl_glsl(void);
 #define SAT__IEEE_END
 #endif
 
-/* Vector instructions come from the compiler's own macros; every vector loop has a plain twin. */
+/* Vector instructions come from the compiler's own macros. */
 #ifndef SAT_NO_SIMD
 #if defined(__SSE2__) || defined(_M_X64) || (defined(_M_IX86_FP) && _M_IX86_FP >= 2)
 #define SAT__SSE2
@@ -1150,7 +1151,10 @@ static inline void sat__read_row(float *out, const sat_image *image, int y, int 
     }
 }
 
-/* ---- four floats at a time: SSE2 or NEON, the same rounding in both. SAT__VECTOR says that they are there. */
+/* ---- >> for siblings, vectors
+
+   Four floats or integers at a time: SSE2, NEON, or plain lanes in a struct, with the same bits in all three. So a loop
+   is written once. SAT__VECTOR says that they are instructions. */
 
 #if defined(SAT__SSE2)
 #define SAT__VECTOR
@@ -1280,6 +1284,86 @@ static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g
     *g = v.val[1];
     *b = v.val[2];
     *a = v.val[3];
+}
+#else
+/* Plain C: four lanes in a struct, the same bits. Written out, not as a loop: so compilers make vectors of them. */
+typedef struct sat__f32x4 { float lane[4]; } sat__f32x4;
+typedef struct sat__i32x4 { int32_t lane[4]; } sat__i32x4;
+#define SAT__LANES(type, name, arguments, value)                                                                       \
+    static inline type name arguments                                                                                  \
+    {                                                                                                                  \
+        type v;                                                                                                        \
+        int i = 0;                                                                                                     \
+        v.lane[i] = (value);                                                                                           \
+        i++;                                                                                                           \
+        v.lane[i] = (value);                                                                                           \
+        i++;                                                                                                           \
+        v.lane[i] = (value);                                                                                           \
+        i++;                                                                                                           \
+        v.lane[i] = (value);                                                                                           \
+        return v;                                                                                                      \
+    }
+SAT__LANES(sat__f32x4, sat__f32x4_load, (const float *p), p[i])
+SAT__LANES(sat__f32x4, sat__f32x4_set1, (float a), a)
+SAT__LANES(sat__f32x4, sat__f32x4_add, (sat__f32x4 a, sat__f32x4 b), a.lane[i] + b.lane[i])
+SAT__LANES(sat__f32x4, sat__f32x4_sub, (sat__f32x4 a, sat__f32x4 b), a.lane[i] - b.lane[i])
+SAT__LANES(sat__f32x4, sat__f32x4_mul, (sat__f32x4 a, sat__f32x4 b), a.lane[i] * b.lane[i])
+SAT__LANES(sat__f32x4, sat__f32x4_div, (sat__f32x4 a, sat__f32x4 b), a.lane[i] / b.lane[i])
+SAT__LANES(sat__f32x4, sat__f32x4_min, (sat__f32x4 a, sat__f32x4 b), a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i])
+SAT__LANES(sat__f32x4, sat__f32x4_max, (sat__f32x4 a, sat__f32x4 b), a.lane[i] > b.lane[i] ? a.lane[i] : b.lane[i])
+SAT__LANES(sat__f32x4, sat__f32x4_sqrt, (sat__f32x4 a), sqrtf(a.lane[i]))
+SAT__LANES(sat__f32x4, sat__f32x4_abs, (sat__f32x4 a), fabsf(a.lane[i]))
+SAT__LANES(sat__i32x4, sat__f32x4_less, (sat__f32x4 a, sat__f32x4 b), -(int32_t)(a.lane[i] < b.lane[i]))
+SAT__LANES(sat__i32x4, sat__f32x4_less_equal, (sat__f32x4 a, sat__f32x4 b), -(int32_t)(a.lane[i] <= b.lane[i]))
+SAT__LANES(sat__f32x4, sat__f32x4_select, (sat__i32x4 mask, sat__f32x4 yes, sat__f32x4 no),
+           mask.lane[i] ? yes.lane[i] : no.lane[i])
+SAT__LANES(sat__i32x4, sat__i32x4_load, (const int32_t *p), p[i])
+SAT__LANES(sat__i32x4, sat__i32x4_set1, (int32_t a), a)
+SAT__LANES(sat__i32x4, sat__i32x4_add, (sat__i32x4 a, sat__i32x4 b),
+           (int32_t)((uint32_t)a.lane[i] + (uint32_t)b.lane[i]))
+SAT__LANES(sat__i32x4, sat__i32x4_sub, (sat__i32x4 a, sat__i32x4 b),
+           (int32_t)((uint32_t)a.lane[i] - (uint32_t)b.lane[i]))
+SAT__LANES(sat__i32x4, sat__i32x4_and, (sat__i32x4 a, sat__i32x4 b), a.lane[i] & b.lane[i])
+SAT__LANES(sat__i32x4, sat__i32x4_or, (sat__i32x4 a, sat__i32x4 b), a.lane[i] | b.lane[i])
+SAT__LANES(sat__i32x4, sat__i32x4_greater, (sat__i32x4 a, sat__i32x4 b), -(int32_t)(a.lane[i] > b.lane[i]))
+SAT__LANES(sat__f32x4, sat__i32x4_to_f32, (sat__i32x4 a), (float)a.lane[i])
+SAT__LANES(sat__i32x4, sat__f32x4_truncate, (sat__f32x4 a),
+           fabsf(a.lane[i]) < 2147483648.0f ? (int32_t)a.lane[i] : INT32_MIN)
+SAT__LANES(sat__i32x4, sat__i32x4_shift_right, (sat__i32x4 a, int bits), (int32_t)((uint32_t)a.lane[i] >> bits))
+static inline void sat__f32x4_store(float *p, sat__f32x4 v) { memcpy(p, v.lane, sizeof v); }
+static inline void sat__i32x4_store(int32_t *p, sat__i32x4 v) { memcpy(p, v.lane, sizeof v); }
+static inline int sat__i32x4_any(sat__i32x4 v) { return (v.lane[0] | v.lane[1] | v.lane[2] | v.lane[3]) != 0; }
+static inline int sat__i32x4_all(sat__i32x4 v) { return (v.lane[0] & v.lane[1] & v.lane[2] & v.lane[3]) == -1; }
+static inline sat__i32x4 sat__f32x4_bits(sat__f32x4 a)
+{
+    sat__i32x4 v;
+    memcpy(v.lane, a.lane, sizeof v);
+    return v;
+}
+static inline sat__f32x4 sat__f32x4_from_bits(sat__i32x4 a)
+{
+    sat__f32x4 v;
+    memcpy(v.lane, a.lane, sizeof v);
+    return v;
+}
+static inline void sat__f32x4_load3(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b)
+{
+    int i;
+    for (i = 0; i < 4; i++, p += 3) {
+        r->lane[i] = p[0];
+        g->lane[i] = p[1];
+        b->lane[i] = p[2];
+    }
+}
+static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b, sat__f32x4 *a)
+{
+    int i;
+    for (i = 0; i < 4; i++, p += 4) {
+        r->lane[i] = p[0];
+        g->lane[i] = p[1];
+        b->lane[i] = p[2];
+        a->lane[i] = p[3];
+    }
 }
 #endif
 

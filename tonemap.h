@@ -616,7 +616,6 @@ static inline float tonemap__exp2(float v)
     return octave * (1 + t + t * (1 - t) * q);
 }
 
-#ifdef SAT__VECTOR
 static inline sat__f32x4 tonemap__log2_octave4(sat__f32x4 t)
 {
     sat__f32x4 q = sat__f32x4_mul(t, sat__f32x4_set1(0.0258414329f));
@@ -654,7 +653,6 @@ static inline sat__f32x4 tonemap__exp2_4(sat__f32x4 v)
     q = sat__f32x4_mul(sat__f32x4_mul(t, sat__f32x4_sub(one, t)), q);
     return sat__f32x4_mul(sat__f32x4_from_bits(octave), sat__f32x4_add(sat__f32x4_add(one, t), q));
 }
-#endif
 
 /* ---- >> measuring: first pass: luminance, its logarithm, and what is wrong with it */
 
@@ -679,8 +677,9 @@ static inline uint32_t tonemap__mask_weight(float v)
     return v > 0 ? v < 1 ? (uint32_t)(int32_t)(v * 15 + 0.5f) : 15 : 0;
 }
 
-/* Pixels [x, end) of a row. lane[x % 4] sums the luminances, so that four pixels at a time give the same sum. */
-static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, float *lane, const float *pixels,
+/* Pixels [x, end) of a row with whatever is in them and their weights. lane[x % 4] sums the luminances, so that four
+   pixels at a time give the same sum. */
+static inline void tonemap__measure_each(tonemap__worker *w, float *luminance, float *lane, const float *pixels,
                                           int channels, int x, int end)
 {
     int64_t log_sum = 0;
@@ -713,7 +712,6 @@ static inline void tonemap__measure_plain(tonemap__worker *w, float *luminance, 
     w->stats.positive += positive;
 }
 
-#ifdef SAT__VECTOR
 static inline sat__f32x4 tonemap__load_pixels(const float *p, int channels, sat__f32x4 *r, sat__f32x4 *g, sat__f32x4 *b)
 {
     sat__f32x4 alpha = sat__f32x4_set1(1);
@@ -739,8 +737,8 @@ static inline void tonemap__count4(uint32_t *histogram, sat__i32x4 bits)
     for (i = 0; i < 4; i++) histogram[bin[i]]++;
 }
 
-/* Whole groups of four of a row of at most 2^16 pixels; returns where it stopped. */
-static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, float *lane, const float *pixels,
+/* Whole groups of four of a row of at most 2^16 pixels without a mask; returns where it stopped. */
+static inline int tonemap__measure_fours(tonemap__worker *w, float *luminance, float *lane, const float *pixels,
                                           int channels, int x, int end)
 {
     sat__f32x4 sum = sat__f32x4_load(lane), low = sat__f32x4_set1(TONEMAP__DARKEST),
@@ -755,7 +753,7 @@ static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, 
         y = tonemap__luminance4(w->luma, channels, r, g, b);
         if (!sat__i32x4_all(sat__i32x4_and(sat__f32x4_less_equal(low, y), sat__f32x4_less_equal(y, high)))) {
             sat__f32x4_store(lane, sum);
-            tonemap__measure_plain(w, luminance, lane, pixels, channels, x, x + 4);
+            tonemap__measure_each(w, luminance, lane, pixels, channels, x, x + 4);
             sum = sat__f32x4_load(lane);
             continue;
         }
@@ -776,7 +774,6 @@ static inline int tonemap__measure_vector(tonemap__worker *w, float *luminance, 
     w->counted += 4 * (uint64_t)groups;
     return x;
 }
-#endif
 
 static inline float tonemap__measure_row(tonemap__worker *w, float *luminance, const float *pixels, int channels,
                                          int width)
@@ -785,10 +782,8 @@ static inline float tonemap__measure_row(tonemap__worker *w, float *luminance, c
     int x = 0, end;
     while (x < width) {
         end = width - x > 65536 ? x + 65536 : width;
-#ifdef SAT__VECTOR
-        if (!w->mask) x = tonemap__measure_vector(w, luminance, lane, pixels, channels, x, end);
-#endif
-        tonemap__measure_plain(w, luminance, lane, pixels, channels, x, end);
+        if (!w->mask) x = tonemap__measure_fours(w, luminance, lane, pixels, channels, x, end);
+        tonemap__measure_each(w, luminance, lane, pixels, channels, x, end);
         x = end;
     }
     return (lane[0] + lane[1]) + (lane[2] + lane[3]);
@@ -1211,21 +1206,15 @@ static inline uint32_t *tonemap__ring_row(const tonemap *map, const tonemap__wor
     return w->sums + (size_t)(j % (2 * TONEMAP__BOXES + 2)) * (size_t)map->ring_row;
 }
 
+/* This and all loops in fours write up to three pixels beyond width or end: rows are longer than the picture. */
 static inline void tonemap__quantise(int32_t *out, const float *luminance, int width, const tonemap__frame *f)
 {
-    int x = 0;
-#ifdef SAT__VECTOR
     sat__f32x4 scale = sat__f32x4_set1(f->scale), cap = sat__f32x4_set1(f->cap), quantum = sat__f32x4_set1(f->quantum);
-    for (; x + 4 <= width; x += 4) {
+    int x;
+    for (x = 0; x < width; x += 4) {
         sat__f32x4 v = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), scale), cap);
         sat__i32x4_store(out + x,
                          sat__f32x4_truncate(sat__f32x4_add(sat__f32x4_mul(v, quantum), sat__f32x4_set1(0.5f))));
-    }
-#endif
-    for (; x < width; x++) {
-        float v = luminance[x] * f->scale;
-        v = v < f->cap ? v : f->cap;
-        out[x] = (int32_t)(v * f->quantum + 0.5f);
     }
 }
 
@@ -1268,20 +1257,6 @@ static inline void tonemap__open_window(tonemap__window *window, const tonemap *
     }
 }
 
-static inline float tonemap__box_sum(const tonemap__window *window, const tonemap__frame *f, int k, int x)
-{
-    const uint32_t *top = window->top[k] + x, *bottom = window->bottom[k] + x;
-    int r = f->radius[k];
-    return (float)(int32_t)((bottom[r + 1] - bottom[-r]) - (top[r + 1] - top[-r]));
-}
-
-static inline float tonemap__box_mean(const tonemap__window *window, const tonemap__frame *f, int k, int x)
-{
-    int columns = sat__min_int(x + f->radius[k] + 1, window->width) - sat__max_int(x - f->radius[k], 0);
-    return tonemap__box_sum(window, f, k, x) * (1 / ((float)(window->rows[k] * columns) * f->quantum));
-}
-
-#ifdef SAT__VECTOR
 /* The inverse areas of four boxes of which some are clipped. */
 static inline sat__f32x4 tonemap__inverse4(const tonemap__window *window, const tonemap__frame *f, int k, int x)
 {
@@ -1310,7 +1285,6 @@ static inline sat__i32x4 tonemap__inside4(int x, int end)
     static const int32_t lanes[4] = {0, 1, 2, 3};
     return sat__i32x4_greater(sat__i32x4_set1(end - x), sat__i32x4_load(lanes));
 }
-#endif
 
 /* ---- the photographic operator's search for the largest even neighbourhood, eq A.5 to A.9
 
@@ -1318,74 +1292,6 @@ static inline sat__i32x4 tonemap__inside4(int x, int end)
    that fails gives its centre; when none fails, the last box is taken. (Eq A.7 does not say what happens when the first
    step fails; this is the reading under which it has an answer.) */
 
-static inline void tonemap__search_one(float *local, const float *luminance, const tonemap__window *window,
-                                       const tonemap__frame *f, size_t *scale, int x)
-{
-    float c = luminance[x] * f->scale;
-    int k;
-    c = c < f->cap ? c : f->cap;
-    for (k = 0; k + 1 < f->boxes; k++) {
-        float v = tonemap__box_mean(window, f, k + 1, x);
-        if (!(fabsf(c - v) < f->epsilon * c + f->term[k])) break;
-        c = v;
-    }
-    local[x] = c;
-    scale[k]++;
-}
-
-/* Sixteen pixels side by side without a branch, in loops that compilers turn into vector code by themselves: limit -
-   |c - v| > 0 is asked of its bits, because a comparison of floats would stop them. */
-static inline void tonemap__search_sixteen(float *local, const float *luminance, const tonemap__window *window,
-                                           const tonemap__frame *f, size_t *scale, int x)
-{
-    enum { N = TONEMAP__GROUP };
-    float c[N], v[N], room[N];
-    int32_t live[N], bits[N], old[N], next[N], count = N;
-    int i, k;
-    for (i = 0; i < N; i++) {
-        c[i] = luminance[x + i] * f->scale;
-        c[i] = c[i] < f->cap ? c[i] : f->cap;
-        live[i] = -1;
-    }
-    for (k = 0; k + 1 < f->boxes && count; k++) {
-        int r = f->radius[k + 1];
-        const uint32_t *top = window->top[k + 1] + x - r, *bottom = window->bottom[k + 1] + x - r;
-        float inverse = window->inverse[k + 1], epsilon = f->epsilon, term = f->term[k];
-        for (i = 0; i < N; i++) {
-            v[i] = (float)(int32_t)((bottom[i + 2 * r + 1] - bottom[i]) - (top[i + 2 * r + 1] - top[i])) * inverse;
-            room[i] = epsilon * c[i] + term - fabsf(c[i] - v[i]);
-        }
-        memcpy(bits, room, sizeof bits);
-        memcpy(old, c, sizeof old);
-        memcpy(next, v, sizeof next);
-        scale[k] += (size_t)count;
-        for (count = 0, i = 0; i < N; i++) {
-            live[i] &= -(int32_t)(bits[i] > 0);
-            old[i] = (next[i] & live[i]) | (old[i] & ~live[i]);
-            count -= live[i];
-        }
-        scale[k] -= (size_t)count;
-        memcpy(c, old, sizeof old);
-    }
-    scale[k] += (size_t)count;
-    memcpy(local + x, c, sizeof c);
-}
-
-static inline void tonemap__search_plain(float *local, const float *luminance, const tonemap__window *window,
-                                         const tonemap__frame *f, size_t *scale, int x, int end)
-{
-    while (x < end) {
-        if (x >= f->reach && x + TONEMAP__GROUP <= end && x + TONEMAP__GROUP + f->reach <= window->width) {
-            tonemap__search_sixteen(local, luminance, window, f, scale, x);
-            x += TONEMAP__GROUP;
-        } else {
-            tonemap__search_one(local, luminance, window, f, scale, x);
-            x++;
-        }
-    }
-}
-
-#ifdef SAT__VECTOR
 /* One step for four pixels: where it holds, the centre becomes the surround; else the pixel is done and keeps it. */
 static inline sat__i32x4 tonemap__step4(sat__f32x4 *c, sat__i32x4 *live, sat__f32x4 v, sat__f32x4 epsilon,
                                         sat__f32x4 term)
@@ -1460,7 +1366,7 @@ static inline void tonemap__move_on(size_t *scale, const sat__i32x4 *passed, int
     }
 }
 
-static inline void tonemap__search_vector(float *local, const float *luminance, const tonemap__window *window,
+static inline void tonemap__search_hard(float *local, const float *luminance, const tonemap__window *window,
                                           const tonemap__frame *f, size_t *scale, int x, int end)
 {
     sat__i32x4 passed[TONEMAP__LENGTHS];
@@ -1477,34 +1383,9 @@ static inline void tonemap__search_vector(float *local, const float *luminance, 
     }
     tonemap__move_on(scale, passed, f->boxes - 1);
 }
-#endif
 
 /* The same with scales mixed: the weight of what lies beyond a step falls from 1 to 0 while the step's contrast grows
    through a band around epsilon, so that noise moves La a little instead of across a scale. */
-static inline void tonemap__search_soft_plain(float *local, const float *luminance, const tonemap__window *window,
-                                              const tonemap__frame *f, size_t *scale, int x, int end)
-{
-    float top = 1 + f->soft, slope = 1 / (2 * f->soft);
-    for (; x < end; x++) {
-        float c = luminance[x] * f->scale, taken, weight = 1;
-        int k, reached = 0;
-        c = c < f->cap ? c : f->cap;
-        taken = c;
-        for (k = 0; k + 1 < f->boxes; k++) {
-            float v = tonemap__box_mean(window, f, k + 1, x), limit = f->epsilon * c + f->term[k];
-            float pass = (top - fabsf(c - v) / limit) * slope;
-            weight = weight * (pass < 0 ? 0 : pass > 1 ? 1 : pass);
-            if (!(weight > 0)) break;
-            taken = taken + weight * (v - c);
-            if (weight >= 0.5f) reached = k + 1;
-            c = v;
-        }
-        local[x] = taken;
-        scale[reached]++;
-    }
-}
-
-#ifdef SAT__VECTOR
 /* What a step of soft scales takes and changes. */
 static inline sat__i32x4 tonemap__soft_step4(sat__f32x4 *c, sat__f32x4 *taken, sat__f32x4 *weight, sat__f32x4 v,
                                              const tonemap__frame *f, int k)
@@ -1574,8 +1455,8 @@ static inline void tonemap__soft_four(float *local, const float *luminance, cons
     sat__f32x4_store(local + x, taken);
 }
 
-static inline void tonemap__search_soft_vector(float *local, const float *luminance, const tonemap__window *window,
-                                               const tonemap__frame *f, size_t *scale, int x, int end)
+static inline void tonemap__search_soft(float *local, const float *luminance, const tonemap__window *window,
+                                        const tonemap__frame *f, size_t *scale, int x, int end)
 {
     sat__i32x4 passed[TONEMAP__LENGTHS];
     int k;
@@ -1591,31 +1472,12 @@ static inline void tonemap__search_soft_vector(float *local, const float *lumina
     }
     tonemap__move_on(scale, passed, f->boxes - 1);
 }
-#endif
 
 /* ---- Ashikhmin's search: the first neighbourhood s = 1..10 whose mean differs from that of twice its size by half of
    itself; else the last. A mean below the quantum says nothing: the pixel then stands for itself. */
 
-static inline void tonemap__search_ashikhmin_plain(float *local, const float *luminance, const tonemap__window *window,
-                                                   const tonemap__frame *f, size_t *scale, int x, int end)
-{
-    for (; x < end; x++) {
-        float own = luminance[x] * f->scale, g = own < f->cap ? own : f->cap;
-        int s = 0;
-        for (;;) {
-            float wide = tonemap__box_mean(window, f, 2 * s + 1, x);
-            if (!(fabsf(g - wide) < 0.5f * g) || s == TONEMAP__ASHIKHMIN - 1) break;
-            s++;
-            g = tonemap__box_mean(window, f, s, x);
-        }
-        local[x] = g * f->quantum < 1 ? own : g;
-        scale[s]++;
-    }
-}
-
-#ifdef SAT__VECTOR
-static inline void tonemap__search_ashikhmin_vector(float *local, const float *luminance, const tonemap__window *window,
-                                                    const tonemap__frame *f, size_t *scale, int x, int end)
+static inline void tonemap__search_ashikhmin(float *local, const float *luminance, const tonemap__window *window,
+                                             const tonemap__frame *f, size_t *scale, int x, int end)
 {
     sat__f32x4 half = sat__f32x4_set1(0.5f), quantum = sat__f32x4_set1(1 / f->quantum);
     sat__i32x4 passed[TONEMAP__ASHIKHMIN];
@@ -1644,27 +1506,17 @@ static inline void tonemap__search_ashikhmin_vector(float *local, const float *l
     }
     tonemap__move_on(scale, passed, TONEMAP__ASHIKHMIN - 1);
 }
-#endif
 
 /* Searches pixels [x, end) of a row and may overwrite what follows them in the group. */
 static inline void tonemap__search(tonemap__worker *w, const float *luminance, const tonemap__window *window,
                                    const tonemap__frame *f, int ashikhmin, int x, int end)
 {
     size_t *scale = w->stats.scale;
-#ifdef SAT__VECTOR
     scale[0] += (size_t)(end - x);
     if (TONEMAP__HAS_ASHIKHMIN && ashikhmin)
-        tonemap__search_ashikhmin_vector(w->local, luminance, window, f, scale, x, end);
-    else if (TONEMAP__HAS_SOFT && f->soft > 0)
-        tonemap__search_soft_vector(w->local, luminance, window, f, scale, x, end);
-    else tonemap__search_vector(w->local, luminance, window, f, scale, x, end);
-#else
-    if (TONEMAP__HAS_ASHIKHMIN && ashikhmin)
-        tonemap__search_ashikhmin_plain(w->local, luminance, window, f, scale, x, end);
-    else if (TONEMAP__HAS_SOFT && f->soft > 0)
-        tonemap__search_soft_plain(w->local, luminance, window, f, scale, x, end);
-    else tonemap__search_plain(w->local, luminance, window, f, scale, x, end);
-#endif
+        tonemap__search_ashikhmin(w->local, luminance, window, f, scale, x, end);
+    else if (TONEMAP__HAS_SOFT && f->soft > 0) tonemap__search_soft(w->local, luminance, window, f, scale, x, end);
+    else tonemap__search_hard(w->local, luminance, window, f, scale, x, end);
     w->stats.searched += (size_t)(end - x);
 }
 
@@ -1680,10 +1532,9 @@ static inline float tonemap__sobel(const float *above, const float *row, const f
 
 static inline void tonemap__sobel_row(float *out, const float *above, const float *row, const float *below, int width)
 {
-    int x = 1;
-    out[0] = tonemap__sobel(above, row, below, 0, 0, width > 1);
-#ifdef SAT__VECTOR
-    for (; x + 5 <= width; x += 4) {
+    int x;
+    out[0] = tonemap__sobel(above, row, below, 0, 0, 1);
+    for (x = 1; x < width; x += 4) {
         sat__f32x4 a0 = sat__f32x4_load(above + x - 1), a1 = sat__f32x4_load(above + x),
                    a2 = sat__f32x4_load(above + x + 1);
         sat__f32x4 b0 = sat__f32x4_load(below + x - 1), b1 = sat__f32x4_load(below + x),
@@ -1695,8 +1546,6 @@ static inline void tonemap__sobel_row(float *out, const float *above, const floa
                                        sat__f32x4_add(sat__f32x4_add(a0, sat__f32x4_mul(two, a1)), a2));
         sat__f32x4_store(out + x, sat__f32x4_add(sat__f32x4_mul(gx, gx), sat__f32x4_mul(gy, gy)));
     }
-#endif
-    for (; x < width; x++) out[x] = tonemap__sobel(above, row, below, x - 1, x, sat__min_int(x + 1, width - 1));
 }
 
 /* ---- >> guided filter: the guided filter (He 2013, eq 5, 6 and 8 with the picture as its own guide), on q = log2 of
@@ -1719,20 +1568,12 @@ static inline uint32_t *tonemap__guided_ring(const tonemap *map, const tonemap__
 static inline void tonemap__steps_row(float *out, const tonemap *map, int j)
 {
     const float *luminance = map->luminance + (size_t)j * (size_t)map->row;
-    float scale = map->frame.scale, darkest = 1 / 1024.0f;
-    int x = 0, last;
-#ifdef SAT__VECTOR
     sat__f32x4 offset = sat__f32x4_set1(TONEMAP__OCTAVES), steps = sat__f32x4_set1(TONEMAP__STEPS);
-    for (; x + 4 <= map->row; x += 4) {
-        sat__f32x4 v = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale));
-        v = sat__f32x4_max(sat__f32x4_min(v, sat__f32x4_set1(TONEMAP__LOCAL_CAP)), sat__f32x4_set1(darkest));
+    int x, last;
+    for (x = 0; x < map->row; x += 4) {
+        sat__f32x4 v = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(map->frame.scale));
+        v = sat__f32x4_max(sat__f32x4_min(v, sat__f32x4_set1(TONEMAP__LOCAL_CAP)), sat__f32x4_set1(1 / 1024.0f));
         sat__f32x4_store(out + x, sat__f32x4_mul(sat__f32x4_add(tonemap__log2_4(v), offset), steps));
-    }
-#endif
-    for (; x < map->row; x++) {
-        float v = luminance[x] * scale;
-        v = v < TONEMAP__LOCAL_CAP ? v : TONEMAP__LOCAL_CAP;
-        out[x] = (sat__log2(v > darkest ? v : darkest) + TONEMAP__OCTAVES) * TONEMAP__STEPS;
     }
     if (!map->row_unusable[j]) return;
     for (last = 0; last < map->width && sat__float_bits(luminance[last]) == TONEMAP__UNUSABLE; last++) {}
@@ -1747,10 +1588,9 @@ static inline void tonemap__steps_row(float *out, const tonemap *map, int j)
 static inline void tonemap__move_steps(uint32_t *sum, uint32_t *square, const float *enters, const float *leaves,
                                        int width)
 {
-    int x = 0;
-#ifdef SAT__VECTOR
     int32_t *s = (int32_t *)(void *)sum, *s2 = (int32_t *)(void *)square;
-    for (; x + 4 <= width; x += 4) {
+    int x;
+    for (x = 0; x < width; x += 4) {
         sat__i32x4 q = sat__f32x4_truncate(sat__f32x4_load(enters + x)),
                    old = sat__f32x4_truncate(sat__f32x4_load(leaves + x));
         sat__f32x4 v = sat__i32x4_to_f32(q), v_old = sat__i32x4_to_f32(old); /* squares below 2^24 are exact */
@@ -1758,25 +1598,16 @@ static inline void tonemap__move_steps(uint32_t *sum, uint32_t *square, const fl
         sat__i32x4_store(s + x, sat__i32x4_add(sat__i32x4_load(s + x), sat__i32x4_sub(q, old)));
         sat__i32x4_store(s2 + x, sat__i32x4_add(sat__i32x4_load(s2 + x), sat__f32x4_truncate(v)));
     }
-#endif
-    for (; x < width; x++) {
-        uint32_t q = (uint32_t)(int32_t)enters[x], old = (uint32_t)(int32_t)leaves[x];
-        sum[x] += q - old;
-        square[x] += q * q - old * old;
-    }
 }
 
 static inline void tonemap__move_sums(uint32_t *sum, const uint32_t *enters, const uint32_t *leaves, int width)
 {
-    int x = 0;
-#ifdef SAT__VECTOR
     int32_t *s = (int32_t *)(void *)sum;
     const int32_t *in = (const int32_t *)(const void *)enters, *out = (const int32_t *)(const void *)leaves;
-    for (; x + 4 <= width; x += 4)
+    int x;
+    for (x = 0; x < width; x += 4)
         sat__i32x4_store(s + x, sat__i32x4_add(sat__i32x4_load(s + x),
                                                sat__i32x4_sub(sat__i32x4_load(in + x), sat__i32x4_load(out + x))));
-#endif
-    for (; x < width; x++) sum[x] += enters[x] - leaves[x];
 }
 
 /* Sums along two rows: entry x is what lies left of x, so that a box is a difference. Before the row stand zeros,
@@ -1804,10 +1635,9 @@ static inline void tonemap__add_along(uint32_t *sum0, uint32_t *sum1, const uint
 static inline void tonemap__guided_fit(uint32_t *a, uint32_t *b, const uint32_t *sum, const uint32_t *square, int x,
                                        int end, float inverse, float edge2)
 {
-    int r = TONEMAP__RADIUS;
-#ifdef SAT__VECTOR
     const int32_t *s = (const int32_t *)(const void *)sum, *s2 = (const int32_t *)(const void *)square;
-    for (; x + 4 <= end; x += 4) {
+    int r = TONEMAP__RADIUS;
+    for (; x < end; x += 4) {
         sat__f32x4 i = sat__f32x4_set1(inverse), half = sat__f32x4_set1(0.5f), share, mean, var;
         mean = sat__f32x4_mul(
             sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_load(s + x + r + 1), sat__i32x4_load(s + x - r))), i);
@@ -1821,15 +1651,6 @@ static inline void tonemap__guided_fit(uint32_t *a, uint32_t *b, const uint32_t 
         sat__i32x4_store((int32_t *)(void *)(b + x),
                          sat__f32x4_truncate(sat__f32x4_mul(mean, sat__f32x4_set1(1024.0f))));
     }
-#endif
-    for (; x < end; x++) {
-        float mean = (float)(int32_t)(sum[x + r + 1] - sum[x - r]) * inverse;
-        float var = (float)(int32_t)(square[x + r + 1] - square[x - r]) * inverse - mean * mean, share;
-        var = var > 0 ? var : 0;
-        share = var / (var + edge2);
-        a[x] = (uint32_t)(int32_t)(share * 1048576.0f);
-        b[x] = (uint32_t)(int32_t)((mean + 0.5f) * (1 - share) * 1024.0f);
-    }
 }
 
 static inline void tonemap__guided_local(float *local, const float *steps, const uint32_t *a, const uint32_t *b, int x,
@@ -1837,20 +1658,13 @@ static inline void tonemap__guided_local(float *local, const float *steps, const
 {
     int r = TONEMAP__RADIUS;
     float share = inverse / (1048576.0f * TONEMAP__STEPS), base = inverse / (1024.0f * TONEMAP__STEPS);
-#ifdef SAT__VECTOR
     const int32_t *sa = (const int32_t *)(const void *)a, *sb = (const int32_t *)(const void *)b;
-    for (; x + 4 <= end; x += 4) {
+    for (; x < end; x += 4) {
         sat__f32x4 va = sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_load(sa + x + r + 1), sat__i32x4_load(sa + x - r)));
         sat__f32x4 vb = sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_load(sb + x + r + 1), sat__i32x4_load(sb + x - r)));
         va = sat__f32x4_mul(sat__f32x4_mul(va, sat__f32x4_set1(share)), sat__f32x4_load(steps + x));
         vb = sat__f32x4_sub(sat__f32x4_mul(vb, sat__f32x4_set1(base)), sat__f32x4_set1(TONEMAP__OCTAVES));
         sat__f32x4_store(local + x, tonemap__exp2_4(sat__f32x4_add(va, vb)));
-    }
-#endif
-    for (; x < end; x++) {
-        float va = (float)(int32_t)(a[x + r + 1] - a[x - r]) * share * steps[x];
-        float vb = (float)(int32_t)(b[x + r + 1] - b[x - r]) * base - TONEMAP__OCTAVES;
-        local[x] = tonemap__exp2(va + vb);
     }
 }
 
@@ -1927,43 +1741,33 @@ static inline void tonemap__guided_local_row(const tonemap *map, tonemap__worker
    search. */
 static inline void tonemap__own_luminance(float *local, const float *luminance, float scale, float cap, int x, int end)
 {
-#ifdef SAT__VECTOR
-    for (; x + 4 <= end; x += 4) {
+    for (; x < end; x += 4) {
         sat__f32x4 own = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale));
         sat__f32x4_store(local + x, sat__f32x4_min(own, sat__f32x4_set1(cap)));
     }
-#endif
-    for (; x < end; x++) local[x] = luminance[x] * scale < cap ? luminance[x] * scale : cap;
 }
 
 /* Some squared gradient of [x, end) is above the threshold. */
 static inline int tonemap__has_edge(const float *edge, float threshold, int x, int end)
 {
-#ifdef SAT__VECTOR
     sat__i32x4 above = sat__i32x4_set1(0);
-    for (; x + 4 <= end; x += 4)
-        above = sat__i32x4_or(above, sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x)));
-    if (sat__i32x4_any(above)) return 1;
-#endif
-    for (; x < end; x++)
-        if (edge[x] > threshold) return 1;
-    return 0;
+    for (; x < end; x += 4)
+        above = sat__i32x4_or(above,
+                              sat__i32x4_and(tonemap__inside4(x, end),
+                                             sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x))));
+    return sat__i32x4_any(above);
 }
 
 /* Where it is not, the pixel stands for itself. */
 static inline void tonemap__reset_flat(float *local, const float *luminance, const float *edge, float threshold,
                                        float scale, float cap, int x, int end)
 {
-#ifdef SAT__VECTOR
-    for (; x + 4 <= end; x += 4) {
+    for (; x < end; x += 4) {
         sat__i32x4 above = sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x));
         sat__f32x4 own = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale)),
                                         sat__f32x4_set1(cap));
         sat__f32x4_store(local + x, sat__f32x4_select(above, sat__f32x4_load(local + x), own));
     }
-#endif
-    for (; x < end; x++)
-        if (!(edge[x] > threshold)) local[x] = luminance[x] * scale < cap ? luminance[x] * scale : cap;
 }
 
 static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const float *luminance,
@@ -2012,39 +1816,11 @@ static inline void tonemap__local_row(tonemap *map, tonemap__worker *w, int y, i
    luminance as the white of Lab (which makes the result independent of exposure) q = X / (Xn Y), a > 0 means q > 1, and
    X' = Xn Y (1 + rho (cbrt q - 1))^3: one cube root in place of two conversions. */
 
-static inline float tonemap__cbrt(float q)
-{
-    float y = sat__float_from_bits((uint32_t)(int32_t)((float)(int32_t)sat__float_bits(q) * (1 / 3.0f)) + 0x2a514067u),
-          y3 = y * y * y;
-    return y * ((y3 + 2 * q) / (2 * y3 + q)); /* Halley; error below 3e-5 */
-}
-
-/* cbrt(q) - 1 for q > 1: a polynomial within 7e-5 up to 2.65, beyond the bluest colour of Rec. 709. */
-static inline float tonemap__root(float q)
-{
-    float v = q - 1;
-    if (q > 2.65f) return tonemap__cbrt(q) - 1;
-    return v * (0.331779718f + v * (-0.0999134065f + v * (0.0339404425f + v * -0.00595350893f)));
-}
-
-static inline void tonemap__shift_red_plain(float *v, float luminance, float rho, const tonemap__colours *f)
-{
-    float x = f->red_x[0] * v[0] + f->red_x[1] * v[1] + f->red_x[2] * v[2], y = 0.95047f * luminance, q, c, dx;
-    int i;
-    if (!(x > y && rho < 1)) return;
-    q = x / y;
-    q = q < 1048576 ? q : 1048576;
-    c = 1 + rho * tonemap__root(q);
-    dx = c * c * c * y - q * y;
-    for (i = 0; i < 3; i++) v[i] += f->red_step[i] * dx;
-}
-
 static inline void tonemap__rho_row(float *rho, const float *local, float lux, int end)
 {
-    int x = 0;
-#ifdef SAT__VECTOR
+    int x;
     sat__f32x4 one = sat__f32x4_set1(1), ten = sat__f32x4_set1(10), least = sat__f32x4_set1(TONEMAP__RHO_LOW);
-    for (; x + 4 <= end; x += 4) {
+    for (x = 0; x < end; x += 4) {
         sat__f32x4 i = sat__f32x4_max(sat__f32x4_mul(sat__f32x4_load(local + x), sat__f32x4_set1(lux)), least), t, u, q;
         sat__i32x4 bits = sat__f32x4_bits(i), dim = sat__f32x4_less(i, ten);
         if (!sat__i32x4_any(dim)) {
@@ -2066,11 +1842,9 @@ static inline void tonemap__rho_row(float *rho, const float *local, float lux, i
         q = sat__f32x4_add(one, sat__f32x4_mul(sat__f32x4_sub(u, one), q));
         sat__f32x4_store(rho + x, sat__f32x4_select(dim, q, one));
     }
-#endif
-    for (; x < end; x++) rho[x] = tonemap__rho(local[x] * lux);
 }
 
-#ifdef SAT__VECTOR
+/* Halley; error below 3e-5 */
 static inline sat__f32x4 tonemap__cbrt4(sat__f32x4 q)
 {
     sat__i32x4 third =
@@ -2082,6 +1856,7 @@ static inline sat__f32x4 tonemap__cbrt4(sat__f32x4 q)
         y, sat__f32x4_div(sat__f32x4_add(y3, sat__f32x4_mul(two, q)), sat__f32x4_add(sat__f32x4_mul(two, y3), q)));
 }
 
+/* cbrt(q) - 1 for q > 1: a polynomial within 7e-5 up to 2.65, beyond the bluest colour of Rec. 709. */
 static inline sat__f32x4 tonemap__root4(sat__f32x4 q)
 {
     sat__f32x4 v = sat__f32x4_sub(q, sat__f32x4_set1(1)), p;
@@ -2111,7 +1886,6 @@ static inline void tonemap__shift_red4(sat__f32x4 *v, sat__f32x4 luminance, sat_
     dx = sat__f32x4_from_bits(sat__i32x4_and(red, sat__f32x4_bits(dx)));
     for (i = 0; i < 3; i++) v[i] = sat__f32x4_add(v[i], sat__f32x4_mul(sat__f32x4_set1(f->red_step[i]), dx));
 }
-#endif
 
 /* ---- >> display values: the factor from input to display, Ld / L: multiplying R, G and B by it is what replacing Y in
    Yxy does */
@@ -2122,13 +1896,12 @@ static inline void tonemap__shift_red4(sat__f32x4 *v, sat__f32x4 luminance, sat_
 static inline void tonemap__gain_photographic(float *gain, const float *local, const float *luminance,
                                               const tonemap__frame *f, int end)
 {
-    int x = 0;
-    float most = 1.1529215e18f; /* 2^60: larger scaled luminances are white too, and infinity times 0 is no number */
-#ifdef SAT__VECTOR
+    const float most = 1.1529215e18f; /* 2^60: larger scaled luminances are white too; infinity times 0 is no number */
     sat__f32x4 one = sat__f32x4_set1(1), zero = sat__f32x4_set1(0), scale = sat__f32x4_set1(f->scale),
                burn = sat__f32x4_set1(f->inverse_white2);
     sat__f32x4 inverse_cap = sat__f32x4_set1(f->inverse_cap), peak = sat__f32x4_set1(f->peak);
-    for (; x + 4 <= end; x += 4) {
+    int x;
+    for (x = 0; x < end; x += 4) {
         sat__f32x4 y = sat__f32x4_load(luminance + x),
                    lr = sat__f32x4_min(sat__f32x4_mul(y, scale), sat__f32x4_set1(most));
         sat__f32x4 v = sat__f32x4_mul(scale, sat__f32x4_add(one, sat__f32x4_mul(lr, burn)));
@@ -2136,24 +1909,8 @@ static inline void tonemap__gain_photographic(float *gain, const float *local, c
         v = sat__f32x4_div(v, sat__f32x4_add(peak, sat__f32x4_mul(sat__f32x4_load(local + x), lr)));
         sat__f32x4_store(gain + x, sat__f32x4_select(sat__f32x4_less(zero, y), v, zero));
     }
-#endif
-    for (; x < end; x++) {
-        float lr = luminance[x] * f->scale, beyond;
-        lr = lr < most ? lr : most;
-        beyond = lr * f->inverse_cap > 1 ? lr * f->inverse_cap : 1;
-        gain[x] = luminance[x] > 0 ? f->scale * (1 + lr * f->inverse_white2) / (f->peak + local[x] * beyond) : 0;
-    }
 }
 
-/* Ld = TM(La) L / La; a flat picture gets the key. */
-static inline float tonemap__ashikhmin_gain(float local, float luminance, const tonemap__frame *f, float key)
-{
-    float la = local > TONEMAP__DARKEST ? local : TONEMAP__DARKEST;
-    float display = f->curve_factor > 0 ? (tonemap__capacity(la * f->cd) - f->curve_low) * f->curve_factor : key;
-    return luminance > 0 && display > 0 ? display * f->scale / la : 0;
-}
-
-#ifdef SAT__VECTOR
 static inline sat__f32x4 tonemap__capacity4(sat__f32x4 cd)
 {
     sat__f32x4 ln = sat__f32x4_mul(sat__f32x4_set1(0.693147181f),
@@ -2167,25 +1924,23 @@ static inline sat__f32x4 tonemap__capacity4(sat__f32x4 cd)
     c4 = sat__f32x4_select(sat__f32x4_less(cd, sat__f32x4_set1(1)), c2, c4);
     return sat__f32x4_select(sat__f32x4_less(cd, sat__f32x4_set1(0.0034f)), c1, c4);
 }
-#endif
 
+/* Ld = TM(La) L / La; a flat picture gets the key. */
 static inline void tonemap__gain_ashikhmin(float *gain, const float *local, const float *luminance,
                                            const tonemap__frame *f, float key, int end)
 {
-    int x = 0;
-#ifdef SAT__VECTOR
     sat__f32x4 zero = sat__f32x4_set1(0), scale = sat__f32x4_set1(f->scale), low = sat__f32x4_set1(f->curve_low),
-               factor = sat__f32x4_set1(f->curve_factor);
-    for (; f->curve_factor > 0 && x + 4 <= end; x += 4) {
+               factor = sat__f32x4_set1(f->curve_factor), display = sat__f32x4_set1(key);
+    int x;
+    for (x = 0; x < end; x += 4) {
         sat__f32x4 la = sat__f32x4_max(sat__f32x4_load(local + x), sat__f32x4_set1(TONEMAP__DARKEST));
-        sat__f32x4 display =
-            sat__f32x4_mul(sat__f32x4_sub(tonemap__capacity4(sat__f32x4_mul(la, sat__f32x4_set1(f->cd))), low), factor);
-        sat__i32x4 shown =
-            sat__i32x4_and(sat__f32x4_less(zero, sat__f32x4_load(luminance + x)), sat__f32x4_less(zero, display));
+        sat__i32x4 shown;
+        if (f->curve_factor > 0)
+            display = sat__f32x4_mul(
+                sat__f32x4_sub(tonemap__capacity4(sat__f32x4_mul(la, sat__f32x4_set1(f->cd))), low), factor);
+        shown = sat__i32x4_and(sat__f32x4_less(zero, sat__f32x4_load(luminance + x)), sat__f32x4_less(zero, display));
         sat__f32x4_store(gain + x, sat__f32x4_select(shown, sat__f32x4_div(sat__f32x4_mul(display, scale), la), zero));
     }
-#endif
-    for (; x < end; x++) gain[x] = tonemap__ashikhmin_gain(local[x], luminance[x], f, key);
 }
 
 static inline void tonemap__gain_row(tonemap *map, tonemap__worker *w, int y)
@@ -2211,24 +1966,6 @@ typedef float tonemap__planes[3][TONEMAP__CHUNK];
    cyan. */
 #define TONEMAP__GAMUT_TOP 5.7646075e17f /* 2^59 */
 
-static inline void tonemap__gamut_plain(float *v, float top, float grey, float gamut, float floor)
-{
-    float dim, share;
-    int c;
-    top = top < TONEMAP__GAMUT_TOP ? top : TONEMAP__GAMUT_TOP;
-    dim = tonemap__exp2(-gamut * sat__log2(top));
-    grey = (grey < 1 ? grey : 1) * dim;
-    share = top * dim - grey;
-    share = (1 - grey) / (share > 1e-20f ? share : 1e-20f);
-    share = share < 1 ? share : 1;
-    for (c = 0; c < 3; c++) {
-        float d = (v[c] < TONEMAP__GAMUT_TOP ? v[c] : TONEMAP__GAMUT_TOP) * dim;
-        d = grey + (d - grey) * share;
-        v[c] = d > floor ? d : floor;
-    }
-}
-
-#ifdef SAT__VECTOR
 static inline void tonemap__gamut4(sat__f32x4 *v, sat__f32x4 top, sat__f32x4 grey, float gamut, sat__f32x4 least)
 {
     sat__f32x4 one = sat__f32x4_set1(1), highest = sat__f32x4_set1(TONEMAP__GAMUT_TOP), tiny = sat__f32x4_set1(1e-20f),
@@ -2246,7 +1983,6 @@ static inline void tonemap__gamut4(sat__f32x4 *v, sat__f32x4 top, sat__f32x4 gre
         v[c] = sat__f32x4_select(over, d, v[c]);
     }
 }
-#endif
 
 /* What the pixels of a row become their display values by. rho is NULL where nothing is mesopic. */
 typedef struct tonemap__shading {
@@ -2258,44 +1994,6 @@ typedef struct tonemap__shading {
 } tonemap__shading;
 
 /* To the display's primaries. A colour beyond them has a negative component: it fades until it has none. */
-static inline void tonemap__mix_plain(float *v, float luminance, const float *mix)
-{
-    float out[3], lowest = 0, share;
-    int c;
-    for (c = 0; c < 3; c++) {
-        out[c] = mix[3 * c] * v[0] + mix[3 * c + 1] * v[1] + mix[3 * c + 2] * v[2];
-        lowest = out[c] < lowest ? out[c] : lowest;
-    }
-    share = luminance / (luminance - lowest);
-    for (c = 0; c < 3; c++) v[c] = lowest < 0 ? luminance + (out[c] - luminance) * share : out[c];
-}
-
-/* Pixels [x, x + n) times their gain, clipped to [floor, 1]. Comparisons are written so that NaN becomes the floor: it
-   comes from pixels that are black. */
-static inline void tonemap__shade_plain(tonemap__planes out, tonemap__shading *s, int x, int i, int n)
-{
-    for (; i < n; i++) {
-        const float *p = s->pixels + (size_t)(x + i) * (size_t)s->channels;
-        float v[3], top = 1, gain = s->gain[x + i];
-        int c;
-        v[0] = p[0];
-        v[1] = p[s->channels > 1 ? 1 : 0];
-        v[2] = p[s->channels > 1 ? 2 : 0];
-        if (s->colours->mixes && s->channels > 1) tonemap__mix_plain(v, s->luminance[x + i], s->colours->mix);
-        if (TONEMAP__HAS_MESOPIC && s->rho)
-            tonemap__shift_red_plain(v, s->luminance[x + i], s->rho[x + i], s->colours);
-        for (c = 0; c < 3; c++) {
-            float d = v[c] * gain;
-            v[c] = d > s->floor ? d : s->floor;
-            top = v[c] > top ? v[c] : top;
-        }
-        s->clamped += (size_t)(top > 1);
-        if (top > 1 && s->gamut >= 0) tonemap__gamut_plain(v, top, s->luminance[x + i] * gain, s->gamut, s->floor);
-        for (c = 0; c < 3; c++) out[c][i] = v[c] < s->most ? v[c] : s->most;
-    }
-}
-
-#ifdef SAT__VECTOR
 static inline void tonemap__mix4(sat__f32x4 *v, sat__f32x4 luminance, const float *mix)
 {
     sat__f32x4 out[3], zero = sat__f32x4_set1(0), lowest = zero, share;
@@ -2314,23 +2012,32 @@ static inline void tonemap__mix4(sat__f32x4 *v, sat__f32x4 luminance, const floa
             beyond, sat__f32x4_add(luminance, sat__f32x4_mul(sat__f32x4_sub(out[c], luminance), share)), out[c]);
 }
 
-static inline int tonemap__shade_vector(tonemap__planes out, tonemap__shading *s, int x, int n)
+/* Pixels [x, x + n) times their gain, clipped to [floor, most]. Minima and maxima are written so that NaN becomes the
+   floor: it comes from pixels that are black. The last few are copied first: behind them the picture may end. */
+static inline void tonemap__shade(tonemap__planes out, tonemap__shading *s, int x, int n)
 {
     sat__f32x4 one = sat__f32x4_set1(1), least = sat__f32x4_set1(s->floor), most = sat__f32x4_set1(s->most);
     sat__i32x4 over = sat__i32x4_set1(0);
+    size_t channels = (size_t)s->channels;
     int32_t count[4];
+    float last[16];
     int i, c;
-    for (i = 0; i + 4 <= n; i += 4) {
+    for (i = 0; i < n; i += 4) {
+        const float *pixels = s->pixels + (size_t)(x + i) * channels;
         sat__f32x4 v[3], top, gain = sat__f32x4_load(s->gain + x + i),
                               luminance = sat__f32x4_load(s->luminance + x + i);
         sat__i32x4 beyond;
-        tonemap__load_pixels(s->pixels + (size_t)(x + i) * (size_t)s->channels, s->channels, v, v + 1, v + 2);
+        if (i + 4 > n) {
+            memset(last, 0, sizeof last);
+            pixels = (const float *)memcpy(last, pixels, (size_t)(n - i) * channels * sizeof(float));
+        }
+        tonemap__load_pixels(pixels, s->channels, v, v + 1, v + 2);
         if (s->colours->mixes && s->channels > 1) tonemap__mix4(v, luminance, s->colours->mix);
         if (TONEMAP__HAS_MESOPIC && s->rho)
             tonemap__shift_red4(v, luminance, sat__f32x4_load(s->rho + x + i), s->colours);
         for (c = 0; c < 3; c++) v[c] = sat__f32x4_max(sat__f32x4_mul(v[c], gain), least);
         top = sat__f32x4_max(sat__f32x4_max(v[0], v[1]), v[2]);
-        beyond = sat__f32x4_less(one, top);
+        beyond = sat__i32x4_and(sat__f32x4_less(one, top), tonemap__inside4(i, n));
         over = sat__i32x4_sub(over, beyond);
         if (s->gamut >= 0 && sat__i32x4_any(beyond))
             tonemap__gamut4(v, top, sat__f32x4_mul(luminance, gain), s->gamut, least);
@@ -2338,9 +2045,7 @@ static inline int tonemap__shade_vector(tonemap__planes out, tonemap__shading *s
     }
     sat__i32x4_store(count, over);
     s->clamped += (size_t)(count[0] + count[1] + count[2] + count[3]);
-    return i;
 }
-#endif
 
 /* ---- curves of one pixel, as published, for red, green and blue in which the metered luminance is the key */
 
@@ -2366,25 +2071,19 @@ static inline void tonemap__mix_planes(tonemap__planes p, const float *m, int n)
 /* log2 of each, from 1e-9 on. */
 static inline void tonemap__log2_row(float *v, int n)
 {
-    int i = 0;
-#ifdef SAT__VECTOR
-    for (; i + 4 <= n; i += 4)
+    int i;
+    for (i = 0; i < n; i += 4)
         sat__f32x4_store(v + i, tonemap__log2_4(sat__f32x4_max(sat__f32x4_load(v + i), sat__f32x4_set1(1e-9f))));
-#endif
-    for (; i < n; i++) v[i] = sat__log2(v[i] > 1e-9f ? v[i] : 1e-9f);
 }
 
 static inline void tonemap__power_row(float *v, float power, int n)
 {
-    int i = 0;
+    int i;
     tonemap__log2_row(v, n);
-#ifdef SAT__VECTOR
-    for (; i + 4 <= n; i += 4)
+    for (i = 0; i < n; i += 4)
         sat__f32x4_store(v + i,
                          tonemap__exp2_4(sat__f32x4_max(sat__f32x4_mul(sat__f32x4_load(v + i), sat__f32x4_set1(power)),
                                                         sat__f32x4_set1(-59))));
-#endif
-    for (; i < n; i++) v[i] = tonemap__exp2(v[i] * power > -59 ? v[i] * power : -59);
 }
 
 /* Khronos 2024, "PBR Neutral tone mapper": a toe that takes off the reflection of 4 %, colours as they are up to 0.76,
@@ -2610,12 +2309,7 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
         size_t at = (size_t)x * (size_t)channels;
         float *as_float = (float *)(void *)row + at;
         n = sat__min_int(TONEMAP__CHUNK, map->width - x);
-#ifdef SAT__VECTOR
-        i = tonemap__shade_vector(v, &shading, x, n);
-#else
-        i = 0;
-#endif
-        tonemap__shade_plain(v, &shading, x, i, n);
+        tonemap__shade(v, &shading, x, n);
         if (curve) tonemap__curve_planes(v, map->options.operation, shading.floor, 1 / map->frame.peak, n);
         if (channels == 4) /* alpha: before the colours, which may overwrite the input */
             for (i = 0; i < n; i++) {

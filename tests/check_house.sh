@@ -161,6 +161,18 @@ check_contents() {
         }' "$lib.h")"
 }
 
+# what vectors and plain C give are the same bits
+check_same_bits() {
+    local vectors plain o=build/check/house/$lib/same_bits
+    case $lib in sat | tonemap) ;; *) return ;; esac
+    mkdir -p "${o%/*}"
+    for how in "" -DSAT_NO_SIMD; do
+        ${CC:-cc} -std=c99 -O2 $WARN_C -I. $how -DSAME_BITS_${lib^^} tests/same_bits.c -o "$o$how" -lm || { fail "tests/same_bits.c"; return; }
+    done
+    vectors=$("$o") plain=$("$o-DSAT_NO_SIMD")
+    if [ -n "$plain" ] && [ "$vectors" = "$plain" ]; then pass; else fail "vectors and plain C give other bits" "$vectors"$'\n'"$plain"; fi
+}
+
 # every public function, each argument NULL or zero in turn
 check_null() {
     dir=build/check/house/null; rm -rf "$dir"; mkdir -p "$dir"
@@ -182,4 +194,5 @@ check_comments
 check_shape
 check_snippets
 check_contents
+check_same_bits
 finish

@@ -317,7 +317,6 @@ TEST(local_operator_on_small_and_thin_pictures)
 }
 TEST(local_operator_with_a_strict_threshold) { check_local(100, 70, 8, 0.0025); }
 
-#ifdef SAT__VECTOR
 /* ---- the guided filter */
 
 static void check_guided(int width, int height, double edge)
@@ -389,11 +388,11 @@ TEST(guided_operator_on_small_and_thin_pictures)
     for (i = 0; i < 10; ++i) check_guided(sizes[i][0], sizes[i][1], 0.45);
 }
 
-/* Four pixels at a time give the bits of one at a time. */
-TEST(vector_and_plain_code_give_the_same_bits)
+/* Where the groups of pixels begin and end changes no bit. (Vectors against plain C: tests/same_bits.c.) */
+TEST(pixels_do_not_depend_on_their_group)
 {
     enum { W = 203, H = 60 };
-    float *pixels = room_pixels(W, H, 3), *local = (float *)calloc(512, sizeof(float));
+    float *pixels = room_pixels(W, H, 3), *whole = (float *)calloc(512, sizeof(float));
     sat_image view = sat_image_f32(pixels, W, H, 3);
     unsigned char *out = (unsigned char *)malloc(W * H * 3);
     tonemap *map = NULL;
@@ -416,48 +415,53 @@ TEST(vector_and_plain_code_give_the_same_bits)
             for (j = y == 0 ? 0 : y + map->frame.reach; j < H && j <= y + map->frame.reach; ++j)
                 tonemap__add_ring_row(map, w, j);
             tonemap__open_window(&window, map, w, y);
-            scale[0][0] = W;
-            if (kind == 0) tonemap__search_vector(w->local, luminance, &window, &map->frame, scale[0], 0, W);
-            if (kind == 1) tonemap__search_soft_vector(w->local, luminance, &window, &map->frame, scale[0], 0, W);
-            if (kind == 2) tonemap__search_ashikhmin_vector(w->local, luminance, &window, &map->frame, scale[0], 0, W);
-            if (kind == 0) tonemap__search_plain(local, luminance, &window, &map->frame, scale[1], 0, W);
-            if (kind == 1) tonemap__search_soft_plain(local, luminance, &window, &map->frame, scale[1], 0, W);
-            if (kind == 2) tonemap__search_ashikhmin_plain(local, luminance, &window, &map->frame, scale[1], 0, W);
-            differ += memcmp(local, w->local, W * sizeof(float)) != 0;
+            for (j = 0; j < 2; ++j) /* the row at once, and pixel for pixel */
+                for (x = 0; x < W; x += j ? 1 : W) {
+                    int end = j ? x + 1 : W;
+                    scale[j][0] += (size_t)(end - x);
+                    if (kind == 0) tonemap__search_hard(w->local, luminance, &window, &map->frame, scale[j], x, end);
+                    if (kind == 1) tonemap__search_soft(w->local, luminance, &window, &map->frame, scale[j], x, end);
+                    if (kind == 2)
+                        tonemap__search_ashikhmin(w->local, luminance, &window, &map->frame, scale[j], x, end);
+                    if (!j) memcpy(whole, w->local, W * sizeof(float));
+                }
+            differ += memcmp(whole, w->local, W * sizeof(float)) != 0;
             differ += memcmp(scale[0], scale[1], sizeof scale[0]) != 0;
         }
         tonemap_destroy(map);
     }
     EXPECT_EQ(differ, 0);
     for (x = 0; x < 4000; ++x) {
-        float v = (float)exp2(-90 + 0.045 * x), a[4], b[4];
+        float v = (float)exp2(-90 + 0.045 * x), a[4], b[4], light[4];
         sat__f32x4_store(a, tonemap__log2_4(sat__f32x4_set1(v)));
         differ += a[2] != sat__log2(v);
         sat__f32x4_store(a, tonemap__exp2_4(sat__f32x4_set1(-50 + 0.025f * (float)x)));
         differ += a[1] != tonemap__exp2(-50 + 0.025f * (float)x);
         sat__f32x4_store(b, tonemap__cbrt4(sat__f32x4_set1(v)));
-        differ += b[3] != tonemap__cbrt(v);
         sat__f32x4_store(a, tonemap__capacity4(sat__f32x4_set1(v)));
         differ += a[0] != tonemap__capacity(v);
+        sat__f32x4_store(light, sat__f32x4_set1(v));
+        tonemap__rho_row(a, light, 1, 1);
+        differ += a[0] != tonemap__rho(v);
         EXPECT_NEAR(sat__log2(v), -90 + 0.045 * x, 1e-5);
         EXPECT_REL(tonemap__exp2(-50 + 0.025f * (float)x), exp2((double)(-50 + 0.025f * (float)x)), 1e-5);
-        if (v > 1 && v < 1e6f) EXPECT_REL(tonemap__cbrt(v), cbrt((double)v), 5e-5);
+        if (v > 1 && v < 1e6f) EXPECT_REL(b[3], cbrt((double)v), 5e-5);
     }
     EXPECT_EQ(differ, 0);
     free(out);
-    free(local);
+    free(whole);
     free(pixels);
 }
 
-/* One pixel is fewer than a vector: the guided filter and the colours, in ones and in rows. */
-TEST(vector_and_plain_colours_give_the_same_bits)
+/* The same of the guided filter and the colours. */
+TEST(colours_do_not_depend_on_their_group)
 {
     enum { W = 61, H = 40 };
-    float *pixels = room_pixels(W, H, 3), gain[W], rho[W];
+    float *pixels = room_pixels(W, H, 3), gain[W + 3], rho[W + 3];
     sat_image view = sat_image_f32(pixels, W, H, 3);
     unsigned char *out = (unsigned char *)malloc(W * H * 3);
-    uint32_t a[2][W], b[2][W];
-    float local[2][W];
+    uint32_t a[2][W + 3], b[2][W + 3];
+    float local[2][W + 3];
     int kind, x, y, differ = 0;
     for (kind = 0; kind < 4; ++kind) {
         tonemap_options o = tonemap_defaults();
@@ -473,7 +477,7 @@ TEST(vector_and_plain_colours_give_the_same_bits)
             tonemap__planes v[2];
             tonemap__worker *w = &map->worker[0];
             uint32_t *sum = tonemap__guided_ring(map, w, 3, 0), *square = tonemap__guided_ring(map, w, 3, 1);
-            float inverse = 1 / 441.0f, steps[W];
+            float inverse = 1 / 441.0f, steps[W + 3];
             memset(&shading, 0, sizeof shading);
             memset(v, 0, sizeof v);
             shading.pixels = pixels + 3 * y * W;
@@ -485,15 +489,18 @@ TEST(vector_and_plain_colours_give_the_same_bits)
             shading.floor = kind == 1 ? TONEMAP__CODE_FLOOR : 0;
             shading.most = kind == 3 ? 1e9f : 1;
             shading.gamut = kind == 3 ? -1 : map->frame.gamut;
-            for (x = 0; x < W; ++x) {
+            for (x = 0; x < W + 3; ++x) {
                 gain[x] = 0.1f + (float)(x % 7);
                 rho[x] = (float)(x % 5) / 4;
                 steps[x] = (float)(x * y % 1153);
             }
-            tonemap__shade_plain(v[0], &shading, 0, tonemap__shade_vector(v[0], &shading, 0, W), W);
-            tonemap__shade_plain(v[1], &shading, 0, 0, W);
-            differ += memcmp(v[0], v[1], sizeof v[0]) != 0;
-            for (x = -TONEMAP__RADIUS; x < W + TONEMAP__RADIUS + 1; ++x) {
+            tonemap__shade(v[0], &shading, 0, W);
+            for (x = 0; x < W; ++x) {
+                int c;
+                tonemap__shade(v[1], &shading, x, 1);
+                for (c = 0; c < 3; ++c) differ += memcmp(&v[0][c][x], &v[1][c][0], sizeof(float)) != 0;
+            }
+            for (x = -TONEMAP__RADIUS; x < W + TONEMAP__RADIUS + 4; ++x) {
                 sum[x] = (uint32_t)(x + 10) * 5000u;
                 square[x] = (uint32_t)(x + 10) * 3000000u + (uint32_t)(x * x * 70 * y);
             }
@@ -503,8 +510,8 @@ TEST(vector_and_plain_colours_give_the_same_bits)
                 tonemap__guided_fit(a[1], b[1], sum, square, x, x + 1, inverse, map->frame.edge2);
                 tonemap__guided_local(local[1], steps, sum, square, x, x + 1, inverse * 1e-3f);
             }
-            differ += memcmp(a[0], a[1], sizeof a[0]) != 0 || memcmp(b[0], b[1], sizeof b[0]) != 0;
-            differ += memcmp(local[0], local[1], sizeof local[0]) != 0;
+            differ += memcmp(a[0], a[1], W * sizeof a[0][0]) != 0 || memcmp(b[0], b[1], W * sizeof b[0][0]) != 0;
+            differ += memcmp(local[0], local[1], W * sizeof local[0][0]) != 0;
         }
         tonemap_destroy(map);
     }
@@ -512,7 +519,6 @@ TEST(vector_and_plain_colours_give_the_same_bits)
     free(out);
     free(pixels);
 }
-#endif
 
 TEST(same_bits_for_any_number_of_workers)
 {
