@@ -122,6 +122,7 @@
    >> environment   the octahedral picture, its mips, the far drops' prefilter
    >> rainbows      geometrical optics and Airy's theory
    >> rain          sizes, speeds, the drag step, the box
+   >> lamps         their light through drops; drops that oscillate
    >> picture       camera, culling, sorting
    >> drawing       rays in batches, far drops, streaks, depth of field
    >> sprites       the published sprites; bands and whole pictures, background, veil
@@ -278,6 +279,8 @@ typedef struct raindrop_environment_options {
     float sun_direction[3];       /* 0, 1, 0: a unit vector towards the sun, which lights the bows */
     float sun_irradiance[3];      /* 1, 1, 1 */
     float bow_optical_depth;      /* 0; 0..10; 0: no bows; share of the sun's light that the rain in view scatters */
+    int far_swing;                /* 0; 0..1; 1: the prefilter knows how the light of far drops swings with their shape,
+                                     which raindrop_render_options.oscillation shows; takes 3 times as long to make */
     int bow_by_depth;             /* 0; 0..1; 1: raindrop_veil shows the bows, as bright as there is rain before what
                                      stands there; 43 KB */
     double bow_drop_mm;           /* 0; 0.05..6; or 0: geometrical optics; otherwise Airy's theory for drops of this
@@ -415,6 +418,18 @@ typedef enum raindrop_look {
     RAINDROP_LOOK_AUTO    /* far drops as one lookup in the prefiltered environment, near ones as rays */
 } raindrop_look;
 
+/* A lamp of the scene: a small ball of light, all around or in a cone. It lights the drops and is not drawn itself.
+   What stands between it and the drops casts no shadow. */
+typedef struct raindrop_lamp {
+    float position[3];  /* 0, 0, 0: metres */
+    float intensity[3]; /* 1, 1, 1: radiance of the ball times pi radius^2, in the environment's unit and metres */
+    float radius;       /* 0.1; 0..1e18; of the ball, in metres */
+    float direction[3]; /* 0, -1, 0: a unit vector, the axis of the cone */
+    float inner, outer; /* 3.1415927; 0..3.1416; radians from the axis: up to inner its full light, from outer on none */
+} raindrop_lamp;
+RAINDROP_DEF raindrop_lamp raindrop_lamp_defaults(void);
+RAINDROP_DEF const char *raindrop_explain_lamp(char *text, size_t size, const raindrop_lamp *lamp);
+
 typedef struct raindrop_render_options {
     raindrop_look look;        /* RAINDROP_LOOK_AUTO */
     const raindrop_map *map;   /* NULL; needed by RAINDROP_LOOK_MAP */
@@ -428,6 +443,10 @@ typedef struct raindrop_render_options {
     int sort;                  /* 1; 0..1; raindrop_render: 1: far to near; 0: in the array's order, as published */
     int slices;                /* 1; 1..64; raindrop_gl_render: slices of depth, thinner the nearer, drawn from far to
                                   near, each in the array's order; all vertices run once a slice */
+    float oscillation;         /* 0; 0..0.25; RAY and AUTO: share by which the axes of drops from 1.2 mm on swing (none
+                                  below 0.8 mm), so that near drops wobble and streaks speckle; 0.1 is much */
+    const raindrop_lamp *lamps; /* NULL; read by the call: RAY and AUTO draw their glints */
+    int lamp_count;            /* 0; 0..16 */
 } raindrop_render_options;
 RAINDROP_DEF raindrop_render_options raindrop_render_defaults(void);
 
@@ -766,6 +785,7 @@ static const sat__field raindrop__environment_fields[] = {
     SAT__FIELD(raindrop_environment_options, 'i', decode_srgb, 0, 0, 1, ' '),
     SAT__FIELD(raindrop_environment_options, 'f', max_radiance, 0, 0, 1e38, ' '),
     SAT__FIELD(raindrop_environment_options, 'f', bow_optical_depth, 0, 0, 10, ' '),
+    SAT__FIELD(raindrop_environment_options, 'i', far_swing, 0, 0, 1, ' '),
     SAT__FIELD(raindrop_environment_options, 'i', bow_by_depth, 0, 0, 1, ' '),
     SAT__FIELD(raindrop_environment_options, 'd', bow_drop_mm, 0, 0.05, 6, '0'),
     SAT__FIELD(raindrop_environment_options, 'a', allocator, 0, 0, 0, ' '),
@@ -922,7 +942,43 @@ static const sat__field raindrop__render_fields[] = {
     SAT__FIELD(raindrop_render_options, 'f', orders_radius, 8, 0, 1e18, ' '),
     SAT__FIELD(raindrop_render_options, 'i', sort, 1, 0, 1, ' '),
     SAT__FIELD(raindrop_render_options, 'i', slices, 1, 1, 64, ' '),
+    SAT__FIELD(raindrop_render_options, 'f', oscillation, 0, 0, 0.25, ' '),
+    SAT__FIELD(raindrop_render_options, 'i', lamp_count, 0, 0, 16, ' '),
 };
+
+static const sat__field raindrop__lamp_fields[] = {
+    SAT__FIELD(raindrop_lamp, 'f', radius, 0.1, 0, 1e18, ' '),
+    SAT__FIELD(raindrop_lamp, 'f', inner, RAINDROP__PI, 0, 3.1416, ' '),
+    SAT__FIELD(raindrop_lamp, 'f', outer, RAINDROP__PI, 0, 3.1416, ' '),
+};
+
+RAINDROP_DEF raindrop_lamp raindrop_lamp_defaults(void)
+{
+    raindrop_lamp lamp;
+    sat__fields_default(&lamp, sizeof lamp, raindrop__lamp_fields, SAT__COUNT(raindrop__lamp_fields));
+    raindrop__set(lamp.intensity, 1, 1, 1);
+    lamp.direction[1] = -1;
+    return lamp;
+}
+
+static inline int raindrop__lamp_is_valid(sat__text *t, const raindrop_lamp *lamp)
+{
+    float d2 = raindrop__dot(lamp->direction, lamp->direction);
+    if (!raindrop__vector_is_valid(t, "position", lamp->position, -1e18, 1e18)) return 0;
+    if (!raindrop__vector_is_valid(t, "intensity", lamp->intensity, 0, 1e18)) return 0;
+    if (!raindrop__vector_is_valid(t, "direction", lamp->direction, -2, 2)) return 0;
+    if (!(d2 > 0.99f && d2 < 1.01f)) return raindrop__say(t, "direction is no unit vector");
+    if (!raindrop__fields_are_valid(t, lamp, raindrop__lamp_fields, SAT__COUNT(raindrop__lamp_fields))) return 0;
+    return lamp->outer >= lamp->inner ? 1 : raindrop__say(t, "outer is below inner");
+}
+
+RAINDROP_DEF const char *raindrop_explain_lamp(char *text, size_t size, const raindrop_lamp *lamp)
+{
+    sat__text t = sat__text_begin(text, size);
+    if (lamp) raindrop__lamp_is_valid(&t, lamp);
+    else raindrop__say(&t, "lamp is NULL");
+    return text;
+}
 
 RAINDROP_DEF raindrop_render_options raindrop_render_defaults(void)
 {
@@ -948,10 +1004,14 @@ static inline int raindrop__picture_is_valid(sat__text *t, ptrdiff_t stride, int
 
 static inline int raindrop__render_is_valid(sat__text *t, const raindrop_render_options *o)
 {
+    int i;
     if (!raindrop__fields_are_valid(t, o, raindrop__render_fields, SAT__COUNT(raindrop__render_fields))) return 0;
 #ifdef RAINDROP_NO_MAP
     if (o->look == RAINDROP_LOOK_MAP) return raindrop__say(t, "RAINDROP_LOOK_MAP: RAINDROP_NO_MAP left it out");
 #endif
+    if (o->lamp_count > 0 && !o->lamps) return raindrop__say(t, "lamps is NULL, and lamp_count above 0");
+    for (i = 0; i < o->lamp_count; i++)
+        if (!raindrop__lamp_is_valid(t, &o->lamps[i])) return 0;
     return 1;
 }
 
@@ -1866,6 +1926,42 @@ static inline void raindrop__ray_colour(float rgb[3], const raindrop_environment
     }
 }
 
+/* Mean light of a far spheroid seen along the unit vector d, by order 0: samples on a spiral in its elliptic disc, whose
+   half axes are 1 to the side and k upwards. */
+static inline double raindrop__spheroid_light(const raindrop__environment_job *job, const float d[3], float ratio)
+{
+    const raindrop_environment *environment = job->environment;
+    const int samples = job->options->far_samples;
+    float k = sqrtf(ratio * ratio * (1 - d[1] * d[1]) + d[1] * d[1]), width = 1.77f / sqrtf((float)samples), side[3],
+          up[3], p[3], v[4];
+    double sum = 0;
+    int i;
+    raindrop__set(side, -d[2], 0, d[0]);
+    raindrop__normalise(side);
+    if (!(raindrop__dot(side, side) > 0.5f)) side[0] = 1;
+    raindrop__set(up, side[1] * d[2] - side[2] * d[1], side[2] * d[0] - side[0] * d[2],
+                  side[0] * d[1] - side[1] * d[0]);
+    for (i = 0; i < samples; i++) {
+        float b = sqrtf(((float)i + 0.5f) / (float)samples), angle = 2.39996323f * (float)i;
+        raindrop_ray ray;
+        raindrop__combine(p, 0.999f * b * cosf(angle), side, 0.999f * b * k * sinf(angle), up);
+        if (!raindrop_trace_spheroid(&ray, d, p, ratio, environment->n)) continue;
+        raindrop__sample(v, environment, ray.reflected, ray.footprint_reflected * width);
+        sum += (double)ray.fresnel * (double)(v[0] + v[1] + v[2]);
+        raindrop__sample(v, environment, ray.refracted, ray.footprint_refracted * width);
+        sum += (1 - (double)ray.fresnel) * (double)(v[0] + v[1] + v[2]);
+    }
+    return sum;
+}
+
+/* Relative change of a far drop's light with its axis ratio. */
+static inline float raindrop__far_swing(const raindrop__environment_job *job, const float d[3])
+{
+    double flat = raindrop__spheroid_light(job, d, 0.93f), tall = raindrop__spheroid_light(job, d, 1.07f),
+           both = flat + tall;
+    return both > 0 ? (float)((tall - flat) / (0.07 * both)) : 0;
+}
+
 /* Rows of the far drops' picture: the mean over the drop's disc, samples on a spiral of equal areas. */
 static void raindrop__prefilter_rows(int begin, int end, int worker, void *context)
 {
@@ -1890,7 +1986,7 @@ static void raindrop__prefilter_rows(int begin, int end, int worker, void *conte
                 for (c = 0; c < 3; c++) sum[c] += (double)rgb[c];
             }
             for (c = 0; c < 3; c++) out[c] = (float)(sum[c] / samples);
-            out[3] = 0;
+            out[3] = job->options->far_swing ? raindrop__far_swing(job, d) : 0;
         }
     }
 }
@@ -2251,6 +2347,7 @@ struct raindrop_rain {
     int count, capacity, own; /* own: the caller's drops, which do not wrap */
     int settled;              /* all fall with their terminal velocity */
     uint32_t step;            /* advances with dt > 0 so far: the random stream */
+    double time;              /* seconds so far, less whole RAINDROP__PERIODs: phases of the oscillations */
     raindrop_rain_options options;
     raindrop__visible *visible;
     raindrop__pair *pairs[2];
@@ -2266,6 +2363,8 @@ struct raindrop_rain {
 #define RAINDROP__GRAVITY (9.80665 * (1.0 - 1.204 / 998.2)) /* m/s^2; less the air's buoyancy */
 #define RAINDROP__VISCOSITY 1.81e-5                         /* of air, Pa s */
 #define RAINDROP__DENSITY 998.2                             /* of water, kg/m^3 */
+#define RAINDROP__TENSION 0.0728                            /* of water's surface, N/m */
+#define RAINDROP__PERIOD 16.0 /* seconds; frequencies of oscillations are whole multiples of 1 over it */
 
 /* Stokes' law for the smallest and Best 1950 for the others, blended; rms 4 % of Gunn and Kinzer's table. */
 RAINDROP_DEF double raindrop_terminal_velocity(double diameter_mm)
@@ -2576,6 +2675,7 @@ RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt)
     job.rain = rain;
     job.dt = dt;
     if (dt > 0) rain->step++;
+    rain->time = fmod(rain->time + fmod(dt, RAINDROP__PERIOD), RAINDROP__PERIOD);
     sat__parallel_for(&rain->options.threads, chunks, raindrop__advance_range, &job);
     for (chunk = 0; chunk < chunks; chunk++) moving |= rain->unsettled[chunk];
     if (dt > 0 && !moving) rain->settled = 1;
@@ -2717,6 +2817,212 @@ RAINDROP_DEF sat_result raindrop_rain_set_drops(raindrop_rain *rain, const raind
 }
 
 /* ------------------------------------------------------------------------------------------------
+   >> lamps   light of lamps through drops, and drops that oscillate
+
+   A lamp is seen in a drop as one point, a glint, for each path that turns the view by the angle theta between the view
+   and the lamp: the mirrored ray, b = cos(theta/2); order 0, tan r = sin(theta/2) / (n - cos(theta/2)), b = n sin r;
+   order 1, two of them beyond the bow's angle, by Newton's method. Of an irradiance E the drop sends E r^2 G to the eye,
+   G = share d(b^2) / (2 d(-cos theta)): of a lamp of half width a the mean over theta - a .. theta + a, which is finite
+   at the bow too. Near drops, D radii away, show it along a ray that leaves the axis by alpha, sin(alpha) = b/D: theta is
+   smaller by alpha for the mirrored ray and larger for the others, found by iteration. The shares of a drop's area are those of raindrop_render with one internal reflection: the light of
+   lamps from all sides sums to that of a white sky.
+
+   Oscillation: the first two modes (Garg and Nayar 2006), at Rayleigh's frequencies omega^2 = n (n-1) (n+2) sigma /
+   (rho r^3), n = 2 and 3, which those of Beard and Kubesh 1991 follow: the oblate-prolate one changes the axis ratio,
+   the transverse one leans. A surface r (1 + e f(direction)) is curved 1 + (n-1) (n+2) e f times as much there, and a
+   glint inversely bright: exp(-x sin(phase)) over its mean, Bessel's I0(x), keeps its light.
+   ------------------------------------------------------------------------------------------------ */
+
+enum { RAINDROP__GLINTS = 4 }; /* mirrored, order 0, order 1 by its inner and its outer ray */
+#define RAINDROP__LEAST_LAMP 0.004f /* radians; lamps that look smaller are as wide as this, as the sun is */
+
+typedef struct raindrop__swing { float amplitude, cycles[2], rate[2], lean[2]; } raindrop__swing;
+
+/* Phases, in turns, and frequencies of a drop, and where to it leans; amplitude 0: it does not swing. */
+static inline raindrop__swing raindrop__swing_of(const raindrop_rain *rain, uint32_t index, float oscillation)
+{
+    raindrop__swing s = {0, {0, 0}, {0, 0}, {0, 0}};
+    float r = rain->drops[index].radius, frequency;
+    int k;
+    if (!(oscillation > 0) || !(r > 0.0004f)) return s;
+    s.amplitude = oscillation * raindrop__clamp((r - 0.0004f) * 5000, 0, 1);
+    frequency = sqrtf((float)(8 * RAINDROP__TENSION / RAINDROP__DENSITY) / (r * r * r)) * (float)(0.5 / RAINDROP__PI);
+    for (k = 0; k < 2; k++) {
+        uint32_t bits = raindrop__hash(rain->options.seed, 8 + (uint32_t)k, index);
+        double turns;
+        s.rate[k] = floorf(frequency * (k ? 1.9364917f : 1) * (float)RAINDROP__PERIOD) / (float)RAINDROP__PERIOD;
+        turns = (double)s.rate[k] * rain->time;
+        s.cycles[k] = raindrop__uniform(bits) + (float)(turns - floor(turns));
+        if (k) continue;
+        s.lean[0] = cosf((float)(2 * RAINDROP__PI) * raindrop__uniform(raindrop__mix(bits)));
+        s.lean[1] = sinf((float)(2 * RAINDROP__PI) * raindrop__uniform(raindrop__mix(bits)));
+    }
+    return s;
+}
+
+static inline float raindrop__sine_of(float turns) { return sinf((float)(2 * RAINDROP__PI) * (turns - floorf(turns))); }
+
+/* The axis ratio `dt` seconds from now. */
+static inline float raindrop__swung(float ratio, const raindrop__swing *s, float dt)
+{
+    return ratio * (1 + s->amplitude * raindrop__sine_of(s->cycles[0] + s->rate[0] * dt));
+}
+
+static inline float raindrop__bessel(float x)
+{
+    float q = 0.25f * x * x;
+    return 1 + q * (1 + q * (1.0f / 4 + q * (1.0f / 36 + q * (1.0f / 576 + q / 14400))));
+}
+
+/* Brightness over its mean, `dt` seconds from now, over `span` seconds: of both modes exp(x sin phase)/I0(x). */
+static inline float raindrop__flicker(const float x[2], const raindrop__swing *s, float dt, float span)
+{
+    float sum = 0, mean = 1;
+    int k;
+    for (k = 0; k < 2; k++) {
+        float turn = (float)RAINDROP__PI * s->rate[k] * span, v = x[k] * (turn > 0.01f ? sinf(turn) / turn : 1);
+        sum += v * raindrop__sine_of(s->cycles[k] + s->rate[k] * dt);
+        mean *= raindrop__bessel(v);
+    }
+    return expf(sum) / mean;
+}
+
+/* The modes' exponents where the surface has the unit normal n: P2 changes the ratio by 3/2 of its own height; the
+   transverse mode P31 cos(angle), over its largest value, is as high. */
+static inline void raindrop__flicker_at(float x[2], const raindrop__swing *s, const float n[3])
+{
+    float y2 = n[1] * n[1], e = s->amplitude / 1.5f;
+    x[0] = -4 * e * (1.5f * y2 - 0.5f);
+    x[1] = -10 * e * 1.5f * (5 * y2 - 1) * (n[0] * s->lean[0] + n[2] * s->lean[1]) / 2.07f;
+}
+
+/* b^2 of the rays of a path that turn by `angle`, at its ends where there are none; path: as RAINDROP__GLINTS. */
+static inline float raindrop__turned_b2(float angle, int path, float n)
+{
+    float half_sine = sinf(0.5f * angle), half_cosine = cosf(0.5f * angle), b2, bow2, b, e, bend;
+    int i;
+    if (path == 0) return half_cosine * half_cosine;
+    if (path == 1) { /* tan r = sin/(n - cos); beyond the last ray: 1 */
+        if (n < 1 ? n >= half_cosine : n * half_cosine <= 1) return n < 1 ? n * n : 1;
+        return n * n * half_sine * half_sine / (1 + n * n - 2 * n * half_cosine);
+    }
+    bow2 = raindrop__clamp((4 - n * n) / 3, 0, 1);
+    b = sqrtf(bow2);
+    e = angle - (float)RAINDROP__PI - 2 * asinf(b) + 4 * asinf(b < n ? b / n : 1);
+    if (!(e > 0)) return bow2;
+    /* around the bow the angle is a parabola */
+    bend = 2 * b / ((1 - bow2) * sqrtf(1 - bow2) + 1e-6f) -
+           4 * b / (n * n * n * (1 - bow2 / (n * n)) * sqrtf(1 - bow2 / (n * n)));
+    b = raindrop__clamp(b + (path == 2 ? -1 : 1) * sqrtf(2 * e / (bend > 0.1f ? bend : 0.1f)), path == 2 ? 0 : b,
+                        path == 2 ? b : 1);
+    for (i = 0; i < 6; i++) {
+        float slope = 2 / (sqrtf((1 - b) * (1 + b)) + 1e-4f) - 4 / sqrtf(n * n - b * b);
+        b -= ((float)RAINDROP__PI + 2 * asinf(b) - 4 * asinf(b / n) - angle) / slope;
+        b = path == 2 ? raindrop__clamp(b, 0, sqrtf(bow2)) : raindrop__clamp(b, sqrtf(bow2), 1);
+    }
+    b2 = b * b;
+    return b2;
+}
+
+/* Share of a path at b^2: with `orders` 0 order 0 has the later ones'. */
+static inline float raindrop__path_share(float b2, int path, float n, int orders)
+{
+    raindrop__optics o = raindrop__refract(1 - b2, n);
+    if (path == 0) return 0.5f * (o.fs + o.fp);
+    if (o.total) return 0;
+    if (path == 1)
+        return orders ? 0.5f * ((1 - o.fs) * (1 - o.fs) + (1 - o.fp) * (1 - o.fp)) : 1 - 0.5f * (o.fs + o.fp);
+    return orders ? 0.5f * ((1 - o.fs) * o.fs + (1 - o.fp) * o.fp) : 0;
+}
+
+/* b^2 of the ray to the lamp that is `angle` off the axis from the eye to the drop, per_distance = 1/D. */
+static inline float raindrop__glint_b2(float angle, int path, float n, float per_distance)
+{
+    float b2 = raindrop__turned_b2(angle, path, n);
+    int i;
+    for (i = 0; per_distance > 0 && i < 8; i++) {
+        float off = asinf(sqrtf(b2) * per_distance), next;
+        next = raindrop__clamp(path ? angle + off : angle - off, 0, (float)RAINDROP__PI);
+        b2 = 0.5f * (b2 + raindrop__turned_b2(next, path, n));
+    }
+    return b2;
+}
+
+/* A glint: the unit vector that shows it; what it sends, E G; its radius in radii of the drop; the normal where its light
+   enters. */
+typedef struct raindrop__glint { float seen[3], light[3], radius, normal[3]; } raindrop__glint;
+
+/* A lamp as a drop sees it: a unit vector to it, its irradiance, half its width in radians. 0: it is dark there. */
+typedef struct raindrop__lit { float to[3], irradiance[3], width; } raindrop__lit;
+
+static inline int raindrop__light(raindrop__lit *lit, const raindrop_lamp *lamp, const float centre[3], float radius)
+{
+    float distance, axis, share = 1;
+    int c;
+    raindrop__combine(lit->to, 1, lamp->position, -1, centre);
+    distance = sqrtf(raindrop__dot(lit->to, lit->to));
+    if (!(distance > radius) || !sat__is_finite(distance)) return 0;
+    raindrop__combine(lit->to, 1 / distance, lit->to, 0, lit->to);
+    if (lamp->inner < 3.14f) {
+        axis = acosf(raindrop__clamp(-raindrop__dot(lit->to, lamp->direction), -1, 1));
+        share = axis <= lamp->inner  ? 1
+                : axis < lamp->outer ? (lamp->outer - axis) / (lamp->outer - lamp->inner)
+                                     : 0;
+        share *= share * (3 - 2 * share);
+    }
+    lit->width = lamp->radius / (distance > lamp->radius ? distance : lamp->radius);
+    lit->width = lit->width > RAINDROP__LEAST_LAMP ? lit->width : RAINDROP__LEAST_LAMP;
+    for (c = 0; c < 3; c++) lit->irradiance[c] = share * lamp->intensity[c] / (distance * distance);
+    return share > 0;
+}
+
+/* The glint of a path in a drop that is seen along the unit vector d; per_distance: 0 for far drops. */
+static inline int raindrop__glint_of(raindrop__glint *out, const raindrop__lit *lit, const float d[3], int path, float n,
+                                     int orders, float per_distance)
+{
+    float cosine = raindrop__clamp(raindrop__dot(d, lit->to), -1, 1), angle = acosf(cosine), b2, b, ring, g, side[3], p[3],
+          low = angle > lit->width ? angle - lit->width : 0,
+          high = angle + lit->width < (float)RAINDROP__PI ? angle + lit->width : (float)RAINDROP__PI, share, off, sign;
+    float low_b2 = raindrop__glint_b2(low, path, n, per_distance),
+          high_b2 = raindrop__glint_b2(high, path, n, per_distance);
+    int c;
+    if (path > 1 && (n < 1.1f || n > 1.9f)) return 0; /* no bow, or not of this kind */
+    ring = 4 * sinf(0.5f * (low + high)) * sinf(0.5f * (high - low)); /* 2 (cos low - cos high) */
+    g = fabsf(high_b2 - low_b2) / (ring + 1e-9f);
+    if (!(g > 0)) return 0;
+    b2 = raindrop__glint_b2(angle, path, n, per_distance);
+    share = raindrop__path_share(b2, path, n, orders);
+    g *= (1 - per_distance * per_distance) / sqrtf(1 - 0.5f * (low_b2 + high_b2) * per_distance * per_distance);
+    b = sqrtf(b2);
+    off = b * per_distance;
+    sign = path && n > 1 ? -1.0f : 1;
+    raindrop__combine(side, 1, lit->to, -cosine, d);
+    if (!(raindrop__dot(side, side) > 1e-12f)) raindrop__perpendicular(side, p, d);
+    raindrop__normalise(side);
+    raindrop__combine(out->seen, sqrtf(1 - off * off), d, sign * off, side);
+    raindrop__combine(p, sign * b * sqrtf(1 - off * off), side, -b * off, d);
+    raindrop__combine(out->normal, -sqrtf((1 - b) * (1 + b)), out->seen, 1, p);
+    out->radius = lit->width * sqrtf(g);
+    for (c = 0; c < 3; c++) out->light[c] = lit->irradiance[c] * share * g;
+    return share > 0;
+}
+
+/* Adds the lamps' light to that of a far drop, the mean over its disc. */
+static inline void raindrop__far_lamps(float colour[3], const raindrop_render_options *o, const raindrop_drop *drop,
+                                       const float d[3], float n)
+{
+    raindrop__lit lit;
+    raindrop__glint glint;
+    int i, path, c;
+    for (i = 0; i < o->lamp_count; i++) {
+        if (!raindrop__light(&lit, &o->lamps[i], drop->position, drop->radius)) continue;
+        for (path = 0; path < RAINDROP__GLINTS; path++)
+            if (raindrop__glint_of(&glint, &lit, d, path, n, o->orders, 0))
+                for (c = 0; c < 3; c++) colour[c] += glint.light[c] * (float)(1 / RAINDROP__PI);
+    }
+}
+
+/* ------------------------------------------------------------------------------------------------
    >> picture   what is seen, and in what order
 
    1 cull: each drop to a fate and, if it may be seen, a record; 2 sort the records from far to near; 3 draw bands of
@@ -2767,12 +3073,25 @@ typedef struct raindrop__frame {
     const raindrop__pair *order;
 } raindrop__frame;
 
-/* A drop in view space: x right, y up, z forward; the quantities drawing starts from. */
-typedef struct raindrop__placed { float x, y, z, radius, distance2, flatness; } raindrop__placed;
+/* A drop in view space: x right, y up, z forward; the quantities drawing starts from. radius: half axis across; reach: of
+   a ball that holds the drop, however it swings. */
+typedef struct raindrop__placed { float x, y, z, radius, distance2, flatness, reach; } raindrop__placed;
 
-static inline void raindrop__place_drop(raindrop__placed *placed, const raindrop__frame *frame,
-                                        const raindrop_drop *drop)
+static inline void raindrop__swing_drop(raindrop__placed *placed, const raindrop__frame *frame, uint32_t index)
 {
+    const raindrop_drop *drop = &frame->rain->drops[index];
+    const raindrop__swing swing = raindrop__swing_of(frame->rain, index, frame->options.oscillation);
+    float tall = cbrtf(placed->flatness * (1 + swing.amplitude));
+    if (!(swing.amplitude > 0)) return;
+    placed->reach = drop->radius / cbrtf(placed->flatness * (1 - swing.amplitude));
+    if (tall * tall * drop->radius > placed->reach) placed->reach = tall * tall * drop->radius;
+    placed->flatness = raindrop__swung(placed->flatness, &swing, 0);
+    placed->radius = drop->radius / cbrtf(placed->flatness);
+}
+
+static inline void raindrop__place_drop(raindrop__placed *placed, const raindrop__frame *frame, uint32_t index)
+{
+    const raindrop_drop *drop = &frame->rain->drops[index];
     float rel[3];
     raindrop__combine(rel, 1, drop->position, -1, frame->camera.position);
     placed->x = raindrop__dot(rel, frame->camera.right);
@@ -2781,6 +3100,8 @@ static inline void raindrop__place_drop(raindrop__placed *placed, const raindrop
     placed->flatness = drop->axis_ratio;
     /* half axis across: the sphere of equal volume has radius a ratio^(1/3) */
     placed->radius = drop->axis_ratio < 1 ? drop->radius / cbrtf(drop->axis_ratio) : drop->radius;
+    placed->reach = placed->radius;
+    if (frame->options.oscillation > 0) raindrop__swing_drop(placed, frame, index);
     placed->distance2 = placed->x * placed->x + placed->y * placed->y + placed->z * placed->z;
 }
 
@@ -2897,8 +3218,8 @@ static inline raindrop__box raindrop__bounds(const raindrop__frame *frame, const
         }
         return raindrop__make_box(frame, v->x - ax, v->y - ay, v->x + ax, v->y + ay);
     }
-    raindrop__tangents(across, placed->x, placed->z, placed->radius);
-    raindrop__tangents(up, placed->y, placed->z, placed->radius);
+    raindrop__tangents(across, placed->x, placed->z, placed->reach);
+    raindrop__tangents(up, placed->y, placed->z, placed->reach);
     return raindrop__make_box(
         frame, frame->half_width + frame->focal * across[0] - ax, frame->half_height - frame->focal * up[1] - ay,
         frame->half_width + frame->focal * across[1] + ax, frame->half_height - frame->focal * up[0] + ay);
@@ -2950,7 +3271,7 @@ static inline void raindrop__add_motion(raindrop__visible *v, const raindrop__fr
 static inline raindrop__fate raindrop__reject(const raindrop__frame *frame, const raindrop_drop *drop,
                                               const raindrop__placed *placed, float reach)
 {
-    float r = placed->radius;
+    float r = placed->reach;
     float all = fabsf(drop->velocity[0]) + fabsf(drop->velocity[1]) + fabsf(drop->velocity[2]) +
                 placed->distance2; /* finite if all are */
     if (!sat__is_finite(all) || !sat__is_finite(r) || !(r > 0) || !(drop->axis_ratio > 0 && drop->axis_ratio <= 1))
@@ -2973,6 +3294,12 @@ static inline void raindrop__to_world(float out[3], const raindrop_camera *camer
     for (i = 0; i < 3; i++) out[i] = x * camera->right[i] + y * camera->up[i] - forward * camera->back[i];
 }
 
+/* Far drops whose light changes along their streak. */
+static inline int raindrop__flickers(const raindrop__frame *frame, const raindrop_drop *drop)
+{
+    return frame->options.oscillation > 0 && drop->radius > 0.0004f;
+}
+
 static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop__frame *frame, uint32_t index,
                                             double *left_out)
 {
@@ -2981,7 +3308,7 @@ static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop
     raindrop__fate fate;
     raindrop__box box;
     float tangent2, stretch, area, world[3], colour[4];
-    raindrop__place_drop(&placed, frame, drop);
+    raindrop__place_drop(&placed, frame, index);
     v->streak[0] = v->streak[1] = v->blur = 0;
     fate = raindrop__reject(frame, drop, &placed, 1);
     if (fate == RAINDROP__INVALID || fate == RAINDROP__INSIDE || fate == RAINDROP__BEHIND ||
@@ -3023,6 +3350,10 @@ static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop
         raindrop__to_world(world, &frame->camera, placed.x, placed.y, placed.z);
         raindrop__far(colour, frame->environment, world);
         raindrop__set(v->colour, colour[0], colour[1], colour[2]);
+        if (frame->options.lamp_count > 0 && !raindrop__flickers(frame, drop)) {
+            raindrop__normalise(world);
+            raindrop__far_lamps(v->colour, &frame->options, drop, world, frame->environment->n);
+        }
     }
     return fate;
 }
@@ -3097,12 +3428,16 @@ typedef struct raindrop__batch {
     float focal_in_radii; /* of the drop being drawn: z / (focal radius), so that q = pixels times this */
     float width, blur;    /* footprint of a pixel in b, and its widening */
     int orders;           /* -1: the short way without orders */
-    float flatness;
+    float flatness;       /* of the drop being drawn */
+    int slow;             /* flattened or swinging: no sphere */
+    const raindrop__swing *swing; /* NULL: it does not change along the streak */
+    const float *flicker; /* exponents of a far drop; NULL: one colour */
+    float covers;         /* 1; 0: light is added, of lamps */
     float *pixel[RAINDROP__BATCH];
     float slope_x[RAINDROP__BATCH], slope_y[RAINDROP__BATCH]; /* the pixel's ray (x, y, -1) */
     float offset_x[RAINDROP__BATCH], offset_y[RAINDROP__BATCH]; /* q: where it passes the plane of the centre, in
                                                                    radii */
-    float alpha[RAINDROP__BATCH];
+    float alpha[RAINDROP__BATCH], ratio[RAINDROP__BATCH]; /* axis ratio, with `swing` */
     float direction[3][RAINDROP__BATCH], closest[3][RAINDROP__BATCH], one_minus_b2[RAINDROP__BATCH];
     float reflected[3][RAINDROP__BATCH], refracted[3][RAINDROP__BATCH], fresnel[RAINDROP__BATCH], pass[RAINDROP__BATCH];
     float reflect_cone[RAINDROP__BATCH], refract_cone[RAINDROP__BATCH]; /* footprints in radians */
@@ -3155,7 +3490,7 @@ static inline raindrop__v raindrop__half_plane_v(raindrop__v s, raindrop__v gx, 
 static inline void raindrop__batch_rays(raindrop__batch *batch, int keep_alpha)
 {
     const raindrop_camera *camera = &batch->frame->camera;
-    const raindrop__v one = raindrop__splat(1), rim = raindrop__splat(batch->flatness < 1 ? 1e9f : 0.999f);
+    const raindrop__v one = raindrop__splat(1), rim = raindrop__splat(batch->slow ? 1e9f : 0.999f);
     const raindrop__v k = raindrop__splat(batch->focal_in_radii), per_focal = raindrop__splat(1 / batch->frame->focal);
     int at, i;
     for (at = 0; at < batch->count; at += RAINDROP__LANES) {
@@ -3170,7 +3505,8 @@ static inline void raindrop__batch_rays(raindrop__batch *batch, int keep_alpha)
         raindrop__v b2 =
             raindrop__add(raindrop__add(raindrop__mul(px, px), raindrop__mul(py, py)), raindrop__mul(t, t));
         raindrop__v b = raindrop__sqrt(raindrop__max(b2, raindrop__splat(1e-12f))), inward, pz = t;
-        if (!keep_alpha) {
+        if (!keep_alpha && batch->slow) raindrop__store(batch->alpha + at, one); /* raindrop__flat_cover knows */
+        else if (!keep_alpha) {
             /* half the gradient of b^2: (q - t r) (k - t / f), without the small change of the ray's length */
             raindrop__v scale = raindrop__sub(k, raindrop__mul(t, per_focal));
             raindrop__v gx = raindrop__mul(px, scale), gy = raindrop__mul(py, scale);
@@ -3297,10 +3633,10 @@ static inline void raindrop__batch_lookup(float (*colour)[4], raindrop__batch *b
 
 /* Share of pixel i that a flattened drop covers, by b and its gradient in the space where it is a sphere; p moves to
    this side of the rim. */
-static inline float raindrop__flat_cover(const raindrop__batch *batch, const float d[3], float p[3])
+static inline float raindrop__flat_cover(const raindrop__batch *batch, float flatness, const float d[3], float p[3])
 {
     const raindrop_camera *camera = &batch->frame->camera;
-    float stretch = 1 / batch->flatness, unit[3], q[3], along, b, gx, gy, slope;
+    float stretch = 1 / flatness, unit[3], q[3], along, b, gx, gy, slope;
     raindrop__set(unit, d[0], d[1] * stretch, d[2]);
     raindrop__set(q, p[0], p[1] * stretch, p[2]);
     along = raindrop__dot(q, unit) / raindrop__dot(unit, unit);
@@ -3310,7 +3646,7 @@ static inline float raindrop__flat_cover(const raindrop__batch *batch, const flo
     gy = q[0] * camera->up[0] + q[1] * stretch * camera->up[1] + q[2] * camera->up[2];
     slope = sqrtf(gx * gx + gy * gy) + 1e-20f;
     if (b > 0.999f) raindrop__combine(q, 0.999f / b, q, 0, q);
-    raindrop__set(p, q[0], q[1] * batch->flatness, q[2]);
+    raindrop__set(p, q[0], q[1] * flatness, q[2]);
     gx /= slope;
     gy /= slope;
     slope = slope * batch->focal_in_radii / b + 1e-9f;
@@ -3321,11 +3657,12 @@ static inline float raindrop__flat_cover(const raindrop__batch *batch, const flo
 static inline void raindrop__flat_colour(float colour[4], raindrop__batch *batch, int i, const float d[3], float p[3])
 {
     const raindrop_environment *environment = batch->frame->environment;
-    float pixel = 1 / batch->frame->focal, v[4], cover = raindrop__flat_cover(batch, d, p);
+    float pixel = 1 / batch->frame->focal, v[4], flatness = batch->swing ? batch->ratio[i] : batch->flatness,
+          cover = raindrop__flat_cover(batch, flatness, d, p);
     raindrop_ray ray;
     int c;
     if (batch->samples == 1 && !(batch->blur > 1)) batch->alpha[i] = cover;
-    if (!raindrop_trace_spheroid(&ray, d, p, batch->flatness, environment->n)) return;
+    if (!raindrop_trace_spheroid(&ray, d, p, flatness, environment->n)) return;
     raindrop__sample(v, environment, ray.reflected, batch->blur * (ray.footprint_reflected * batch->width + pixel));
     for (c = 0; c < 3; c++) colour[c] = ray.fresnel * v[c];
     raindrop__sample(v, environment, ray.refracted,
@@ -3387,7 +3724,7 @@ static inline void raindrop__batch_slow(float (*colour)[4], raindrop__batch *bat
         if (!(batch->alpha[i] > 0)) continue;
         raindrop__set(d, batch->direction[0][i], batch->direction[1][i], batch->direction[2][i]);
         raindrop__set(p, batch->closest[0][i], batch->closest[1][i], batch->closest[2][i]);
-        if (batch->flatness < 1) raindrop__flat_colour(colour[i], batch, i, d, p);
+        if (batch->slow) raindrop__flat_colour(colour[i], batch, i, d, p);
         else {
             raindrop__large_colour(colour[i], batch, i, d, p);
             batch->tally->order_fragments += batch->orders > 0;
@@ -3400,11 +3737,11 @@ static inline float *raindrop__pixel(const raindrop__frame *frame, int x, int y)
     return (float *)(void *)(frame->rgb + (ptrdiff_t)y * frame->stride) + 3 * (ptrdiff_t)x;
 }
 
-static inline void raindrop__blend(float *out, float alpha, const float colour[3])
+static inline void raindrop__blend(float *out, float alpha, const float colour[3], float covers)
 {
-    out[0] += alpha * (colour[0] - out[0]);
-    out[1] += alpha * (colour[1] - out[1]);
-    out[2] += alpha * (colour[2] - out[2]);
+    out[0] += alpha * (colour[0] - covers * out[0]);
+    out[1] += alpha * (colour[1] - covers * out[1]);
+    out[2] += alpha * (colour[2] - covers * out[2]);
 }
 
 static inline void raindrop__batch_blend(raindrop__batch *batch, float (*colour)[4])
@@ -3416,7 +3753,7 @@ static inline void raindrop__batch_blend(raindrop__batch *batch, float (*colour)
             for (c = 0; c < 3; c++) mean[c] += colour[j][c];
         for (c = 0; c < 3; c++) mean[c] /= (float)m;
         if (!(batch->alpha[i] > 0)) continue;
-        raindrop__blend(batch->pixel[i], batch->alpha[i], mean);
+        raindrop__blend(batch->pixel[i], batch->alpha[i], mean, 1);
         batch->tally->fragments++;
     }
     batch->count = 0;
@@ -3440,7 +3777,7 @@ static inline void raindrop__flush_rays(raindrop__batch *batch, int keep_alpha)
     if (!batch->count) return;
     raindrop__batch_pad(batch);
     raindrop__batch_rays(batch, keep_alpha);
-    if (batch->orders >= 0 || batch->flatness < 1) raindrop__batch_slow(colour, batch);
+    if (batch->orders >= 0 || batch->slow) raindrop__batch_slow(colour, batch);
     else {
         raindrop__batch_trace(batch);
         raindrop__batch_lookup(colour, batch);
@@ -3470,6 +3807,8 @@ static inline void raindrop__begin_drop(raindrop__batch *batch, const raindrop__
     batch->blur = 1;
     batch->samples = 1;
     batch->flatness = placed->flatness;
+    batch->slow = placed->flatness < 1 || placed->flatness > 1;
+    batch->swing = NULL;
     batch->orders = v->radius >= o->orders_radius && !raindrop__is_sprite(batch->frame) ? o->orders : -1;
 }
 
@@ -3568,7 +3907,7 @@ static inline void raindrop__draw_far_round(raindrop__batch *batch, const raindr
             float alpha = opacity * raindrop__path_cover(span, &path, (float)x + 0.5f - v->x, (float)y + 0.5f - v->y);
             if (!(alpha > 0) || raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth))
                 continue;
-            raindrop__blend(raindrop__pixel(frame, x, y), alpha, v->colour);
+            raindrop__blend(raindrop__pixel(frame, x, y), alpha, v->colour, batch->covers);
             batch->tally->fragments++;
         }
     }
@@ -3607,8 +3946,17 @@ static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__v
     float opacity = v->radius * v->radius / (path.radius * path.radius), alpha[RAINDROP__BATCH], span[2] = {0, 0},
           spacing;
     int x, y, j;
+    raindrop__swing swing;
+    const float focal_in_radii = batch->focal_in_radii;
     batch->samples = samples;
     batch->orders = -1;
+    if (moving && frame->options.oscillation > 0) {
+        swing = raindrop__swing_of(frame->rain, v->drop, frame->options.oscillation);
+        if (swing.amplitude > 0) {
+            batch->swing = &swing;
+            batch->slow = 1;
+        }
+    }
     spacing = moving ? (2 * v->radius < path.length ? 2 * v->radius : path.length) / (float)samples : 0;
     batch->blur = 1 + 2 * v->blur + (spacing > 1 ? spacing - 1 : 0);
     for (y = box->y0; y < box->y1; y++) {
@@ -3624,14 +3972,36 @@ static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__v
             for (j = 0; j < samples; j++) {
                 float t = span[0] + (span[1] - span[0]) * ((float)j + 0.5f) / (float)samples;
                 alpha[batch->count] = cover;
+                if (batch->swing) {
+                    float ratio = raindrop__swung(frame->rain->drops[v->drop].axis_ratio, &swing,
+                                                  t / path.length * frame->camera.exposure);
+                    batch->ratio[batch->count] = ratio;
+                    batch->focal_in_radii = focal_in_radii * cbrtf(ratio / batch->flatness);
+                }
                 raindrop__push_ray(batch, x, y, v->x + t * path.along[0], v->y + t * path.along[1]);
             }
             if (batch->count + samples > RAINDROP__BATCH) raindrop__flush_soft(batch, alpha);
         }
     }
     raindrop__flush_soft(batch, alpha);
+    batch->focal_in_radii = focal_in_radii;
+    batch->swing = NULL;
 }
 #endif
+
+/* The colour of a far drop in a row, or column: it speckles where the drop swings. */
+static inline void raindrop__far_colour(float colour[3], const raindrop__batch *batch, const raindrop__visible *v,
+                                        const raindrop__shape *shape, int major)
+{
+    float along, per_pixel, flicker = 1;
+    raindrop__set(colour, v->colour[0], v->colour[1], v->colour[2]);
+    if (!batch->flicker) return;
+    along = (float)major + 0.5f - (shape->swapped ? v->x : v->y);
+    per_pixel = batch->frame->camera.exposure / (2 * shape->half_height);
+    if ((shape->swapped ? v->streak[0] : v->streak[1]) < 0) along = -along;
+    flicker = raindrop__flicker(batch->flicker, batch->swing, along * per_pixel, per_pixel);
+    raindrop__set(colour, flicker * colour[0], flicker * colour[1], flicker * colour[2]);
+}
 
 /* One row of a far drop's pixels (a column where x and y have changed places), at y0..y1 of its parallelogram: `x` is
    the first, seen from the middle of the part of the path that is in this row, which moves by w. */
@@ -3639,8 +4009,10 @@ static inline void raindrop__far_row(raindrop__batch *batch, const raindrop__vis
                                      float opacity, float x, float w, int major, int first, int last)
 {
     const raindrop__frame *frame = batch->frame;
-    float scale = 0.5f / w, left = shape->half_width - 0.5f * w, right = shape->half_width + 0.5f * w, right_of = 0;
+    float scale = 0.5f / w, left = shape->half_width - 0.5f * w, right = shape->half_width + 0.5f * w, right_of = 0,
+          colour[3];
     int at;
+    raindrop__far_colour(colour, batch, v, shape, major);
     for (at = first; at <= last; at++, x += 1) {
         /* the mean over the way w of what lies right of x: of ramps, whose integrals are squares */
         float a = left - x > 0 ? left - x : 0, b = right - x > 0 ? right - x : 0, c = -right - x > 0 ? -right - x : 0,
@@ -3651,7 +4023,7 @@ static inline void raindrop__far_row(raindrop__batch *batch, const raindrop__vis
         if (at == first || !(alpha > 0) ||
             raindrop__occluded(frame, (size_t)py * (size_t)frame->width + (size_t)px, v->depth))
             continue;
-        raindrop__blend(raindrop__pixel(frame, px, py), alpha < 1 ? alpha : 1, v->colour);
+        raindrop__blend(raindrop__pixel(frame, px, py), alpha < 1 ? alpha : 1, colour, batch->covers);
         batch->tally->fragments++;
     }
 }
@@ -3673,7 +4045,7 @@ static inline void raindrop__draw_far_still(raindrop__batch *batch, const raindr
             if (!(high > low) || !(right > left) ||
                 raindrop__occluded(frame, (size_t)y * (size_t)frame->width + (size_t)x, v->depth))
                 continue;
-            raindrop__blend(raindrop__pixel(frame, x, y), alpha, v->colour);
+            raindrop__blend(raindrop__pixel(frame, x, y), alpha, v->colour, batch->covers);
             batch->tally->fragments++;
         }
     }
@@ -3700,6 +4072,102 @@ static inline void raindrop__draw_far(raindrop__batch *batch, const raindrop__vi
         last = sat__min_int(raindrop__pixel_up(at + reach, high), high);
         raindrop__far_row(batch, v, &shape, shape.opacity * (to - from), (float)first - at, w, row, first, last);
     }
+}
+
+static inline void raindrop__draw_far_any(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
+{
+    if (!(fabsf(v->streak[0]) + fabsf(v->streak[1]) + v->blur > 0) && !batch->flicker)
+        raindrop__draw_far_still(batch, v, box);
+    else if (raindrop__is_round(v)) raindrop__draw_far_round(batch, v, box);
+    else raindrop__draw_far(batch, v, box);
+}
+
+/* ---- glints of lamps, and far drops that swing */
+
+/* The glint of a lamp by one path as a far drop of its own: in a near drop at its place, in a far one all over it. */
+static inline int raindrop__glint_seen(raindrop__visible *out, float normal[3], const raindrop__frame *frame,
+                                       const raindrop__visible *v, const raindrop__lit *lit, int path)
+{
+    const raindrop_camera *camera = &frame->camera;
+    const raindrop_drop *drop = &frame->rain->drops[v->drop & ~RAINDROP__FAR_BIT];
+    const int is_far = (v->drop & RAINDROP__FAR_BIT) != 0;
+    raindrop__glint glint;
+    float d[3], z, scale, distance;
+    int c;
+    raindrop__combine(d, 1, drop->position, -1, camera->position);
+    distance = sqrtf(raindrop__dot(d, d)) / drop->radius;
+    raindrop__normalise(d);
+    if (!raindrop__glint_of(&glint, lit, d, path, frame->environment->n, frame->options.orders,
+                            is_far ? 0 : raindrop__clamp(1 / distance, 0, 0.25f)))
+        return 0;
+    *out = *v;
+    out->drop |= RAINDROP__FAR_BIT;
+    if (!is_far) {
+        z = -raindrop__dot(glint.seen, camera->back);
+        if (!(z > 0)) return 0;
+        out->x = frame->half_width + frame->focal * raindrop__dot(glint.seen, camera->right) / z;
+        out->y = frame->half_height - frame->focal * raindrop__dot(glint.seen, camera->up) / z;
+        out->radius = raindrop__clamp(v->radius * glint.radius, 0.3f, v->radius);
+    }
+    scale = v->radius * v->radius / ((float)RAINDROP__PI * out->radius * out->radius);
+    for (c = 0; c < 3; c++) out->colour[c] = glint.light[c] * scale;
+    memcpy(normal, glint.normal, sizeof glint.normal);
+    return 1;
+}
+
+static inline void raindrop__draw_glints(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
+{
+    const raindrop__frame *frame = batch->frame;
+    const uint32_t index = v->drop & ~RAINDROP__FAR_BIT;
+    const raindrop_drop *drop = &frame->rain->drops[index];
+    const raindrop__swing swing = raindrop__swing_of(frame->rain, index, frame->options.oscillation);
+    raindrop__placed placed = {0, 0, 0, 0, 0, 0, 0};
+    raindrop__visible glint;
+    raindrop__box box;
+    raindrop__lit lit;
+    float normal[3], flicker[2];
+    int i, path;
+    batch->covers = 0;
+    batch->swing = &swing;
+    for (i = 0; i < frame->options.lamp_count; i++) {
+        if (!raindrop__light(&lit, &frame->options.lamps[i], drop->position, drop->radius)) continue;
+        for (path = 0; path < RAINDROP__GLINTS; path++) {
+            if (!raindrop__glint_seen(&glint, normal, frame, v, &lit, path)) continue;
+            raindrop__flicker_at(flicker, &swing, normal);
+            batch->flicker = swing.amplitude > 0 ? flicker : NULL;
+            box = raindrop__bounds(frame, &glint, &placed);
+            box.y0 = sat__max_int(box.y0, y0);
+            box.y1 = sat__min_int(box.y1, y1);
+            raindrop__draw_far_any(batch, &glint, &box);
+        }
+    }
+    batch->covers = 1;
+    batch->swing = NULL;
+    batch->flicker = NULL;
+}
+
+/* A far drop that swings: the environment's light by what its prefilter knows of it, the transverse mode's curvature
+   swings 10/4 times as much; then each lamp's. */
+static inline void raindrop__draw_flickering(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
+{
+    const raindrop__frame *frame = batch->frame;
+    const uint32_t index = v->drop & ~RAINDROP__FAR_BIT;
+    const raindrop__swing swing = raindrop__swing_of(frame->rain, index, frame->options.oscillation);
+    const raindrop__placed placed = {0, 0, 0, 0, 0, 0, 0};
+    raindrop__box box = raindrop__bounds(frame, v, &placed);
+    float d[3], colour[4], flicker[2];
+    box.y0 = sat__max_int(box.y0, y0);
+    box.y1 = sat__min_int(box.y1, y1);
+    raindrop__combine(d, 1, frame->rain->drops[index].position, -1, frame->camera.position);
+    raindrop__far(colour, frame->environment, d);
+    flicker[0] = raindrop__clamp(swing.amplitude * colour[3], -0.6f, 0.6f);
+    flicker[1] = 2.5f * flicker[0];
+    batch->swing = &swing;
+    batch->flicker = fabsf(flicker[0]) > 0 ? flicker : NULL;
+    raindrop__draw_far_any(batch, v, &box);
+    batch->swing = NULL;
+    batch->flicker = NULL;
+    if (frame->options.lamp_count > 0) raindrop__draw_glints(batch, v, y0, y1);
 }
 
 /* ------------------------------------------------------------------------------------------------
@@ -3820,10 +4288,10 @@ static inline void raindrop__draw_sprite(raindrop__batch *batch, const raindrop_
 static inline void raindrop__draw(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
 {
     const raindrop__frame *frame = batch->frame;
-    raindrop__placed placed = {0, 0, 0, 0, 0, 0};
+    raindrop__placed placed = {0, 0, 0, 0, 0, 0, 0};
     raindrop__box box;
     if (!(v->drop & RAINDROP__FAR_BIT)) {
-        raindrop__place_drop(&placed, frame, &frame->rain->drops[v->drop]);
+        raindrop__place_drop(&placed, frame, v->drop);
         raindrop__begin_drop(batch, v, &placed);
     }
     box = raindrop__bounds(frame, v, &placed);
@@ -3831,14 +4299,16 @@ static inline void raindrop__draw(raindrop__batch *batch, const raindrop__visibl
     box.y1 = sat__min_int(box.y1, y1);
     if (raindrop__is_sprite(frame)) raindrop__draw_sprite(batch, v, &placed, &box);
     else if (v->drop & RAINDROP__FAR_BIT) {
-        if (!(fabsf(v->streak[0]) + fabsf(v->streak[1]) + v->blur > 0)) raindrop__draw_far_still(batch, v, &box);
-        else if (raindrop__is_round(v)) raindrop__draw_far_round(batch, v, &box);
-        else raindrop__draw_far(batch, v, &box);
+        if (raindrop__flickers(frame, &frame->rain->drops[v->drop & ~RAINDROP__FAR_BIT]))
+            raindrop__draw_flickering(batch, v, y0, y1);
+        else raindrop__draw_far_any(batch, v, &box);
     }
 #ifndef RAINDROP_NO_STREAK
     else if (!raindrop__is_still(v)) raindrop__draw_soft(batch, v, &box);
 #endif
     else raindrop__draw_still(batch, v, &box);
+    if (frame->options.lamp_count > 0 && !(v->drop & RAINDROP__FAR_BIT) && !raindrop__is_sprite(frame))
+        raindrop__draw_glints(batch, v, y0, y1);
 }
 
 /* Records lie in the order of the array, not of the depths: those of the next drops are asked for before they are
@@ -3869,6 +4339,7 @@ static void raindrop__draw_bands(int begin, int end, int worker, void *context)
     int band, i, n;
     memset(&batch, 0, sizeof batch);
     batch.frame = frame;
+    batch.covers = 1;
     batch.tally = &frame->rain->tally[worker];
     for (band = begin; band < end; band++) {
         int y0 = band * RAINDROP__BAND, y1 = sat__min_int(y0 + RAINDROP__BAND, frame->height);

@@ -159,7 +159,8 @@ static inline void reference_draw(float *fine, unsigned char *mask, int width, i
                                   const raindrop_environment *environment, int orders)
 {
     double focal = 0.5 * height * side / tan(0.5 * (double)camera->fov_y), ratio = (double)drop->axis_ratio;
-    double radius = (double)drop->radius / cbrt(ratio), rel[3], z = 0, x = 0, y = 0, reach, zz, rr;
+    double radius = (double)drop->radius / cbrt(ratio), ball = ratio > 1 ? radius * ratio : radius, rel[3], z = 0, x = 0,
+           y = 0, reach, zz, rr;
     int i, px, py, x0, x1, y0, y1, w = width * side, h = height * side;
     for (i = 0; i < 3; i++) {
         rel[i] = (double)drop->position[i] - (double)camera->position[i];
@@ -167,11 +168,11 @@ static inline void reference_draw(float *fine, unsigned char *mask, int width, i
         y += rel[i] * (double)camera->up[i];
         z -= rel[i] * (double)camera->back[i];
     }
-    if (z - radius < (double)camera->depth_near) return;
+    if (z - ball < (double)camera->depth_near) return;
     /* bounds of the projected ball, generous */
-    zz = z - radius;
+    zz = z - ball;
     rr = sqrt(x * x + y * y + z * z);
-    reach = focal * radius / zz * (rr / zz) * 1.1 + 2;
+    reach = focal * ball / zz * (rr / zz) * 1.1 + 2;
     x0 = (int)fmax(0, floor(w * 0.5 + focal * x / z - reach));
     x1 = (int)fmin(w, ceil(w * 0.5 + focal * x / z + reach));
     y0 = (int)fmax(0, floor(h * 0.5 - focal * y / z - reach));
@@ -184,7 +185,7 @@ static inline void reference_draw(float *fine, unsigned char *mask, int width, i
             reference_ray(d, camera, (px + 0.5 - w * 0.5) / focal, (h * 0.5 - py - 0.5) / focal);
             for (i = 0; i < 3; i++) along += d[i] * rel[i];
             for (i = 0; i < 3; i++) b2 += (rel[i] - along * d[i]) * (rel[i] - along * d[i]);
-            if (b2 >= radius * radius) continue;
+            if (b2 >= ball * ball) continue;
             for (i = 0; i < 3; i++) {
                 origin[i] = (reference_real)(-rel[i] / radius);
                 direction[i] = (reference_real)d[i];
@@ -243,6 +244,62 @@ static inline int reference_render(float *rgb, unsigned char *mask, int width, i
     free(fine);
     free(order);
     return 1;
+}
+
+/* ---- one lamp in one drop before black, by rays fine enough to hit it: its light in pixels, and where its middle is; the
+   orders up to 1 as raindrop_render has them by default, the later ones' light with the last */
+
+static inline void reference_lamp(double *out, int width, int height, const raindrop_camera *camera,
+                                  const raindrop_drop *drop, const raindrop_lamp *lamp)
+{
+    const double focal = 0.5 * height / tan(0.5 * (double)camera->fov_y), pi = acos(-1.0);
+    double to[3], rel[3], distance = 0, wide, radiance, z = 0, x = 0, y = 0, reach, step;
+    int i, j, k, c, n;
+    for (c = 0; c < 3; c++) {
+        rel[c] = (double)drop->position[c] - (double)camera->position[c];
+        to[c] = (double)lamp->position[c] - (double)drop->position[c];
+        distance += to[c] * to[c];
+        x += rel[c] * (double)camera->right[c];
+        y += rel[c] * (double)camera->up[c];
+        z -= rel[c] * (double)camera->back[c];
+    }
+    distance = sqrt(distance);
+    for (c = 0; c < 3; c++) to[c] /= distance;
+    wide = (double)lamp->radius / distance;
+    radiance = (double)lamp->intensity[0] / (pi * (double)lamp->radius * (double)lamp->radius);
+    reach = 1.3 * focal * (double)drop->radius / z;
+    n = 800;
+    step = 2 * reach / n;
+    out[0] = out[1] = out[2] = 0;
+    for (j = 0; j < n; j++)
+        for (i = 0; i < n; i++) {
+            double px = 0.5 * width + focal * x / z - reach + (i + 0.5) * step,
+                   py = 0.5 * height - focal * y / z - reach + (j + 0.5) * step, d[3], light = 0;
+            reference_real origin[3], direction[3];
+            reference_drop traced;
+            reference_ray(d, camera, (px - 0.5 * width) / focal, (0.5 * height - py) / focal);
+            for (c = 0; c < 3; c++) {
+                origin[c] = (reference_real)(-rel[c] / (double)drop->radius);
+                direction[c] = (reference_real)d[c];
+            }
+            traced = reference_trace(origin, direction, (reference_real)drop->axis_ratio, (reference_real)1.33L);
+            if (!traced.hit) continue;
+            for (k = -1; k < 2; k++) {
+                const reference_real *leaves = k < 0 ? traced.reflected : traced.order[k];
+                double cosine = 0;
+                for (c = 0; c < 3; c++) cosine += (double)leaves[c] * to[c];
+                if (cosine < cos(wide)) continue;
+                light += (double)(k < 0   ? traced.fresnel
+                                  : k < 1 ? traced.share[0]
+                                          : 1 - traced.fresnel - traced.share[0]);
+            }
+            light *= radiance * step * step;
+            out[0] += light;
+            out[1] += light * px;
+            out[2] += light * py;
+        }
+    out[1] /= out[0];
+    out[2] /= out[0];
 }
 
 /* ---- measures: pictures are compared after the global photographic operator, as they will be seen */

@@ -1262,7 +1262,9 @@ TEST(raindrop_options_are_checked_and_named)
         {raindrop__camera_fields, SAT__COUNT(raindrop__camera_fields)},
         {raindrop__render_fields, SAT__COUNT(raindrop__render_fields)},
         {raindrop__map_fields, SAT__COUNT(raindrop__map_fields)}};
+    raindrop_lamp lamps[16];
     int which, i, at;
+    for (i = 0; i < 16; i++) lamps[i] = raindrop_lamp_defaults();
     for (which = 0; which < 5; which++)
         for (i = 0; i < tables[which].count; i++) {
             const sat__field *f = &tables[which].fields[i];
@@ -1288,6 +1290,7 @@ TEST(raindrop_options_are_checked_and_named)
                 e.far_samples = 16;
                 sat__field_set(f, options, at == 5 ? (double)sat__float_from_bits(0x7fc00000u) : values[at]);
                 if (!strcmp(f->name, "look") && at == 1) continue; /* which needs a map */
+                o.lamps = lamps;
                 if (!strcmp(f->name, "diameter_min_mm") && at == 2) r.diameter_min_mm = 5.9;
                 text = rt_explain(which, options, !large, &result);
                 if (at < 3 && !smallest) {
@@ -1899,13 +1902,256 @@ TEST(raindrop_streaks_do_not_shimmer)
     raindrop_environment_destroy(white);
 }
 
+/* ---- lamps, and drops that oscillate ---- */
+
+/* Lamps from all sides are a white sky. */
+TEST(raindrop_lamps_all_around_are_a_white_sky)
+{
+    enum { LAMPS = 4000 };
+    static const float indices[3] = {1.33f, 1.5f, 1 / 1.33f};
+    raindrop_drop drop = rt_drop(0, 0, 0, 0.001f);
+    const float d[3] = {0.48f, 0.6f, -0.64f};
+    int i, k, orders;
+    for (k = 0; k < 3; k++)
+        for (orders = 0; orders < 2; orders++) {
+            raindrop_lamp lamp = raindrop_lamp_defaults();
+            raindrop_render_options o = raindrop_render_defaults();
+            float colour[3] = {0, 0, 0};
+            double bubble = 0;
+            if (k == 2 && orders) continue; /* a bubble shows no bow of order 1 */
+            o.lamps = &lamp;
+            o.lamp_count = 1;
+            o.orders = orders;
+            lamp.radius = 0.3f;
+            for (i = 0; i < LAMPS; i++) {
+                double t = 1 - (2 * i + 1.0) / LAMPS, a = 2.39996323 * i, s = sqrt(1 - t * t);
+                raindrop__set(lamp.position, (float)(10 * s * cos(a)), (float)(10 * t), (float)(10 * s * sin(a)));
+                lamp.intensity[0] = lamp.intensity[1] = lamp.intensity[2] = (float)(100 * 4 * acos(-1.0) / LAMPS);
+                raindrop__far_lamps(colour, &o, &drop, d, indices[k]);
+            }
+            EXPECT_NEAR(colour[0], 1, 0.01);
+            bubble += (double)colour[0];
+            REPORT("light of lamps from all sides over that of a white sky", bubble, "");
+        }
+}
+
+/* The picture of a drop lit by one lamp, before black, against rays: its light, and where it is. */
+TEST(raindrop_glints_are_the_traced_lamp)
+{
+    static const double angles[7] = {10, 40, 75, 110, 139, 150, 172};
+    static const double sizes[3] = {160, 24, 5};
+    static float black[3 * 16 * 8];
+    sat_image image = sat_image_f32(black, 16, 8, 3);
+    raindrop_environment *dark = NULL;
+    raindrop_render_options o = raindrop_render_defaults();
+    raindrop_lamp lamp = raindrop_lamp_defaults();
+    rt_scene scene = rt_open();
+    double worst_light = 0, worst_place = 0, worst_far = 0, focal;
+    int i, k, c, size;
+    scene.camera.fov_y = 0.3f;
+    focal = 0.5 * RT_H / tan(0.15);
+    EXPECT_EQ(raindrop_environment_create(&dark, &image, NULL, NULL), SAT_OK);
+    o.lamps = &lamp;
+    o.lamp_count = 1;
+    lamp.radius = 40;
+    for (size = 0; size < 3; size++)
+        for (i = 0; i < 7; i++) {
+            const double away = sqrt(1 + pow(2 * focal / sizes[size], 2)) / sqrt(1 + 0.05 * 0.05 + 0.03 * 0.03);
+            raindrop_drop drop = rt_drop((float)(0.05 * away), (float)(-0.03 * away), (float)-away, 1);
+            raindrop_rain *rain = rt_rain_of(&drop, 1);
+            double d[3], side[3], length = 0, want[3], have[3] = {0, 0, 0}, error;
+            for (c = 0; c < 3; c++) length += (double)drop.position[c] * (double)drop.position[c];
+            for (c = 0; c < 3; c++) d[c] = (double)drop.position[c] / sqrt(length);
+            side[0] = d[1] / hypot(d[0], d[1]);
+            side[1] = -d[0] / hypot(d[0], d[1]);
+            side[2] = 0;
+            for (c = 0; c < 3; c++) {
+                double a = angles[i] * acos(-1.0) / 180, to = cos(a) * d[c] + sin(a) * side[c];
+                lamp.position[c] = drop.position[c] + (float)(1600 * to);
+            }
+            reference_lamp(want, RT_W, RT_H, &scene.camera, &drop, &lamp);
+            memset(scene.picture, 0, sizeof(float) * 3 * RT_W * RT_H);
+            EXPECT_EQ(raindrop_render(scene.picture, 0, RT_W, RT_H, NULL, &scene.camera, rain, dark, &o, NULL), SAT_OK);
+            for (k = 0; k < RT_W * RT_H; k++) {
+                double v = (double)scene.picture[3 * k];
+                have[0] += v;
+                have[1] += v * (k % RT_W + 0.5);
+                have[2] += v * (k / RT_W + 0.5);
+            }
+            error = fabs(have[0] / want[0] - 1);
+            if (error > worst_light) worst_light = error;
+            if (error > 0.08) printf("%g px, %g degrees: light %g, %g\n", sizes[size], angles[i], have[0], want[0]);
+            error = hypot(have[1] / have[0] - want[1], have[2] / have[0] - want[2]);
+            if (size == 2 && error > worst_far) worst_far = error;
+            if (size < 2 && error > worst_place) worst_place = error;
+            if (error > 0.02 * sizes[size] + 0.2)
+                printf("%g px, %g degrees: %g pixels off\n", sizes[size], angles[i], error);
+            raindrop_rain_destroy(rain);
+        }
+    EXPECT(worst_light <= 0.08); /* the most within half a degree of the bow */
+    EXPECT(worst_place <= 2 && worst_far <= 0.3);
+    REPORT("glints of a lamp, largest error of their light", 100 * worst_light, "%");
+    REPORT("glints of a lamp, largest error of their place", worst_place, "pixels of 24 and 160");
+    raindrop_environment_destroy(dark);
+    rt_close(&scene);
+}
+
+/* Swinging drops keep the light of their streaks on average, and change it along them. */
+TEST(raindrop_oscillation_speckles_and_keeps_the_light)
+{
+    enum { SIDE = 64, MOMENTS = 300 };
+    static float picture[3 * SIDE * SIDE], sky[3 * 64 * 32];
+    static const double radii[3] = {0.3, 1.2, 4};
+    sat_image image = sat_image_f32(sky, 64, 32, 3);
+    raindrop_environment_options e = raindrop_environment_defaults();
+    raindrop_environment *environment = NULL;
+    raindrop_lamp lamp = raindrop_lamp_defaults();
+    int i, k, lit;
+    memset(sky, 0, sizeof sky);
+    for (i = 0; i < 3 * 64; i++) sky[3 * 64 * 14 + i] = (float)(i % 60); /* lamps along the horizon */
+    e.far_swing = 1;
+    EXPECT_EQ(raindrop_environment_create(&environment, &image, &e, NULL), SAT_OK);
+    lamp.position[0] = 3;
+    lamp.position[1] = 4;
+    lamp.position[2] = -6;
+    lamp.intensity[0] = lamp.intensity[1] = lamp.intensity[2] = 500;
+    for (lit = 0; lit < 2; lit++)
+        for (i = 0; i < 3; i++) {
+            raindrop_camera camera = raindrop_camera_defaults();
+            raindrop_drop drop = rt_drop(0, 0, 0, 0.0012f);
+            raindrop_render_options o = raindrop_render_defaults();
+            raindrop_rain *rain;
+            double mean[2] = {0, 0}, speckle = 0, least, most;
+            int moment, swings;
+            const double pixel = (double)drop.radius / radii[i] / (2.0 / SIDE); /* distance */
+            drop.position[2] = (float)-pixel;
+            drop.velocity[1] = -6;
+            camera.depth_near = 0;
+            camera.exposure = (float)(pixel * (2.0 / SIDE) * 24 / 6); /* 24 pixels */
+            rain = rt_rain_of(&drop, 1);
+            if (lit) {
+                o.lamps = &lamp;
+                o.lamp_count = 1;
+            }
+            for (moment = 0; moment < MOMENTS; moment++)
+                for (swings = 0; swings < 2; swings++) {
+                    double rows[SIDE];
+                    o.oscillation = swings ? 0.1f : 0;
+                    rain->time = fmod(0.000371 * moment, RAINDROP__PERIOD);
+                    memset(picture, 0, sizeof picture);
+                    memset(rows, 0, sizeof rows);
+                    EXPECT_EQ(raindrop_render(picture, 0, SIDE, SIDE, NULL, &camera, rain, environment, &o, NULL),
+                              SAT_OK);
+                    for (k = 0; k < SIDE * SIDE; k++) {
+                        mean[swings] += (double)picture[3 * k] / MOMENTS;
+                        rows[k / SIDE] += (double)picture[3 * k];
+                    }
+                    if (!swings) continue;
+                    for (k = 26, least = most = rows[k]; k < 37; k++) {
+                        least = fmin(least, rows[k]);
+                        most = fmax(most, rows[k]);
+                    }
+                    speckle += (1 - least / most) / MOMENTS;
+                }
+            EXPECT_REL(mean[1], mean[0], 0.02);
+            if (lit) EXPECT(speckle > 0.1);
+            REPORT(lit ? "swinging streaks under a lamp, mean light over that of still ones"
+                       : "swinging streaks, mean light over that of still ones", mean[1] / mean[0], "");
+            REPORT("darkest over brightest row of the middle half", 1 - speckle, "on average");
+            raindrop_rain_destroy(rain);
+        }
+    raindrop_environment_destroy(environment);
+}
+
+/* A still near drop that swings is the spheroid of that moment. */
+TEST(raindrop_swinging_drop_against_ray_tracing)
+{
+    rt_scene scene = rt_open();
+    raindrop_drop drop = rt_drop(0.001f, 0.0005f, -0.01f, 0.0022f), bent = drop;
+    raindrop_render_options o = raindrop_render_defaults();
+    raindrop_rain *rain = rt_rain_of(&drop, 1);
+    raindrop__swing swing;
+    double error;
+    int i;
+    o.oscillation = 0.1f;
+    o.orders = 0;
+    for (i = 0; i < 2; i++) { /* flat and tall */
+        rain->time = 0;
+        do {
+            rain->time += 0.0001;
+            swing = raindrop__swing_of(rain, 0, o.oscillation);
+            bent.axis_ratio = raindrop__swung(1, &swing, 0);
+        } while ((bent.axis_ratio > 1) != i || fabsf(bent.axis_ratio - 1) < 0.09f);
+        EXPECT(reference_render(scene.truth, scene.mask, RT_W, RT_H, 4, &scene.camera, &bent, 1, scene.environment, -1));
+        rt_render(&scene, rain, &o, NULL);
+        error = rt_error(&scene);
+        EXPECT(error < 0.03);
+        REPORT(i ? "a drop swung tall, RMSE from rays" : "a drop swung flat, RMSE from rays", error, "");
+    }
+    raindrop_rain_destroy(rain);
+    rt_close(&scene);
+}
+
+TEST(raindrop_lamps_refuse_nonsense)
+{
+    char text[160];
+    raindrop_lamp lamps[2];
+    raindrop_render_options o = raindrop_render_defaults();
+    float spot[3] = {0, 0, 0}, all[3] = {0, 0, 0};
+    raindrop_drop drop = rt_drop(0, -5, 0, 0.001f);
+    const float d[3] = {0, 0, -1};
+    lamps[0] = lamps[1] = raindrop_lamp_defaults();
+    EXPECT(strcmp(raindrop_explain_lamp(text, sizeof text, &lamps[0]), "") == 0);
+    EXPECT(strcmp(raindrop_explain_lamp(text, sizeof text, NULL), "lamp is NULL") == 0);
+    o.lamp_count = 2;
+    EXPECT(strcmp(raindrop_explain_render(text, sizeof text, 0, 1, 1, NULL, &o), "lamps is NULL, and lamp_count above 0") == 0);
+    o.lamps = lamps;
+    EXPECT(strcmp(raindrop_explain_render(text, sizeof text, 0, 1, 1, NULL, &o), "") == 0);
+    lamps[1].inner = 1;
+    lamps[1].outer = 0.5f;
+    EXPECT(strcmp(raindrop_explain_render(text, sizeof text, 0, 1, 1, NULL, &o), "outer is below inner") == 0);
+    lamps[1].outer = sat__float_from_bits(0x7fc00000u);
+    EXPECT(strcmp(raindrop_explain_lamp(text, sizeof text, &lamps[1]), "outer is NaN; 0..3.1416") == 0);
+    lamps[1] = lamps[0];
+    lamps[1].direction[1] = -1.5f;
+    EXPECT(strcmp(raindrop_explain_lamp(text, sizeof text, &lamps[1]), "direction is no unit vector") == 0);
+    lamps[1] = lamps[0];
+    lamps[1].intensity[2] = -1;
+    EXPECT(strcmp(raindrop_explain_lamp(text, sizeof text, &lamps[1]), "intensity[2] is -1; 0..1e18") == 0);
+    /* a cone lights what it points at, as brightly as a lamp all around, and nothing beside it */
+    o.lamp_count = 1;
+    raindrop__far_lamps(all, &o, &drop, d, 1.33f);
+    lamps[0].inner = 0.3f;
+    lamps[0].outer = 0.5f;
+    raindrop__far_lamps(spot, &o, &drop, d, 1.33f);
+    EXPECT(all[0] > 0 && memcmp(all, spot, sizeof all) == 0);
+    raindrop__set(spot, 0, 0, 0);
+    drop.position[0] = 5 * tanf(0.4f);
+    raindrop__far_lamps(spot, &o, &drop, d, 1.33f);
+    EXPECT(spot[0] > 0);
+    raindrop__set(spot, 0, 0, 0);
+    drop.position[0] = 5 * tanf(0.51f);
+    raindrop__far_lamps(spot, &o, &drop, d, 1.33f);
+    EXPECT(!(spot[0] > 0));
+    drop.position[1] = 0; /* in the drop */
+    drop.position[0] = 0;
+    raindrop__far_lamps(spot, &o, &drop, d, 1.33f);
+    EXPECT(!(spot[0] > 0));
+}
+
 TEST(raindrop_same_bits_for_any_workers)
 {
     enum { COUNT = 30000 };
     static const int workers[4] = {1, 2, 3, 7};
     uint64_t truth = 0, rain_truth = 0;
     rt_scene scene = rt_open();
+    raindrop_lamp lamp = raindrop_lamp_defaults();
+    raindrop_render_options render = raindrop_render_defaults();
     int i, odd;
+    lamp.position[1] = 1;
+    render.lamps = &lamp;
+    render.lamp_count = 1;
+    render.oscillation = 0.1f;
     scene.camera.exposure = 0.005f;
     scene.camera.aperture = 0.002f;
     for (odd = 0; odd < 2; odd++) {
@@ -1923,7 +2169,7 @@ TEST(raindrop_same_bits_for_any_workers)
             raindrop_rain_advance(rain, 0.3);
             raindrop_rain_set_wind(rain, gust);
             raindrop_rain_advance(rain, 0.02);
-            stats = rt_render(&scene, rain, NULL, NULL);
+            stats = rt_render(&scene, rain, &render, NULL);
             drops = support_hash(raindrop_rain_drops(NULL, rain), COUNT * sizeof(raindrop_drop));
             hash = support_hash_add(support_hash(scene.picture, sizeof(float) * 3 * RT_W * RT_H), &stats, sizeof stats);
             if (!truth) { truth = hash; rain_truth = drops; }
