@@ -125,6 +125,7 @@
    >> lamps         their light through drops; drops that oscillate
    >> picture       camera, culling, sorting
    >> drawing       rays in batches, far drops, streaks, depth of field
+   >> glints        lamps seen in drops, far drops that swing
    >> sprites       the published sprites; bands and whole pictures, background, veil
    >> shaders       the same in GLSL
    >> OpenGL        the object and its calls
@@ -425,7 +426,8 @@ typedef struct raindrop_lamp {
     float intensity[3]; /* 1, 1, 1: radiance of the ball times pi radius^2, in the environment's unit and metres */
     float radius;       /* 0.1; 0..1e18; of the ball, in metres */
     float direction[3]; /* 0, -1, 0: a unit vector, the axis of the cone */
-    float inner, outer; /* 3.1415927; 0..3.1416; radians from the axis: up to inner its full light, from outer on none */
+    float inner;        /* 3.1415926535897932; 0..3.1416; radians from the axis within which it has its full light */
+    float outer;        /* 3.1415926535897932; 0..3.1416; radians from which on it has none; not below inner */
 } raindrop_lamp;
 RAINDROP_DEF raindrop_lamp raindrop_lamp_defaults(void);
 RAINDROP_DEF const char *raindrop_explain_lamp(char *text, size_t size, const raindrop_lamp *lamp);
@@ -1926,8 +1928,8 @@ static inline void raindrop__ray_colour(float rgb[3], const raindrop_environment
     }
 }
 
-/* Mean light of a far spheroid seen along the unit vector d, by order 0: samples on a spiral in its elliptic disc, whose
-   half axes are 1 to the side and k upwards. */
+/* Mean light of a far spheroid seen along the unit vector d, by order 0: samples on a spiral in its elliptic disc, with
+   half axes of 1 to the side and k upwards. */
 static inline double raindrop__spheroid_light(const raindrop__environment_job *job, const float d[3], float ratio)
 {
     const raindrop_environment *environment = job->environment;
@@ -2821,11 +2823,11 @@ RAINDROP_DEF sat_result raindrop_rain_set_drops(raindrop_rain *rain, const raind
 
    A lamp is seen in a drop as one point, a glint, for each path that turns the view by the angle theta between the view
    and the lamp: the mirrored ray, b = cos(theta/2); order 0, tan r = sin(theta/2) / (n - cos(theta/2)), b = n sin r;
-   order 1, two of them beyond the bow's angle, by Newton's method. Of an irradiance E the drop sends E r^2 G to the eye,
-   G = share d(b^2) / (2 d(-cos theta)): of a lamp of half width a the mean over theta - a .. theta + a, which is finite
-   at the bow too. Near drops, D radii away, show it along a ray that leaves the axis by alpha, sin(alpha) = b/D: theta is
-   smaller by alpha for the mirrored ray and larger for the others, found by iteration. The shares of a drop's area are those of raindrop_render with one internal reflection: the light of
-   lamps from all sides sums to that of a white sky.
+   order 1, two of them beyond the bow's angle, by Newton's method. Of an irradiance E the drop sends E r^2 G to the
+   eye, G = share d(b^2) / (2 d(-cos theta)): of a lamp of half width a the mean over theta - a .. theta + a, which is
+   finite at the bow too. Near drops, D radii away, show it along a ray that leaves the axis by alpha, sin(alpha) = b/D:
+   theta is smaller by alpha for the mirrored ray and larger for the others, found by iteration. The shares are those of
+   raindrop_render with one internal reflection: the light of lamps from all sides sums to that of a white sky.
 
    Oscillation: the first two modes (Garg and Nayar 2006), at Rayleigh's frequencies omega^2 = n (n-1) (n+2) sigma /
    (rho r^3), n = 2 and 3, which those of Beard and Kubesh 1991 follow: the oblate-prolate one changes the axis ratio,
@@ -2948,8 +2950,8 @@ static inline float raindrop__glint_b2(float angle, int path, float n, float per
     return b2;
 }
 
-/* A glint: the unit vector that shows it; what it sends, E G; its radius in radii of the drop; the normal where its light
-   enters. */
+/* A glint: the unit vector that shows it; what it sends, E G; its radius in radii of the drop; the normal where its
+   light enters. */
 typedef struct raindrop__glint { float seen[3], light[3], radius, normal[3]; } raindrop__glint;
 
 /* A lamp as a drop sees it: a unit vector to it, its irradiance, half its width in radians. 0: it is dark there. */
@@ -2977,11 +2979,11 @@ static inline int raindrop__light(raindrop__lit *lit, const raindrop_lamp *lamp,
 }
 
 /* The glint of a path in a drop that is seen along the unit vector d; per_distance: 0 for far drops. */
-static inline int raindrop__glint_of(raindrop__glint *out, const raindrop__lit *lit, const float d[3], int path, float n,
-                                     int orders, float per_distance)
+static inline int raindrop__glint_of(raindrop__glint *out, const raindrop__lit *lit, const float d[3], int path,
+                                     float n, int orders, float per_distance)
 {
-    float cosine = raindrop__clamp(raindrop__dot(d, lit->to), -1, 1), angle = acosf(cosine), b2, b, ring, g, side[3], p[3],
-          low = angle > lit->width ? angle - lit->width : 0,
+    float cosine = raindrop__clamp(raindrop__dot(d, lit->to), -1, 1), angle = acosf(cosine), b2, b, ring, g, side[3];
+    float p[3], low = angle > lit->width ? angle - lit->width : 0,
           high = angle + lit->width < (float)RAINDROP__PI ? angle + lit->width : (float)RAINDROP__PI, share, off, sign;
     float low_b2 = raindrop__glint_b2(low, path, n, per_distance),
           high_b2 = raindrop__glint_b2(high, path, n, per_distance);
@@ -3073,8 +3075,8 @@ typedef struct raindrop__frame {
     const raindrop__pair *order;
 } raindrop__frame;
 
-/* A drop in view space: x right, y up, z forward; the quantities drawing starts from. radius: half axis across; reach: of
-   a ball that holds the drop, however it swings. */
+/* A drop in view space: x right, y up, z forward; the quantities drawing starts from. radius: half axis across; reach:
+   of a ball that holds the drop, however it swings. */
 typedef struct raindrop__placed { float x, y, z, radius, distance2, flatness, reach; } raindrop__placed;
 
 static inline void raindrop__swing_drop(raindrop__placed *placed, const raindrop__frame *frame, uint32_t index)
@@ -4082,7 +4084,9 @@ static inline void raindrop__draw_far_any(raindrop__batch *batch, const raindrop
     else raindrop__draw_far(batch, v, box);
 }
 
-/* ---- glints of lamps, and far drops that swing */
+/* ------------------------------------------------------------------------------------------------
+   >> glints   lamps seen in drops, and far drops that swing
+   ------------------------------------------------------------------------------------------------ */
 
 /* The glint of a lamp by one path as a far drop of its own: in a near drop at its place, in a far one all over it. */
 static inline int raindrop__glint_seen(raindrop__visible *out, float normal[3], const raindrop__frame *frame,
@@ -5679,6 +5683,8 @@ static inline int raindrop__gl_frame_is_valid(raindrop_gl *g, const raindrop__fr
     if (!raindrop__camera_is_valid(&t, &frame->camera) || !raindrop__render_is_valid(&t, &frame->options)) return 0;
     if (frame->options.look == RAINDROP_LOOK_MAP && !g->options.map)
         return raindrop__say(&t, "map is NULL, which RAINDROP_LOOK_MAP needs");
+    if (frame->options.lamp_count > 0 || frame->options.oscillation > 0)
+        return raindrop__say(&t, "lamp_count or oscillation is above 0; OpenGL has neither");
     if (!g->environment) return raindrop__say(&t, "there was no raindrop_gl_set_environment");
     return g->drops[0] ? 1 : raindrop__say(&t, "there was no raindrop_gl_set_rain");
 }

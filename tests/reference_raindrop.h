@@ -159,8 +159,8 @@ static inline void reference_draw(float *fine, unsigned char *mask, int width, i
                                   const raindrop_environment *environment, int orders)
 {
     double focal = 0.5 * height * side / tan(0.5 * (double)camera->fov_y), ratio = (double)drop->axis_ratio;
-    double radius = (double)drop->radius / cbrt(ratio), ball = ratio > 1 ? radius * ratio : radius, rel[3], z = 0, x = 0,
-           y = 0, reach, zz, rr;
+    double radius = (double)drop->radius / cbrt(ratio), ball = ratio > 1 ? radius * ratio : radius;
+    double rel[3], z = 0, x = 0, y = 0, reach, zz, rr;
     int i, px, py, x0, x1, y0, y1, w = width * side, h = height * side;
     for (i = 0; i < 3; i++) {
         rel[i] = (double)drop->position[i] - (double)camera->position[i];
@@ -246,8 +246,8 @@ static inline int reference_render(float *rgb, unsigned char *mask, int width, i
     return 1;
 }
 
-/* ---- one lamp in one drop before black, by rays fine enough to hit it: its light in pixels, and where its middle is; the
-   orders up to 1 as raindrop_render has them by default, the later ones' light with the last */
+/* ---- one lamp in one drop before black, by rays fine enough to hit it: its light in pixels, and where its middle is;
+   the orders up to 1 as raindrop_render has them by default, the later ones' light with the last */
 
 static inline void reference_lamp(double *out, int width, int height, const raindrop_camera *camera,
                                   const raindrop_drop *drop, const raindrop_lamp *lamp)
@@ -268,7 +268,7 @@ static inline void reference_lamp(double *out, int width, int height, const rain
     wide = (double)lamp->radius / distance;
     radiance = (double)lamp->intensity[0] / (pi * (double)lamp->radius * (double)lamp->radius);
     reach = 1.3 * focal * (double)drop->radius / z;
-    n = 800;
+    n = 600;
     step = 2 * reach / n;
     out[0] = out[1] = out[2] = 0;
     for (j = 0; j < n; j++)

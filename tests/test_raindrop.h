@@ -1939,7 +1939,7 @@ TEST(raindrop_lamps_all_around_are_a_white_sky)
 TEST(raindrop_glints_are_the_traced_lamp)
 {
     static const double angles[7] = {10, 40, 75, 110, 139, 150, 172};
-    static const double sizes[3] = {160, 24, 5};
+    static const double sizes[2] = {160, 5};
     static float black[3 * 16 * 8];
     sat_image image = sat_image_f32(black, 16, 8, 3);
     raindrop_environment *dark = NULL;
@@ -1953,8 +1953,8 @@ TEST(raindrop_glints_are_the_traced_lamp)
     EXPECT_EQ(raindrop_environment_create(&dark, &image, NULL, NULL), SAT_OK);
     o.lamps = &lamp;
     o.lamp_count = 1;
-    lamp.radius = 40;
-    for (size = 0; size < 3; size++)
+    lamp.radius = 64;
+    for (size = 0; size < 2; size++)
         for (i = 0; i < 7; i++) {
             const double away = sqrt(1 + pow(2 * focal / sizes[size], 2)) / sqrt(1 + 0.05 * 0.05 + 0.03 * 0.03);
             raindrop_drop drop = rt_drop((float)(0.05 * away), (float)(-0.03 * away), (float)-away, 1);
@@ -1982,8 +1982,8 @@ TEST(raindrop_glints_are_the_traced_lamp)
             if (error > worst_light) worst_light = error;
             if (error > 0.08) printf("%g px, %g degrees: light %g, %g\n", sizes[size], angles[i], have[0], want[0]);
             error = hypot(have[1] / have[0] - want[1], have[2] / have[0] - want[2]);
-            if (size == 2 && error > worst_far) worst_far = error;
-            if (size < 2 && error > worst_place) worst_place = error;
+            if (size == 1 && error > worst_far) worst_far = error;
+            if (size == 0 && error > worst_place) worst_place = error;
             if (error > 0.02 * sizes[size] + 0.2)
                 printf("%g px, %g degrees: %g pixels off\n", sizes[size], angles[i], error);
             raindrop_rain_destroy(rain);
@@ -1991,7 +1991,7 @@ TEST(raindrop_glints_are_the_traced_lamp)
     EXPECT(worst_light <= 0.08); /* the most within half a degree of the bow */
     EXPECT(worst_place <= 2 && worst_far <= 0.3);
     REPORT("glints of a lamp, largest error of their light", 100 * worst_light, "%");
-    REPORT("glints of a lamp, largest error of their place", worst_place, "pixels of 24 and 160");
+    REPORT("glints of a lamp, largest error of their place", worst_place, "pixels of 160");
     raindrop_environment_destroy(dark);
     rt_close(&scene);
 }
@@ -2082,7 +2082,8 @@ TEST(raindrop_swinging_drop_against_ray_tracing)
             swing = raindrop__swing_of(rain, 0, o.oscillation);
             bent.axis_ratio = raindrop__swung(1, &swing, 0);
         } while ((bent.axis_ratio > 1) != i || fabsf(bent.axis_ratio - 1) < 0.09f);
-        EXPECT(reference_render(scene.truth, scene.mask, RT_W, RT_H, 4, &scene.camera, &bent, 1, scene.environment, -1));
+        EXPECT(reference_render(scene.truth, scene.mask, RT_W, RT_H, 4, &scene.camera, &bent, 1, scene.environment,
+                                -1));
         rt_render(&scene, rain, &o, NULL);
         error = rt_error(&scene);
         EXPECT(error < 0.03);
