@@ -69,7 +69,7 @@
      1e-15. The optimum is proven by complementary slackness with differences of twice the width; where doubles do not
      hold what the costs span (1e-45 to 1e30 in one problem), the last paths are searched in fixed point of 320 bits, so
      that no cost that is not used spoils the proof (stats.exact_repair). Softassign stays finite
-     down to temperatures of 1e-12. Ties: free columns first, then the smaller index.
+     at any temperature, 0 too. Ties: free columns first, then the smaller index.
      Same bits for any number of workers. A compiler that contracts a*b+c may change the last bit of distances.
 
    METHOD (EXACT)
@@ -475,6 +475,14 @@ static inline double softassign__gap(double cost, double bound, double magnitude
     if (!sat__is_finite_double(bound)) return (double)SOFTASSIGN__INFINITY;
     if (size > 0) return off / size;
     return off <= 1e-13 * magnitude ? 0 : (double)SOFTASSIGN__INFINITY;
+}
+
+/* 1 / sqrt(t), but no more than keeps the sum of `count` elements of exp(70) or exp(650) finite: below that temperature
+   it only weighs elements against the outlier, which is nothing beside them. */
+static inline double softassign__published_factor(double t, int count, int wide)
+{
+    double factor = 1 / sqrt(t), largest = (wide ? 1e25 : 1e7) / count;
+    return factor < largest ? factor : largest;
 }
 
 /* splitmix64 */
@@ -3104,7 +3112,7 @@ typedef struct softassign__published {
     void *m, *best;           /* rows x columns, float or double */
     void *column, *outlier;   /* per column */
     double *row_cost;
-    double largest, t;
+    double largest, t, factor;
     int evolves;
 } softassign__published;
 
@@ -3141,7 +3149,7 @@ static inline double softassign__exp_clamped_f64(double x) { return exp(x < -650
         softassign__published *p = (softassign__published *)context;                                                   \
         const softassign *s = p->s;                                                                                    \
         int i, j, n = s->columns, gold = s->options.gold;                                                              \
-        T alpha = (T)s->options.alpha, scale = (T)(1 / p->largest), inverse = (T)(1 / p->t), factor = (T)(1 / sqrt(p->t));\
+        T alpha = (T)s->options.alpha, scale = (T)(1 / p->largest), inverse = (T)(1 / p->t), factor = (T)p->factor;\
         (void)worker;                                                                                                  \
         for (i = begin; i < end; i++) {                                                                                \
             const float *cost = s->matrix + (size_t)i * (size_t)n;                                                     \
@@ -3208,6 +3216,7 @@ static inline double softassign__exp_clamped_f64(double x) { return exp(x < -650
         for (cool = 0; cool < o->iterations[0]; cool++, p->t *= o->cooling) {                                          \
             double cost = 0;                                                                                           \
             if (!(p->t > 1e-30)) p->t = 1e-30;                                                                         \
+            p->factor = softassign__published_factor(p->t, sat__max_int(s->rows, s->columns), o->double_precision);    \
             for (steady = 0; steady < o->iterations[1]; steady++) {                                                    \
                 sat__parallel_for(&o->threads, s->rows, softassign__update_##suffix, p);                               \
                 for (j = 0; j < s->columns; j++) ((T *)p->outlier)[j] = (T)o->outlier;                                 \
@@ -4846,7 +4855,8 @@ static sat_result softassign__gl_cool(softassign_gl *g, double t, float *cost)
 {
     const softassign_options *o = &g->options;
     int w = g->columns, h = g->rows, steady, turn, q;
-    float alpha = (float)o->alpha, inverse = (float)(1 / t), factor = (float)(1 / sqrt(t)), scale = 1 / g->largest;
+    float alpha = (float)o->alpha, inverse = (float)(1 / t), scale = 1 / g->largest,
+          factor = (float)softassign__published_factor(t, sat__max_int(w, h), 0);
     sat_result result = SAT_OK;
     *cost = 0;
     softassign__gl_values(g, SOFTASSIGN__UPDATE_M, alpha, inverse, factor, scale);

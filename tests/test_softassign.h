@@ -751,12 +751,12 @@ TEST(softassign_tiny_temperatures_stay_finite)
 {
     static float (*const costs[])(int, int, uint64_t *) = {cost_uniform, cost_wide, cost_equal, cost_zero,
                                                            cost_negative};
-    static const double temperatures[] = {1e-3, 1e-6, 1e-12};
+    static const double temperatures[] = {1e-3, 1e-6, 1e-12, 0};
     size_t k, t;
     int m, x[50];
     float *soft = (float *)malloc(50 * 80 * sizeof *soft);
     for (k = 0; k < 5; k++)
-        for (t = 0; t < 3; t++)
+        for (t = 0; t < 4; t++)
             for (m = 0; m < 3; m++) {
                 problem q = make_dense(50, 80, costs[k], 5);
                 softassign_options o = softassign_method_defaults(m ? SOFTASSIGN_PUBLISHED : SOFTASSIGN_ENTROPIC);

@@ -366,8 +366,8 @@ TEST(softassign_gl_refuses_the_options_that_the_cpu_refuses)
     close_gl();
 }
 
-/* NULL means softassign_defaults(), and the corners of the options that are read, in pairs, give the CPU's matrix. But
-   for a temperature of 0, whose exponents are 0 times infinity. */
+/* NULL means softassign_defaults(), and the corners of the options that are read, in pairs, give the CPU's matrix, a
+   temperature of 0 too. */
 TEST(softassign_gl_corners_of_options_in_pairs)
 {
     enum { ROWS = 5, COLUMNS = 7, CELLS = ROWS * COLUMNS };
@@ -389,8 +389,8 @@ TEST(softassign_gl_corners_of_options_in_pairs)
         for (b = a; b < 8; b++)
             for (k = 0; k < 9; k++) {
                 const sat__field *f = fields[a], *g = fields[b];
-                const double first[3] = {f->initial, a ? f->low : 1e-3, f->high < 2e9 || f->type == 'd' ? f->high : 3};
-                const double second[3] = {g->initial, b ? g->low : 1e-3, g->high < 2e9 || g->type == 'd' ? g->high : 3};
+                const double first[3] = {f->initial, f->low, f->high < 2e9 || f->type == 'd' ? f->high : 3};
+                const double second[3] = {g->initial, g->low, g->high < 2e9 || g->type == 'd' ? g->high : 3};
                 softassign_options o = softassign_defaults();
                 softassign_stats r;
                 double soft_cost;
