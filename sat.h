@@ -1384,9 +1384,9 @@ SAT__IEEE_END
    defines SAT_SIBLING and SAT_SIBLING_GL before it includes this header in its implementation part, keeps
    a sat__gl in its object, and does
 
-       create    sat__gl_open, sat__gl_build, sat__gl_texture, sat__gl_framebuffer
-       a frame   sat__gl_begin, { sat__gl_pass, sat__gl_set_..., sat__gl_draw } ..., sat__gl_end
-       destroy   DeleteProgram, DeleteTextures, DeleteFramebuffers, sat__gl_close
+       create    sat__gl_open, sat__gl_build_table, sat__gl_make_target, sat__gl_texture
+       a frame   sat__gl_begin, { SAT__GL_START, sat__gl_set_..., sat__gl_draw, or SAT__GL_PASS } ..., sat__gl_end
+       destroy   sat__gl_delete_programs, sat__gl_free_target, DeleteTextures, sat__gl_close
 
    with the context current. Anything not wrapped here is called through the table: gl->DrawBuffers(...).
    A frame's calls ask nothing of the GPU that makes the CPU wait.
@@ -1879,6 +1879,77 @@ static inline sat_result sat__gl_build(sat__gl *gl, unsigned *program, const sat
     return result;
 }
 
+/* ---- the table of programs: a line each, with what it reads and its texts. Nothing else lists them: the object has an
+   array of programs with an enum of the same order, and where a pass is run its textures follow in the order of the
+   samplers (SAT__GL_PASS). */
+
+enum { SAT__GL_COMPUTE = 1 << 30 }; /* in `when`: a compute shader, made only where the context has them */
+
+typedef struct sat__gl_program {
+    const char *name;        /* for messages, such as "tonemap: steps" */
+    int when;                /* bits of the header's own: it is made where all of them are given; 0: always */
+    const char *samplers;    /* "luminance state": those of the units 0, 1, ... */
+    const char *defines;     /* #define lines of its own, or NULL */
+    const char *vertex;      /* NULL: a triangle over the whole viewport */
+    const char *fragment[8]; /* texts, one behind the other */
+} sat__gl_program;
+
+/* The samplers of a program read the units 0, 1, ..., for good. */
+static inline void sat__gl_name_units(sat__gl *gl, unsigned program, const char *samplers)
+{
+    char name[32];
+    int unit;
+    gl->UseProgram(program);
+    for (unit = 0; *samplers; unit++) {
+        size_t n = strcspn(samplers, " ");
+        SAT_ASSERT(n < sizeof name);
+        memcpy(name, samplers, n);
+        name[n] = 0;
+        gl->Uniform1i(gl->GetUniformLocation(program, name), unit);
+        samplers += n + (samplers[n] == ' ');
+    }
+}
+
+/* Makes programs[i] of each line i of the table that is wanted; the others are 0. The pending #define lines and
+   `library` go in front of all. Between sat__gl_begin and sat__gl_end; delete them with sat__gl_delete_programs. */
+static inline sat_result sat__gl_build_table(sat__gl *gl, unsigned *programs, const sat__gl_program *table, int count,
+                                             int given, const char *const *library)
+{
+    char defines[sizeof gl->defines];
+    sat_result result = SAT_OK;
+    int i, wanted = given | (gl->has_compute ? SAT__GL_COMPUTE : 0);
+    memcpy(defines, gl->defines, sizeof defines);
+    for (i = 0; i < count && result == SAT_OK; i++) {
+        const char *fragment[9], *vertex[2];
+        sat__gl_shaders shaders;
+        programs[i] = 0;
+        if ((table[i].when & wanted) != table[i].when) continue;
+        memset(&shaders, 0, sizeof shaders);
+        memcpy(fragment, table[i].fragment, sizeof table[i].fragment);
+        fragment[8] = vertex[1] = NULL;
+        vertex[0] = table[i].vertex;
+        shaders.name = table[i].name;
+        shaders.library = library;
+        if (vertex[0]) shaders.vertex = vertex;
+        if (table[i].when & SAT__GL_COMPUTE) shaders.compute = fragment;
+        else shaders.fragment = fragment;
+        snprintf(gl->defines, sizeof gl->defines, "%s%s", defines, table[i].defines ? table[i].defines : "");
+        result = sat__gl_build(gl, &programs[i], &shaders);
+        if (result == SAT_OK) sat__gl_name_units(gl, programs[i], table[i].samplers);
+    }
+    gl->defines[0] = 0;
+    return result;
+}
+
+static inline void sat__gl_delete_programs(sat__gl *gl, unsigned *programs, int count)
+{
+    int i;
+    for (i = 0; i < count; i++) {
+        gl->DeleteProgram(programs[i]); /* 0 is ignored */
+        programs[i] = 0;
+    }
+}
+
 /* ---- >> for siblings, textures: and framebuffers. These change bindings: call them between sat__gl_begin and
    sat__gl_end. */
 
@@ -1994,6 +2065,31 @@ static inline sat_result sat__gl_framebuffer(sat__gl *gl, unsigned *framebuffer,
     return result;
 }
 
+/* A texture that passes draw into, and its framebuffer: what a header's objects mostly are made of. */
+typedef struct sat__gl_target {
+    unsigned texture, framebuffer;
+    int width, height;
+} sat__gl_target;
+
+static inline void sat__gl_free_target(sat__gl *gl, sat__gl_target *target)
+{
+    if (target->framebuffer) gl->DeleteFramebuffers(1, &target->framebuffer);
+    if (target->texture) gl->DeleteTextures(1, &target->texture);
+    memset(target, 0, sizeof *target);
+}
+
+static inline sat_result sat__gl_make_target(sat__gl *gl, sat__gl_target *target, unsigned internal, int width,
+                                             int height)
+{
+    sat_result result = sat__gl_texture(gl, &target->texture, internal, width, height, NULL);
+    target->framebuffer = 0;
+    target->width = width;
+    target->height = height;
+    if (result == SAT_OK) result = sat__gl_framebuffer(gl, &target->framebuffer, &target->texture, 1, 0);
+    if (result != SAT_OK) sat__gl_free_target(gl, target);
+    return result;
+}
+
 /* Copies a texture into packed rows; waits for the GPU. Some ES drivers read only RGBA back. */
 static inline sat_result sat__gl_read(sat__gl *gl, void *pixels, unsigned texture, unsigned internal, int width,
                                       int height)
@@ -2018,16 +2114,16 @@ static inline void sat__gl_pass(sat__gl *gl, unsigned program, unsigned framebuf
     gl->Viewport(0, 0, width, height);
 }
 
-/* What a shader that draws to a sat_gl_target has instead of gl_FragCoord: the pixel of the picture. */
-static inline const char *sat__gl_pixel(void)
-{
-    return SAT__GLSL(
-        uniform ivec3 sat_corner_of; /* x, y; with flip the height, else 0 */
-        ivec2 sat_pixel() {
-            ivec2 p = ivec2(gl_FragCoord.xy) - sat_corner_of.xy;
-            return sat_corner_of.z > 0 ? ivec2(p.x, sat_corner_of.z - 1 - p.y) : p;
-        });
-}
+/* What a shader that draws to a sat_gl_target has instead of gl_FragCoord: the pixel of the picture. The uniform is x,
+   y, and with flip the height, else 0. */
+#define SAT__GL_PIXEL                                                                                                  \
+    SAT__GLSL(                                                                                                         \
+        uniform ivec3 sat_corner_of;                                                                                   \
+        ivec2 sat_pixel() {                                                                                            \
+            ivec2 p = ivec2(gl_FragCoord.xy) - sat_corner_of.xy;                                                       \
+            return sat_corner_of.z > 0 ? ivec2(p.x, sat_corner_of.z - 1 - p.y) : p;                                    \
+        })
+static inline const char *sat__gl_pixel(void) { return SAT__GL_PIXEL; }
 
 static inline int sat__gl_target_is_valid(const sat_gl_target *target)
 {
@@ -2135,6 +2231,35 @@ static inline void sat__gl_set_texture(sat__gl *gl, unsigned program, const char
     gl->BindSampler((unsigned)unit, 0);
     gl->Uniform1i(gl->GetUniformLocation(program, name), unit);
 }
+
+/* Textures for the units 0, 1, ... of a program of a table. */
+static inline void sat__gl_inputs(sat__gl *gl, const unsigned *textures, int count)
+{
+    int unit;
+    for (unit = 0; unit < count; unit++) {
+        gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)unit);
+        gl->BindTexture(SAT__GL_TEXTURE_2D, textures[unit]);
+        gl->BindSampler((unsigned)unit, 0);
+    }
+}
+
+/* SAT__GL_INPUTS(gl, textures in the order of the samplers ...); SAT__GL_START(gl, program, &target, textures ...),
+   then its uniforms and sat__gl_draw; SAT__GL_PASS(gl, program, &target, textures ...): a pass without uniforms. */
+#define SAT__GL_INPUTS(gl, ...)                                                                                        \
+    do {                                                                                                               \
+        const unsigned sat__textures[] = {__VA_ARGS__};                                                                \
+        sat__gl_inputs(gl, sat__textures, SAT__COUNT(sat__textures));                                                  \
+    } while (0)
+#define SAT__GL_START(gl, program, to, ...)                                                                            \
+    do {                                                                                                               \
+        sat__gl_pass(gl, program, (to)->framebuffer, (to)->width, (to)->height);                                       \
+        SAT__GL_INPUTS(gl, __VA_ARGS__);                                                                               \
+    } while (0)
+#define SAT__GL_PASS(gl, program, to, ...)                                                                             \
+    do {                                                                                                               \
+        SAT__GL_START(gl, program, to, __VA_ARGS__);                                                                   \
+        sat__gl_draw(gl);                                                                                              \
+    } while (0)
 
 /* ---- state: what the passes may touch, saved before and put back after
 
@@ -6463,10 +6588,6 @@ typedef struct sat__gl_kernel {
     int axis, size, across, bounds, factor, limit, scale;
 } sat__gl_kernel;
 
-typedef struct sat__gl_target {
-    unsigned texture, framebuffer;
-} sat__gl_target;
-
 /* One level of the tree along an axis: sums of groups, then their scan. */
 typedef struct sat__gl_level {
     sat__gl_target sums, scan;
@@ -6603,21 +6724,6 @@ static sat_result sat__gl_make_kernel(sat_gl *g, sat__gl_kernel *kernel, const c
     sat__gl_set_int(gl, kernel->program, "source", 0);
     sat__gl_set_int(gl, kernel->program, "uncles", 1);
     return SAT_OK;
-}
-
-static void sat__gl_free_target(sat__gl *gl, sat__gl_target *target)
-{
-    if (target->framebuffer) gl->DeleteFramebuffers(1, &target->framebuffer);
-    if (target->texture) gl->DeleteTextures(1, &target->texture);
-    target->texture = target->framebuffer = 0;
-}
-
-static sat_result sat__gl_make_target(sat__gl *gl, sat__gl_target *target, unsigned internal, int width, int height)
-{
-    sat_result result = sat__gl_texture(gl, &target->texture, internal, width, height, NULL);
-    if (result == SAT_OK) result = sat__gl_framebuffer(gl, &target->framebuffer, &target->texture, 1, 0);
-    if (result != SAT_OK) sat__gl_free_target(gl, target);
-    return result;
 }
 
 /* ---- tiles: programs and passes */

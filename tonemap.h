@@ -2897,6 +2897,7 @@ static const char tonemap__glsl_fit[] =
 
 /* La. Soft scales and Ashikhmin's search are here, the plain search in the library. */
 static const char tonemap__glsl_search[] =
+    "#if TONEMAP_OPERATOR == 0 || TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 5\n"
     SAT__GLSL(uniform highp usampler2D table;)
     "#if TONEMAP_OPERATOR != 5\n"
     SAT__GLSL(
@@ -2954,7 +2955,8 @@ static const char tonemap__glsl_search[] =
             float f = tonemap_at(p + ivec2(-1, 1)), g = tonemap_at(p + ivec2(0, 1)), h = tonemap_at(p + ivec2(1, 1));
             vec2 gradient = vec2((c + 2.0 * e + h) - (a + 2.0 * d + f), (f + 2.0 * g + h) - (a + 2.0 * b + c)) * scale;
             return dot(gradient, gradient) > TONEMAP_SELECTIVE * TONEMAP_SELECTIVE;
-        });
+        })
+    "#endif\n";
 
 /* Curves of one pixel, and encodings of values in units of the peak: the CPU's. */
 static const char tonemap__glsl_curves[] =
@@ -3106,20 +3108,60 @@ static const char tonemap__glsl_map[] =
 
 /* ---- >> passes of OpenGL */
 
+/* What is made for some options only. */
+enum { TONEMAP__IF_GUIDED = 1, TONEMAP__IF_TABLE = 2, TONEMAP__IF_HISTOGRAM = 4 };
+
+/* The programs, in the order of the table. */
+enum {
+    TONEMAP__GL_LUMINANCE, TONEMAP__GL_LOGARITHMS, TONEMAP__GL_REDUCE, TONEMAP__GL_COUNT, TONEMAP__GL_ADAPT,
+    TONEMAP__GL_ROUND, TONEMAP__GL_STEPS, TONEMAP__GL_SUMS, TONEMAP__GL_FIT, TONEMAP__GL_SUMS_OF_FITS, TONEMAP__GL_MAP,
+    TONEMAP__GL_PROGRAMS
+};
+
+static const sat__gl_program tonemap__programs[TONEMAP__GL_PROGRAMS] = {
+    {"tonemap: luminance", 0, "hdr", NULL, NULL, {tonemap__glsl_luminance}},
+    {"tonemap: log-average", 0, "source mask", "#define TONEMAP_FIRST\n", NULL, {tonemap__glsl_reduce}},
+    {"tonemap: reduction", 0, "source", NULL, NULL, {tonemap__glsl_reduce}},
+    {"tonemap: histogram", TONEMAP__IF_HISTOGRAM, "luminance mask", NULL, tonemap__glsl_scatter, {tonemap__glsl_count}},
+    {"tonemap: adaptation", 0, "sums old histogram", NULL, NULL, {tonemap__glsl_state}},
+    {"tonemap: rounding", TONEMAP__IF_TABLE, "luminance state", NULL, NULL, {tonemap__glsl_frame, tonemap__glsl_quantise}},
+    {"tonemap: steps", TONEMAP__IF_GUIDED, "luminance state", NULL, NULL, {tonemap__glsl_frame, tonemap__glsl_steps}},
+    {"tonemap: sums", TONEMAP__IF_GUIDED, "source", "#define TONEMAP_FIRST\n", NULL, {tonemap__glsl_along}},
+    {"tonemap: a and b", TONEMAP__IF_GUIDED, "source", NULL, NULL, {tonemap__glsl_down, tonemap__glsl_fit}},
+    {"tonemap: sums of a and b", TONEMAP__IF_GUIDED, "source", NULL, NULL, {tonemap__glsl_along}},
+    {"tonemap: mapping", 0, "hdr luminance state table steps", NULL, NULL,
+     {tonemap__glsl_frame, SAT__GL_PIXEL, tonemap__glsl_down, tonemap__glsl_search, tonemap__glsl_curves,
+      tonemap__glsl_map}}};
+
+/* What they draw into, in the order of the table; of the state [0] is the new one. */
 enum { TONEMAP__LEVELS = 14, TONEMAP__BIN_ROWS = (TONEMAP__BINS + 63) / 64, TONEMAP__GL_UNITS = 5 };
+enum {
+    TONEMAP__T_LUMINANCE, TONEMAP__T_OUT, TONEMAP__T_STATE, TONEMAP__T_OLD_STATE, TONEMAP__T_BINS, TONEMAP__T_QUANTA,
+    TONEMAP__T_STEPS, TONEMAP__T_PAIR, TONEMAP__T_PAIR_1, TONEMAP__T_LEVEL, TONEMAP__TARGETS = TONEMAP__T_LEVEL + 14
+};
+
+static const struct { int when; unsigned internal; int width, height; } tonemap__targets[TONEMAP__T_LEVEL] = {
+    {0, SAT__GL_R32F, 0, 0}, /* 0: as the picture */
+    {0, SAT__GL_RGBA8, 0, 0},
+    {0, SAT__GL_RGBA32F, 2, 1},
+    {0, SAT__GL_RGBA32F, 2, 1},
+    {TONEMAP__IF_HISTOGRAM, SAT__GL_R32F, 64, TONEMAP__BIN_ROWS},
+    {TONEMAP__IF_TABLE, SAT__GL_R32UI, 0, 0},
+    {TONEMAP__IF_GUIDED, SAT__GL_R32F, 0, 0},
+    {TONEMAP__IF_GUIDED, SAT__GL_RG32UI, 0, 0},
+    {TONEMAP__IF_GUIDED, SAT__GL_RG32UI, 0, 0}};
 
 struct tonemap_gl {
     sat__gl gl;
     tonemap_options options;
     sat_allocator allocator;
-    sat_gl *sat;                /* NULL for the global operators */
+    sat_gl *sat;                /* NULL without a table */
     tonemap__colours colours;
-    int width, height, levels, current, histogram; /* histogram: 0, or the estimates it serves, see the state shader */
-    unsigned luminance_program, first_program, reduce_program, scatter_program, state_program, quantise_program,
-        steps_program, along_program[2], fit_program, map_program;
-    unsigned luminance, quanta, out, bins, steps, mask, pair[2], state[2], level[TONEMAP__LEVELS]; /* textures */
-    unsigned luminance_target, quanta_target, out_target, bins_target, steps_target, pair_target[2], state_target[2],
-        level_target[TONEMAP__LEVELS];
+    int width, height, levels, given;
+    int histogram;              /* 0, or the estimates it serves, see the state shader */
+    int ready;                  /* all programs are there */
+    unsigned program[TONEMAP__GL_PROGRAMS], mask;
+    sat__gl_target target[TONEMAP__TARGETS]; /* from TONEMAP__T_LEVEL on those of the sums of 4 x 4, finest first */
 };
 
 TONEMAP_DEF const char *tonemap_gl_message(const tonemap_gl *gl)
@@ -3128,7 +3170,7 @@ TONEMAP_DEF const char *tonemap_gl_message(const tonemap_gl *gl)
     return gl->sat && sat_gl_message(gl->sat)[0] ? sat_gl_message(gl->sat) : gl->gl.message;
 }
 
-TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl) { return gl ? gl->out : 0; }
+TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl) { return gl ? gl->target[TONEMAP__T_OUT].texture : 0; }
 
 static inline void tonemap__gl_define_options(tonemap_gl *g)
 {
@@ -3159,76 +3201,6 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define_float(gl, "TONEMAP_STEPS", ashikhmin ? TONEMAP__ASHIKHMIN_QUANTUM : TONEMAP__QUANTUM);
 }
 
-static inline sat_result tonemap__gl_program(tonemap_gl *g, unsigned *program, const char *name, const char *vertex,
-                                             const char *frame, const char *search, const char *body)
-{
-    const char *library[3], *fragment[8], *points[2];
-    sat__gl_shaders shaders;
-    int n = 0;
-    memset(&shaders, 0, sizeof shaders);
-    library[0] = sat_gl_glsl();
-    library[1] = tonemap_gl_glsl();
-    library[2] = NULL;
-    if (frame) fragment[n++] = frame;
-    if (body == tonemap__glsl_map) fragment[n++] = sat__gl_pixel();
-    if (search && *search) fragment[n++] = tonemap__glsl_down;
-    if (search) fragment[n++] = search;
-    if (search) fragment[n++] = tonemap__glsl_curves;
-    fragment[n++] = body;
-    fragment[n] = NULL;
-    points[0] = vertex;
-    points[1] = NULL;
-    shaders.name = name;
-    shaders.library = library;
-    shaders.vertex = vertex ? points : NULL;
-    shaders.fragment = fragment;
-    tonemap__gl_define_options(g);
-    return sat__gl_build(&g->gl, program, &shaders);
-}
-
-static inline sat_result tonemap__gl_programs(tonemap_gl *g)
-{
-    sat_result r =
-        tonemap__gl_program(g, &g->luminance_program, "tonemap: luminance", NULL, NULL, NULL, tonemap__glsl_luminance);
-    if (r == SAT_OK)
-        r = tonemap__gl_program(g, &g->reduce_program, "tonemap: reduction", NULL, NULL, NULL, tonemap__glsl_reduce);
-    sat__gl_define(&g->gl, "TONEMAP_FIRST", 1);
-    if (r == SAT_OK)
-        r = tonemap__gl_program(g, &g->first_program, "tonemap: log-average", NULL, NULL, NULL, tonemap__glsl_reduce);
-    if (r == SAT_OK)
-        r = tonemap__gl_program(g, &g->state_program, "tonemap: adaptation", NULL, NULL, NULL, tonemap__glsl_state);
-    if (r == SAT_OK && g->histogram)
-        r = tonemap__gl_program(g, &g->scatter_program, "tonemap: histogram", tonemap__glsl_scatter, NULL, NULL,
-                                tonemap__glsl_count);
-    if (r == SAT_OK && g->sat)
-        r = tonemap__gl_program(g, &g->quantise_program, "tonemap: rounding", NULL, tonemap__glsl_frame, NULL,
-                                tonemap__glsl_quantise);
-    return r;
-}
-
-static inline sat_result tonemap__gl_guided_programs(tonemap_gl *g)
-{
-    sat_result r = tonemap__gl_program(g, &g->steps_program, "tonemap: steps", NULL, tonemap__glsl_frame, NULL,
-                                       tonemap__glsl_steps);
-    sat__gl_define(&g->gl, "TONEMAP_FIRST", 1);
-    if (r == SAT_OK)
-        r = tonemap__gl_program(g, &g->along_program[0], "tonemap: sums of steps", NULL, NULL, NULL, tonemap__glsl_along);
-    if (r == SAT_OK)
-        r = tonemap__gl_program(g, &g->along_program[1], "tonemap: sums of a and b", NULL, NULL, NULL,
-                                tonemap__glsl_along);
-    if (r == SAT_OK)
-        r = tonemap__gl_program(g, &g->fit_program, "tonemap: a and b", NULL, tonemap__glsl_down, NULL,
-                                tonemap__glsl_fit);
-    return r;
-}
-
-static inline sat_result tonemap__gl_target(tonemap_gl *g, unsigned *texture, unsigned *framebuffer, unsigned internal,
-                                            int width, int height)
-{
-    sat_result r = sat__gl_texture(&g->gl, texture, internal, width, height, NULL);
-    return r == SAT_OK ? sat__gl_framebuffer(&g->gl, framebuffer, texture, 1, 0) : r;
-}
-
 static inline sat_result tonemap__gl_make_mask(tonemap_gl *g)
 {
     size_t n = (size_t)g->width * (size_t)g->height, i;
@@ -3244,30 +3216,24 @@ static inline sat_result tonemap__gl_make_mask(tonemap_gl *g)
     return r;
 }
 
-static inline sat_result tonemap__gl_targets(tonemap_gl *g)
+static inline sat_result tonemap__gl_make_targets(tonemap_gl *g)
 {
+    static const float nothing[4] = {0, 0, 0, 0};
     int i, width = g->width, height = g->height;
-    sat_result r = tonemap__gl_target(g, &g->luminance, &g->luminance_target, SAT__GL_R32F, width, height);
-    for (i = 0; g->options.operation == TONEMAP_GUIDED && i < 3 && r == SAT_OK; i++)
-        r = i < 2 ? tonemap__gl_target(g, &g->pair[i], &g->pair_target[i], SAT__GL_RG32UI, width, height)
-                  : tonemap__gl_target(g, &g->steps, &g->steps_target, SAT__GL_R32F, width, height);
-    if (r == SAT_OK && g->options.meter_weights) r = tonemap__gl_make_mask(g);
-    if (r == SAT_OK && g->sat) r = tonemap__gl_target(g, &g->quanta, &g->quanta_target, SAT__GL_R32UI, width, height);
-    if (r == SAT_OK) r = tonemap__gl_target(g, &g->out, &g->out_target, SAT__GL_RGBA8, width, height);
-    if (r == SAT_OK && g->histogram)
-        r = tonemap__gl_target(g, &g->bins, &g->bins_target, SAT__GL_R32F, 64, TONEMAP__BIN_ROWS);
-    for (i = 0; i < 2 && r == SAT_OK; i++) {
-        static const float nothing[4] = {0, 0, 0, 0};
-        r = tonemap__gl_target(g, &g->state[i], &g->state_target[i], SAT__GL_RGBA32F, 2, 1);
-        if (r == SAT_OK) g->gl.ClearBufferfv(SAT__GL_COLOR, 0, nothing);
-    }
+    sat_result r = SAT_OK;
+    for (i = 0; i < TONEMAP__T_LEVEL && r == SAT_OK; i++)
+        if ((tonemap__targets[i].when & g->given) == tonemap__targets[i].when) {
+            int w = tonemap__targets[i].width, h = tonemap__targets[i].height;
+            r = sat__gl_make_target(&g->gl, &g->target[i], tonemap__targets[i].internal, w ? w : width, h ? h : height);
+            if (r == SAT_OK && w == 2) g->gl.ClearBufferfv(SAT__GL_COLOR, 0, nothing); /* the state */
+        }
     while (r == SAT_OK && (g->levels == 0 || width > 1 || height > 1)) {
         width = (width + 3) / 4;
         height = (height + 3) / 4;
-        r = tonemap__gl_target(g, &g->level[g->levels], &g->level_target[g->levels], SAT__GL_RGBA32I, width, height);
+        r = sat__gl_make_target(&g->gl, &g->target[TONEMAP__T_LEVEL + g->levels], SAT__GL_RGBA32I, width, height);
         g->levels++;
     }
-    return r;
+    return r == SAT_OK && g->options.meter_weights ? tonemap__gl_make_mask(g) : r;
 }
 
 static inline void tonemap__gl_count(tonemap_gl *g);
@@ -3287,6 +3253,7 @@ static inline sat_result tonemap__gl_try_blending(tonemap_gl *g)
 static inline sat_result tonemap__gl_make(tonemap_gl *g, sat_gl_get_proc *get_proc)
 {
     const tonemap_options *o = &g->options;
+    const char *const library[3] = {sat_gl_glsl(), tonemap_gl_glsl(), NULL};
     sat__gl_state state;
     sat_gl_options table = sat_gl_defaults();
     sat_result r = sat__gl_open(&g->gl, get_proc);
@@ -3302,14 +3269,15 @@ static inline sat_result tonemap__gl_make(tonemap_gl *g, sat_gl_get_proc *get_pr
     }
     g->histogram = (tonemap__is_ashikhmin(o) ? 1 : 0) + (o->key > 0 ? 0 : 2) + (o->white > 0 ? 0 : 4) +
                    (o->metering == TONEMAP_METERING_PERCENTILES ? 8 : 0);
+    g->given = (o->operation == TONEMAP_GUIDED ? TONEMAP__IF_GUIDED : 0) | (g->sat ? TONEMAP__IF_TABLE : 0) |
+               (g->histogram ? TONEMAP__IF_HISTOGRAM : 0);
     sat__gl_begin(&g->gl, &state, TONEMAP__GL_UNITS);
-    r = tonemap__gl_targets(g);
-    if (r == SAT_OK) r = tonemap__gl_programs(g);
-    if (r == SAT_OK && o->operation == TONEMAP_GUIDED) r = tonemap__gl_guided_programs(g);
-    if (r == SAT_OK && g->histogram && g->gl.is_es) r = tonemap__gl_try_blending(g);
+    r = tonemap__gl_make_targets(g);
+    tonemap__gl_define_options(g);
     if (r == SAT_OK)
-        r = tonemap__gl_program(g, &g->map_program, "tonemap: mapping", NULL, tonemap__glsl_frame,
-                                g->sat || g->steps ? tonemap__glsl_search : "", tonemap__glsl_map);
+        r = sat__gl_build_table(&g->gl, g->program, tonemap__programs, TONEMAP__GL_PROGRAMS, g->given, library);
+    if (r == SAT_OK && g->histogram && g->gl.is_es) r = tonemap__gl_try_blending(g);
+    g->ready = r == SAT_OK;
     sat__gl_end(&g->gl, &state);
     return r;
 }
@@ -3356,7 +3324,7 @@ static inline int tonemap__gl_same_programs(const tonemap_options *a, const tone
 TONEMAP_DEF sat_result tonemap_gl_set_options(tonemap_gl *gl, const tonemap_options *options)
 {
     tonemap_options o = options ? *options : tonemap_defaults();
-    if (!gl || !gl->map_program || !tonemap__options_are_valid(&o) || !tonemap__gl_same_programs(&gl->options, &o))
+    if (!gl || !gl->ready || !tonemap__options_are_valid(&o) || !tonemap__gl_same_programs(&gl->options, &o))
         return SAT_ERR_ARGUMENT;
     gl->options = o;
     tonemap__prepare_colours(&gl->colours, &o);
@@ -3371,30 +3339,11 @@ TONEMAP_DEF void tonemap_gl_destroy(tonemap_gl *gl)
     t = &gl->gl;
     allocator = gl->allocator;
     sat_gl_destroy(gl->sat);
-    if (t->vertex_array) { /* deleting 0 is fine */
-        const unsigned programs[11] = {gl->luminance_program, gl->first_program, gl->reduce_program,
-                                       gl->scatter_program,   gl->state_program, gl->quantise_program,
-                                       gl->map_program,       gl->steps_program, gl->along_program[0],
-                                       gl->along_program[1],  gl->fit_program};
+    if (t->vertex_array) {
         int i;
-        for (i = 0; i < 11; i++) t->DeleteProgram(programs[i]);
-        t->DeleteFramebuffers(TONEMAP__LEVELS, gl->level_target);
-        t->DeleteFramebuffers(2, gl->state_target);
-        t->DeleteFramebuffers(1, &gl->luminance_target);
-        t->DeleteFramebuffers(1, &gl->quanta_target);
-        t->DeleteFramebuffers(1, &gl->out_target);
-        t->DeleteFramebuffers(1, &gl->bins_target);
-        t->DeleteFramebuffers(1, &gl->steps_target);
-        t->DeleteFramebuffers(2, gl->pair_target);
-        t->DeleteTextures(TONEMAP__LEVELS, gl->level);
-        t->DeleteTextures(2, gl->state);
-        t->DeleteTextures(1, &gl->luminance);
-        t->DeleteTextures(1, &gl->quanta);
-        t->DeleteTextures(1, &gl->out);
-        t->DeleteTextures(1, &gl->bins);
-        t->DeleteTextures(1, &gl->steps);
+        sat__gl_delete_programs(t, gl->program, TONEMAP__GL_PROGRAMS);
+        for (i = 0; i < TONEMAP__TARGETS; i++) sat__gl_free_target(t, &gl->target[i]);
         t->DeleteTextures(1, &gl->mask);
-        t->DeleteTextures(2, gl->pair);
         sat__gl_close(t);
     }
     sat__release(&allocator, gl, sizeof *gl);
@@ -3405,20 +3354,17 @@ TONEMAP_DEF void tonemap_gl_destroy(tonemap_gl *gl)
 static inline void tonemap__gl_measure(tonemap_gl *g, unsigned hdr)
 {
     sat__gl *gl = &g->gl;
-    int i, width = g->width, height = g->height;
-    sat__gl_pass(gl, g->luminance_program, g->luminance_target, width, height);
-    sat__gl_set_texture(gl, g->luminance_program, "hdr", 0, hdr);
-    sat__gl_set_float3(gl, g->luminance_program, "luma", g->colours.luma);
+    const sat__gl_target *from = &g->target[TONEMAP__T_LUMINANCE], *to = &g->target[TONEMAP__T_LEVEL];
+    unsigned program = g->program[TONEMAP__GL_LUMINANCE];
+    int i;
+    SAT__GL_START(gl, program, from, hdr);
+    sat__gl_set_float3(gl, program, "luma", g->colours.luma);
     sat__gl_draw(gl);
-    for (i = 0; i < g->levels; i++) {
-        unsigned program = i ? g->reduce_program : g->first_program;
-        sat__gl_pass(gl, program, g->level_target[i], (width + 3) / 4, (height + 3) / 4);
-        sat__gl_set_texture(gl, program, "source", 0, i ? g->level[i - 1] : g->luminance);
-        if (g->mask && !i) sat__gl_set_texture(gl, program, "mask", 1, g->mask);
-        sat__gl_set_int2(gl, program, "size", width, height);
+    for (i = 0; i < g->levels; i++, from = to++) {
+        program = g->program[i ? TONEMAP__GL_REDUCE : TONEMAP__GL_LOGARITHMS];
+        SAT__GL_START(gl, program, to, from->texture, g->mask);
+        sat__gl_set_int2(gl, program, "size", from->width, from->height);
         sat__gl_draw(gl);
-        width = (width + 3) / 4;
-        height = (height + 3) / 4;
     }
 }
 
@@ -3426,14 +3372,13 @@ static inline void tonemap__gl_count(tonemap_gl *g)
 {
     static const float nothing[4] = {0, 0, 0, 0};
     sat__gl *gl = &g->gl;
-    sat__gl_pass(gl, g->scatter_program, g->bins_target, 64, TONEMAP__BIN_ROWS);
+    unsigned program = g->program[TONEMAP__GL_COUNT];
+    SAT__GL_START(gl, program, &g->target[TONEMAP__T_BINS], g->target[TONEMAP__T_LUMINANCE].texture, g->mask);
     gl->ClearBufferfv(SAT__GL_COLOR, 0, nothing);
     gl->Enable(SAT__GL_BLEND);
     gl->BlendEquationSeparate(0x8006u, 0x8006u); /* GL_FUNC_ADD */
     gl->BlendFuncSeparate(SAT__GL_ONE, SAT__GL_ONE, SAT__GL_ONE, SAT__GL_ONE);
-    sat__gl_set_texture(gl, g->scatter_program, "luminance", 0, g->luminance);
-    if (g->mask) sat__gl_set_texture(gl, g->scatter_program, "mask", 1, g->mask);
-    sat__gl_set_int(gl, g->scatter_program, "width", g->width);
+    sat__gl_set_int(gl, program, "width", g->width);
     gl->BindVertexArray(gl->vertex_array);
     gl->DrawArrays(SAT__GL_POINTS, 0, g->width * g->height);
     gl->Disable(SAT__GL_BLEND);
@@ -3443,12 +3388,12 @@ static inline void tonemap__gl_adapt(tonemap_gl *g, double dt)
 {
     sat__gl *gl = &g->gl;
     const tonemap_options *o = &g->options;
-    unsigned program = g->state_program;
-    g->current = !g->current;
-    sat__gl_pass(gl, program, g->state_target[g->current], 2, 1);
-    sat__gl_set_texture(gl, program, "sums", 0, g->level[g->levels - 1]);
-    sat__gl_set_texture(gl, program, "old", 1, g->state[!g->current]);
-    sat__gl_set_texture(gl, program, "histogram", 2, g->bins);
+    sat__gl_target *t = g->target, old = t[TONEMAP__T_STATE];
+    unsigned program = g->program[TONEMAP__GL_ADAPT];
+    t[TONEMAP__T_STATE] = t[TONEMAP__T_OLD_STATE];
+    t[TONEMAP__T_OLD_STATE] = old;
+    SAT__GL_START(gl, program, &t[TONEMAP__T_STATE], t[TONEMAP__T_LEVEL + g->levels - 1].texture, old.texture,
+                  t[TONEMAP__T_BINS].texture);
     sat__gl_set_float(gl, program, "weight", (float)tonemap__share(o, 0, dt));
     sat__gl_set_float(gl, program, "weight_darker", (float)tonemap__share(o, 1, dt));
     sat__gl_set_float(gl, program, "exposure", (float)o->exposure);
@@ -3461,44 +3406,32 @@ static inline void tonemap__gl_adapt(tonemap_gl *g, double dt)
     sat__gl_draw(gl);
 }
 
-static inline void tonemap__gl_guide(tonemap_gl *g)
+/* What La comes from: the table, or the guided filter's a and b. */
+static inline sat_result tonemap__gl_local(tonemap_gl *g)
 {
     sat__gl *gl = &g->gl;
-    const unsigned program[3] = {g->along_program[0], g->fit_program, g->along_program[1]},
-                   source[3] = {g->steps, g->pair[0], g->pair[1]};
-    int i;
-    sat__gl_pass(gl, g->steps_program, g->steps_target, g->width, g->height);
-    sat__gl_set_texture(gl, g->steps_program, "luminance", 0, g->luminance);
-    sat__gl_set_texture(gl, g->steps_program, "state", 1, g->state[g->current]);
-    sat__gl_draw(gl);
-    for (i = 0; i < 3; i++) {
-        sat__gl_pass(gl, program[i], g->pair_target[i & 1], g->width, g->height);
-        sat__gl_set_texture(gl, program[i], "source", 0, source[i]);
-        sat__gl_draw(gl);
+    const sat__gl_target *t = g->target, *pair = &t[TONEMAP__T_PAIR], *steps = &t[TONEMAP__T_STEPS];
+    const unsigned *p = g->program, luminance = t[TONEMAP__T_LUMINANCE].texture, state = t[TONEMAP__T_STATE].texture;
+    if (g->given & TONEMAP__IF_GUIDED) {
+        SAT__GL_PASS(gl, p[TONEMAP__GL_STEPS], steps, luminance, state);
+        SAT__GL_PASS(gl, p[TONEMAP__GL_SUMS], &pair[0], steps->texture);
+        SAT__GL_PASS(gl, p[TONEMAP__GL_FIT], &pair[1], pair[0].texture);
+        SAT__GL_PASS(gl, p[TONEMAP__GL_SUMS_OF_FITS], &pair[0], pair[1].texture);
     }
+    if (!g->sat) return SAT_OK;
+    SAT__GL_PASS(gl, p[TONEMAP__GL_ROUND], &t[TONEMAP__T_QUANTA], luminance, state);
+    return sat_gl_build(g->sat, 0, t[TONEMAP__T_QUANTA].texture, g->width, g->height);
 }
 
 static inline sat_result tonemap__gl_map(tonemap_gl *g, const sat_gl_target *to, unsigned hdr)
 {
     sat__gl *gl = &g->gl;
-    unsigned program = g->map_program;
-    sat_result result = SAT_OK;
-    if (g->sat) {
-        sat__gl_pass(gl, g->quantise_program, g->quanta_target, g->width, g->height);
-        sat__gl_set_texture(gl, g->quantise_program, "luminance", 0, g->luminance);
-        sat__gl_set_texture(gl, g->quantise_program, "state", 1, g->state[g->current]);
-        sat__gl_draw(gl);
-        result = sat_gl_build(g->sat, 0, g->quanta, g->width, g->height);
-    }
-    if (g->steps) tonemap__gl_guide(g);
-    if (result == SAT_OK) result = sat__gl_pass_to(gl, program, to, g->out_target, g->width, g->height);
+    const sat__gl_target *t = g->target;
+    unsigned program = g->program[TONEMAP__GL_MAP];
+    sat_result result = sat__gl_pass_to(gl, program, to, t[TONEMAP__T_OUT].framebuffer, g->width, g->height);
     if (result != SAT_OK) return result;
-    sat__gl_set_texture(gl, program, "hdr", 0, hdr);
-    sat__gl_set_texture(gl, program, "luminance", 1, g->luminance);
-    sat__gl_set_texture(gl, program, "state", 2, g->state[g->current]);
-    if (g->sat) sat__gl_set_texture(gl, program, "table", 3, sat_gl_table(g->sat));
-    if (g->steps) sat__gl_set_texture(gl, program, "table", 3, g->pair[0]);
-    if (g->steps) sat__gl_set_texture(gl, program, "steps", 4, g->steps);
+    SAT__GL_INPUTS(gl, hdr, t[TONEMAP__T_LUMINANCE].texture, t[TONEMAP__T_STATE].texture,
+                   g->sat ? sat_gl_table(g->sat) : t[TONEMAP__T_PAIR].texture, t[TONEMAP__T_STEPS].texture);
     sat__gl_set_float(gl, program, "cd_per_unit", (float)g->options.cd_per_unit);
     sat__gl_set_float(gl, program, "lux_per_cd", (float)g->options.lux_per_cd);
     sat__gl_set_float(gl, program, "peak", (float)g->options.peak);
@@ -3519,14 +3452,15 @@ TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, const sat_gl_target *to,
 {
     sat__gl_state state;
     sat_result result;
-    if (!gl || !gl->map_program || !hdr || !sat__gl_target_is_valid(to) || sat__gl_target_is(to, hdr))
+    if (!gl || !gl->ready || !hdr || !sat__gl_target_is_valid(to) || sat__gl_target_is(to, hdr))
         return SAT_ERR_ARGUMENT;
     if (!tonemap__in_range(dt, 0, 1e300) && !tonemap__is_infinite(dt)) return SAT_ERR_ARGUMENT;
     sat__gl_begin(&gl->gl, &state, TONEMAP__GL_UNITS);
     tonemap__gl_measure(gl, hdr);
     if (gl->histogram) tonemap__gl_count(gl);
     tonemap__gl_adapt(gl, dt);
-    result = tonemap__gl_map(gl, to, hdr);
+    result = tonemap__gl_local(gl);
+    if (result == SAT_OK) result = tonemap__gl_map(gl, to, hdr);
     sat__gl_end(&gl->gl, &state);
     return result;
 }

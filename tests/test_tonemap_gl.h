@@ -325,6 +325,7 @@ TEST(gl_sums_are_the_cpus_integers)
     tonemap_options o = local_options();
     tonemap *map = NULL;
     tonemap_gl *gl = NULL;
+    const sat__gl_target *level;
     sat__gl_state state;
     unsigned hdr;
     int x, y, off = 0;
@@ -336,8 +337,9 @@ TEST(gl_sums_are_the_cpus_integers)
     EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
     EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, 0), SAT_OK);
     sat__gl_begin(&s.gl, &state, 1);
-    EXPECT_EQ(sat__gl_read(&s.gl, quanta, gl->quanta, SAT__GL_R32UI, W, H), SAT_OK);
-    EXPECT_EQ(sat__gl_read(&s.gl, sums, gl->level[gl->levels - 1], SAT__GL_RGBA32I, 1, 1), SAT_OK);
+    EXPECT_EQ(sat__gl_read(&s.gl, quanta, gl->target[TONEMAP__T_QUANTA].texture, SAT__GL_R32UI, W, H), SAT_OK);
+    level = &gl->target[TONEMAP__T_LEVEL + gl->levels - 1];
+    EXPECT_EQ(sat__gl_read(&s.gl, sums, level->texture, SAT__GL_RGBA32I, 1, 1), SAT_OK);
     sat__gl_end(&s.gl, &state);
     log_sum = (int64_t)sums[0] * 65536 + sums[1];
     EXPECT_NEAR((double)(log_sum - map->worker[0].log_sum) / 65536 / (W * H), 0, 1e-6);
