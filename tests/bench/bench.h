@@ -21,8 +21,9 @@
        bench_plot("Error against time; x=time_ratio; y=error; log=xy");
        bench_row("%s\t%.3g\t%.3g\t%d", "tiled", ratio, error, 1);
 
-   QUICK=1 in the environment asks for a short run: bench_quick(). SMOKE=1 asks for the shortest that shows every table
-   once: bench_smoke(), and bench_quick() too; every call is made once, and the figures say nothing.
+   QUICK=1 in the environment asks for a short run: bench_quick(); what takes longer than BENCH_LONG is then run twice,
+   and the second time counts. SMOKE=1 asks for the shortest that shows every table once: bench_smoke(), and
+   bench_quick() too; every call is made once, and the figures say nothing.
 
    A peer that is not installed loses only its own cells: bench_missing("OpenCV", "libopencv-dev") after bench_table says
    so, bench_cell(value, have_it) makes "-" of them, and the report leaves out a column that has nothing else. */
@@ -42,7 +43,8 @@ static inline int bench_set(const char *name)
 static inline int bench_smoke(void) { return bench_set("SMOKE"); }
 static inline int bench_quick(void) { return bench_set("QUICK") || bench_smoke(); }
 
-/* full rounds, or what a short run affords */
+/* Full rounds, or what a short run affords. BENCH_LONG: seconds of a call that a short run repeats no more. */
+#define BENCH_LONG 0.02
 static inline int bench_rounds(int full) { return bench_smoke() ? 1 : bench_quick() && full > 3 ? 3 : full; }
 
 /* Name of the processor, compiler and instruction set as a comment line. */
@@ -132,8 +134,8 @@ typedef struct bench_times {
     double work, peer;     /* median seconds of one call */
 } bench_times;
 
-/* Runs A B A B ... (`rounds` pairs, at most 64, after one warm-up each). A call shorter than a millisecond is repeated
-   inside the pair until it is not. */
+/* Runs A B A B ... (`rounds` pairs, at most 64, after one warm-up each, two in a full run). A call shorter than a
+   millisecond is repeated inside the pair until it is not. */
 static inline bench_times bench_ratio(bench_fn *work, void *work_user, bench_fn *peer, void *peer_user, int rounds)
 {
     double ratios[64], a[64], b[64], t0, t1, t2;
@@ -141,7 +143,7 @@ static inline bench_times bench_ratio(bench_fn *work, void *work_user, bench_fn 
     int i, k, repeat[2] = {1, 1};
     if (rounds < 1) rounds = 1;
     if (rounds > 64) rounds = 64;
-    if (!bench_smoke()) {
+    if (!bench_quick()) {
         work(work_user);
         peer(peer_user);
     }
@@ -150,10 +152,13 @@ static inline bench_times bench_ratio(bench_fn *work, void *work_user, bench_fn 
     t1 = bench_clock();
     peer(peer_user);
     t2 = bench_clock();
-    if (bench_smoke()) rounds = 1;
-    else if (t1 - t0 < 1e-3) repeat[0] = 1 + (int)(1e-3 / (t1 - t0 + 1e-8));
-    if (!bench_smoke() && t2 - t1 < 1e-3) repeat[1] = 1 + (int)(1e-3 / (t2 - t1 + 1e-8));
-    for (i = 0; i < rounds; ++i) {
+    a[0] = t1 - t0;
+    b[0] = t2 - t1;
+    ratios[0] = a[0] / b[0];
+    if (bench_quick() && a[0] + b[0] > 2 * BENCH_LONG) rounds = 1;
+    if (a[0] < 1e-3) repeat[0] = 1 + (int)(1e-3 / (a[0] + 1e-8));
+    if (b[0] < 1e-3) repeat[1] = 1 + (int)(1e-3 / (b[0] + 1e-8));
+    for (i = 0; i < rounds && !bench_smoke(); ++i) {
         t0 = bench_clock();
         for (k = 0; k < repeat[0]; ++k) work(work_user);
         t1 = bench_clock();
@@ -163,6 +168,7 @@ static inline bench_times bench_ratio(bench_fn *work, void *work_user, bench_fn 
         b[i] = (t2 - t1) / repeat[1];
         ratios[i] = a[i] / b[i];
     }
+    if (bench_smoke()) rounds = 1;
     result.ratio = support_median(ratios, rounds);
     result.work = support_median(a, rounds);
     result.peer = support_median(b, rounds);
@@ -172,18 +178,19 @@ static inline bench_times bench_ratio(bench_fn *work, void *work_user, bench_fn 
 /* Median seconds of one call. */
 static inline double bench_time(bench_fn *work, void *user, int rounds)
 {
-    double t[64], start;
+    double t[64], start = bench_clock();
     int i;
     if (rounds < 1) rounds = 1;
     if (rounds > 64) rounds = 64;
-    if (bench_smoke()) rounds = 1;
-    else work(user);
-    for (i = 0; i < rounds; ++i) {
+    work(user);
+    t[0] = bench_clock() - start;
+    if (bench_quick() && t[0] > BENCH_LONG) rounds = 1;
+    for (i = 0; i < rounds && !bench_smoke(); ++i) {
         start = bench_clock();
         work(user);
         t[i] = bench_clock() - start;
     }
-    return support_median(t, rounds);
+    return support_median(t, bench_smoke() ? 1 : rounds);
 }
 
 #endif /* BENCH_H */

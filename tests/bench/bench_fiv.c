@@ -34,7 +34,10 @@ static double median_time(bench_fn *work, void *user, int rounds)
 {
     double t[16];
     int i;
+    t[0] = -seconds_used();
     work(user);
+    t[0] += seconds_used();
+    if (bench_quick() && t[0] > BENCH_LONG) rounds = 1;
     for (i = 0; i < rounds && i < 16; i++) {
         t[i] = -seconds_used();
         work(user);
@@ -703,7 +706,7 @@ static void resting(int side)
     bench_table("What rests on a floor 3 R wide: own masks near contact, rays where the depth map of a sun is not sure",
                 "mesh\tenvironment\tgap_R\tsamples\tnrmse_interpolated\tnrmse\tpoint_us_interpolated\tpoint_us\town_masks_percent\trays_percent");
     bench_note("nrmse: eq 17 against rays to every texel of the light and to each split-off light.");
-    for (i = 0; i < last; i++) {
+    for (i = 0; i < last; i += bench_quick() ? 3 : 1) { /* the box and the bunny in a short run */
         bench b;
         memset(&b, 0, sizeof b);
         if (i == 0) b.mesh = reference_box(0.5f, 0.3f, 0.4f), b.mesh_name = "box";
@@ -869,7 +872,7 @@ static void suns(int side)
     b.mesh = load("mesh/bunny_small.ply", &b.mesh_name);
     open_plane(&b, side);
     o = make(&b, 32, 17, 15, FIV_STORAGE_FLOAT, &seconds, NULL);
-    for (e = 0; e < 4; e++) {
+    for (e = 0; e < (bench_quick() ? 2 : 4); e++) {
         if (!open_sun(&b, &truth, names[e])) continue;
         check(fiv_occluder_light(o, b.environment, NULL), "light");
         for (g = 0; g < 2; g++) {
@@ -962,9 +965,9 @@ int main(void)
     tables_17_18(&b);
     many_occluders(&b);
     table_4();
-    resting(bench_smoke() ? 12 : bench_quick() ? 40 : 96);
-    suns(bench_smoke() ? 12 : bench_quick() ? 32 : 80);
-    pixels(&b, bench_smoke() ? 12 : bench_quick() ? 40 : MAX_SIDE);
+    resting(bench_smoke() ? 12 : bench_quick() ? 28 : 96);
+    suns(bench_smoke() ? 12 : bench_quick() ? 28 : 80);
+    pixels(&b, bench_smoke() ? 12 : bench_quick() ? 28 : MAX_SIDE);
     b.side = bench_smoke() ? 8 : bench_quick() ? 20 : 40; /* the first rows of the plane would be a strip: start anew */
     reference_free(&b.scene);
     open_plane(&b, b.side);

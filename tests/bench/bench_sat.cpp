@@ -337,7 +337,7 @@ static void bench_lookups(void)
     bench_note("time_ratio: a loop of sat_sum; many_time_ratio: sat_sums, which asks memory ahead");
     int *boxes = (int *)malloc(4 * 4096 * sizeof(int));
     double *sums = (double *)malloc(4096 * sizeof(double));
-    for (int r = 0; r < 6; r++) {
+    for (int r = 0; r < 6; r += bench_quick() ? 2 : 1) {
         uint64_t state = 9;
         for (int i = 0; i < LOOKUPS; i++) {
             x[i] = radii[r] + support_below(&state, n - 2 * radii[r]);
@@ -600,7 +600,7 @@ static void bench_scans(void)
     bench_plot("Accesses a value; x=k; y=accesses_a_value; by=algorithm; style=linespoints");
     bench_note("these are the algorithms of the GPU; on a CPU the sequential scan is the fast one");
     for (int a = 1; a < 3; a++)
-        for (int i = 0; i < 7; i++) {
+        for (int i = 0; i < 7; i += bench_quick() ? 2 : 1) {
             sat_scan_counters c;
             scan_work work = {in, out, (size_t)N, sat_scan_defaults()}, peer = work;
             double worst = 0;

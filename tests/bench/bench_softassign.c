@@ -391,7 +391,7 @@ static void table_3_1(void)
         for (k = 0; k < 3; k++) {
             instance q;
             double cost[3], repeats, best = published[k][0];
-            if (bench_quick() && (f > 0 || k > (bench_smoke() ? 0u : 1u))) break;
+            if (bench_quick() && (f > 0 || k > 0)) break;
             open_instance(&q, photos[f], sizes[k][0], sizes[k][1], sizes[k][2], 1);
             run_lapjv(&q);
             set_method(&q, SOFTASSIGN_EXACT);
@@ -568,7 +568,7 @@ static void table_video(void)
                 "cells_a_frame\tswitching\twarm_ratio_cold\twarm_ratio_lapjv\tchanged\tfree_optimum_changes\texcess\tcertified_gap\tcolumns_finished\tdefault");
     bench_note("warm_ratio_cold: against the same call without prices; changed: share of the 900 tiles that differ from the frame before");
     for (m = 0; m < (bench_quick() ? 1u : 2u); m++)
-    for (b = 0; b < 4; b += bench_smoke() ? 4u : bench_quick() ? 2u : 1u) {
+    for (b = 0; b < 4; b += bench_quick() ? 4u : 1u) {
         instance q;
         float *made;
         softassign *warm = NULL;

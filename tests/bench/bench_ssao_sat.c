@@ -403,7 +403,7 @@ static void resolution_table(void)
 {
     static const char *const names[4] = {"traditional", "horizon-based", "refined (5.3.5)", "slabs"},
                              *const published[4] = {"1.71", "2.44", "1", ""};
-    int size, top = bench_quick() ? 512 : 2048, first = bench_smoke() ? 128 : 256, m, half_size = 0;
+    int size, top = bench_quick() ? 256 : 2048, first = bench_quick() ? 128 : 256, m, half_size = 0;
     double half[4] = {0, 0, 0, 0};
     bench_table("Figure 5.16 re-made: time against resolution, scene 0, R = 0.25", "method\tsize\tms\tto_minimalist_ratio");
     bench_plot("Time against resolution; x=size; y=ms; by=method; log=xy; style=linespoints");
@@ -684,7 +684,7 @@ int main(void)
 {
     const char *fit = getenv("FIT");
     int i;
-    side = bench_smoke() ? 64 : bench_quick() ? 192 : 512;
+    side = bench_smoke() ? 64 : bench_quick() ? 128 : 512;
     pixels = (size_t)side * (size_t)side;
     out = (float *)malloc(pixels * 4);
     other = (float *)malloc(pixels * 4);

@@ -308,14 +308,15 @@ static void times(scene *still)
         const char *programs[] = {"pfstmo_reinhard02 -s", "pfstmo_reinhard02", "pfstmo_drago03"};
         for (int i = 0; i < 3; ++i) {
             double ratio[3], seconds = 0;
-            for (int k = 0; k < 3; ++k) {
+            const int rounds = bench_quick() ? 1 : 3;
+            for (int k = 0; k < rounds; ++k) {
                 double peer = time_pfs(programs[i]), start = own_seconds();
                 run_work(&base);
                 run_work(&base);
                 ratio[k] = peer / (0.5 * (own_seconds() - start));
                 seconds = peer;
             }
-            bench_row("peer: %s\t%.3f\t%.2f\t0", programs[i], support_median(ratio, 3), 1e9 * seconds / (double)big.n);
+            bench_row("peer: %s\t%.3f\t%.2f\t0", programs[i], support_median(ratio, rounds), 1e9 * seconds / (double)big.n);
         }
     }
     free_work(&base);
@@ -428,7 +429,7 @@ static void accuracy(scene *scenes, int count)
         codes[3] = gaussian_codes(s, stats.adapted, 0);
         times[3] = (bench_clock() - start) / base_time;
         start = support_clock();
-        codes[4] = pfs_codes(s);
+        codes[4] = bench_quick() && i ? NULL : pfs_codes(s);
         times[4] = (support_clock() - start) / base_time;
         free_work(&base);
         for (int k = 0; k < 6; ++k) {
@@ -482,8 +483,8 @@ static void pareto(const scene *s)
         rows[count++].o = o;
         o = local_options();
     };
-    for (int k = 1; k <= 8; ++k) o.scales = k, add("scales", k);
-    for (double t = 0.05; t < 2; t *= 2) o.selective = t, add("selective", t);
+    for (int k = 1; k <= 8; k += bench_quick() ? k : 1) o.scales = k, add("scales", k);
+    for (double t = 0.05; t < 2; t *= bench_quick() ? 4 : 2) o.selective = t, add("selective", t);
     o.soft = 0.5, add("soft", 0.5);
     o.soft = 1, add("soft", 1);
     bench_table("What can be left out: error against the full local operator, and time", "option\tvalue\ttime_ratio\trms_codes\tlargest_codes\tssim\tskipped\tdefault");
