@@ -127,8 +127,11 @@
    >> drawing       rays in batches, far drops, streaks, depth of field
    >> glints        lamps seen in drops, far drops that swing
    >> sprites       the published sprites; bands and whole pictures, background, veil
-   >> shaders       the same in GLSL
-   >> OpenGL        the object and its calls
+   >> shaders       the same in GLSL: environment, veil, the vertices of drops, lamps
+   >> fragments     the fragments of drops
+   >> rain shader   the rain's step in GLSL
+   >> OpenGL        the object: programs, environment, drops
+   >> OpenGL picture  drops, glints and veil
 */
 
 #if defined(LIGHTSCAN_IMPLEMENTATION) && !defined(RAINDROP_IMPLEMENTATION)
@@ -493,6 +496,8 @@ typedef struct raindrop_veil_options {
     float extinction;    /* 0.00069; 0..1e18; a metre: raindrop_extinction of the rate, here of 10 mm/h */
     float from;          /* 4; 0..1e18; metres from the eye: what is nearer is left to the drops that are drawn */
     float reach;         /* 1000; 0..1e18; metres: as far as it rains, and how far it is where depth is empty */
+    int clip_zero_to_one; /* 0; 0..1; raindrop_gl_veil: 0: projection takes depth to [-1,1] (OpenGL); 1: to [0,1]
+                            (glClipControl) */
     sat_threads threads; /* serial; same bits for any worker count */
 } raindrop_veil_options;
 RAINDROP_DEF raindrop_veil_options raindrop_veil_defaults(void);
@@ -523,17 +528,30 @@ typedef struct raindrop_gl_options {
     int half_map;            /* 1; 0..1; 1: half floats, 22 MB for a base of 1024; 0: floats */
     int quads;               /* 1; 0..1; 1: instanced quads; 0: point sprites, as published, which vanish when their
                                 centre leaves the picture and are cut at the context's largest point */
-    int compile_all;         /* 0; 0..1; 1: create compiles every program, so that no picture does */
-    sat_allocator allocator; /* malloc; used by create, destroy and set_environment only */
+    int sprites;             /* 1; 0..1; 0: pictures have no RAINDROP_LOOK_SPRITE. This and the next six are what create
+                                compiles programs for; a picture that needs one which is 0 is refused by name */
+    int motion;              /* 1; 0..1; 0: no exposure, no aperture */
+    int oblate;              /* 1; 0..1; 0: no flattened drops */
+    int orders;              /* 1; 0..1; 0: no internal reflections (render options' orders 0), all drops quicker */
+    int veil;                /* 1; 0..1; 0: no raindrop_gl_veil */
+    int oscillation;         /* 0; 0..1; 1: render options' oscillation */
+    int lamps;               /* 0; 0..1; 1: render options' lamps: all drops once more for each and its four paths */
+    sat_allocator allocator; /* malloc; used by create and destroy only */
 } raindrop_gl_options;
 RAINDROP_DEF raindrop_gl_options raindrop_gl_defaults(void);
 
 /* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL
    state as it was (but for pending errors, which are lost). */
 typedef struct raindrop_gl raindrop_gl;
-/* On an OpenGL error *out only answers raindrop_gl_message, and is to be destroyed; on the others it is NULL. */
+/* Compiles all that the options ask for; nothing is compiled or allocated later, but for what set_environment and
+   set_rain send. On an OpenGL error *out only answers raindrop_gl_message, and is to be destroyed; on the others it is
+   NULL. */
 RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *get_proc,
                                            const raindrop_gl_options *options);
+/* Other options: whatever needs no other program or texture, so one of the last seven that was 1 and is 0 now.
+   SAT_ERR_MISMATCH, the message names it and nothing changes, when a map, half_map, quads or one of them that was 0
+   differs. The allocator is not looked at. All else is an option of each raindrop_gl_render. */
+RAINDROP_DEF sat_result raindrop_gl_set_options(raindrop_gl *gl, const raindrop_gl_options *options);
 RAINDROP_DEF const char *raindrop_explain_gl(char *text, size_t size, const raindrop_gl_options *options);
 RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *gl); /* NULL is fine */
 /* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
@@ -552,9 +570,8 @@ RAINDROP_DEF sat_result raindrop_gl_set_centre(raindrop_gl *gl, const float cent
 RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *drops, int count);
 
 /* Blends the drops over a picture of this size in the target `to`, which should hold floats; NULL: in the framebuffer
-   that is bound. Row 0 is the bottom one, as OpenGL has it. Unsorted, as published; else as raindrop_render. The first
-   picture with a shutter or a lens, of flattened drops, or with internal reflections compiles a program that knows
-   them, unless options.compile_all has them all; the others do not pay.
+   that is bound. Row 0 is the bottom one, as OpenGL has it. Unsorted, as published, or in slices; else as
+   raindrop_render, lamps' glints last. What a picture does not need, its program does not know.
 
    projection: the perspective matrix (column-major) that drew the framebuffer's depth buffer: the depth test is on,
    depth is not written. It may be reversed, infinite, or made for glClipControl's [0,1]. NULL: no test, or where
@@ -563,11 +580,12 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, const sat_gl_target 
                                            const raindrop_camera *camera, const float projection[16],
                                            const raindrop_render_options *options);
 
-/* raindrop_veil over the bound framebuffer. depth: a texture of the camera's depth_near and depth_far, 1 where it is
-   empty, which the framebuffer must not hold; 0: empty everywhere. The first veil compiles its program, unless
-   options.compile_all had it. */
-RAINDROP_DEF sat_result raindrop_gl_veil(raindrop_gl *gl, int width, int height, unsigned depth,
-                                         const raindrop_camera *camera, const raindrop_veil_options *options);
+/* raindrop_veil over the target `to`; NULL: over the framebuffer that is bound. depth: a depth texture of the picture's
+   size, row for row with it, which the target must not hold; where it is as far as it can be, it is empty. 0: empty
+   everywhere. projection: as in raindrop_gl_render; options->clip_zero_to_one tells how it maps depth. */
+RAINDROP_DEF sat_result raindrop_gl_veil(raindrop_gl *gl, const sat_gl_target *to, int width, int height,
+                                         unsigned depth, const raindrop_camera *camera, const float projection[16],
+                                         const raindrop_veil_options *options);
 
 /* GLSL (3.30 or ES 3.00) for shaders of your own: raindrop_ray raindrop_trace(d, p, one_minus_b2, n) as on the CPU. */
 RAINDROP_DEF const char *raindrop_gl_glsl(void);
@@ -1033,6 +1051,7 @@ static const sat__field raindrop__veil_fields[] = {
     SAT__FIELD(raindrop_veil_options, 'f', extinction, 0.00069, 0, 1e18, ' '),
     SAT__FIELD(raindrop_veil_options, 'f', from, 4, 0, 1e18, ' '),
     SAT__FIELD(raindrop_veil_options, 'f', reach, 1000, 0, 1e18, ' '),
+    SAT__FIELD(raindrop_veil_options, 'i', clip_zero_to_one, 0, 0, 1, ' '),
     SAT__FIELD(raindrop_veil_options, 't', threads, 0, 0, 0, ' '),
 };
 
@@ -2836,7 +2855,7 @@ RAINDROP_DEF sat_result raindrop_rain_set_drops(raindrop_rain *rain, const raind
    ------------------------------------------------------------------------------------------------ */
 
 enum { RAINDROP__GLINTS = 4 }; /* mirrored, order 0, order 1 by its inner and its outer ray */
-#define RAINDROP__LEAST_LAMP 0.004f /* radians; lamps that look smaller are as wide as this, as the sun is */
+#define RAINDROP__LEAST_LAMP 0.004 /* radians; lamps that look smaller are as wide as this, as the sun is */
 
 typedef struct raindrop__swing { float amplitude, cycles[2], rate[2], lean[2]; } raindrop__swing;
 
@@ -2973,7 +2992,7 @@ static inline int raindrop__light(raindrop__lit *lit, const raindrop_lamp *lamp,
         share *= share * (3 - 2 * share);
     }
     lit->width = lamp->radius / (distance > lamp->radius ? distance : lamp->radius);
-    lit->width = lit->width > RAINDROP__LEAST_LAMP ? lit->width : RAINDROP__LEAST_LAMP;
+    if (!(lit->width > (float)RAINDROP__LEAST_LAMP)) lit->width = (float)RAINDROP__LEAST_LAMP;
     for (c = 0; c < 3; c++) lit->irradiance[c] = share * lamp->intensity[c] / (distance * distance);
     return share > 0;
 }
@@ -4311,8 +4330,7 @@ static inline void raindrop__draw(raindrop__batch *batch, const raindrop__visibl
     else if (!raindrop__is_still(v)) raindrop__draw_soft(batch, v, &box);
 #endif
     else raindrop__draw_still(batch, v, &box);
-    if (frame->options.lamp_count > 0 && !(v->drop & RAINDROP__FAR_BIT) && !raindrop__is_sprite(frame))
-        raindrop__draw_glints(batch, v, y0, y1);
+    if (frame->options.lamp_count > 0 && !(v->drop & RAINDROP__FAR_BIT)) raindrop__draw_glints(batch, v, y0, y1);
 }
 
 /* Records lie in the order of the array, not of the depths: those of the next drops are asked for before they are
@@ -4372,6 +4390,10 @@ static inline int raindrop__frame_is_valid(raindrop__frame *frame)
 
 static inline void raindrop__set_frame(raindrop__frame *frame)
 {
+    if (raindrop__is_sprite(frame)) { /* still spheres under the environment alone, as published */
+        frame->options.oscillation = 0;
+        frame->options.lamp_count = 0;
+    }
     frame->half_width = 0.5f * (float)frame->width;
     frame->half_height = 0.5f * (float)frame->height;
     frame->focal = frame->half_height / tanf(0.5f * frame->camera.fov_y);
@@ -4591,7 +4613,22 @@ static const char raindrop__glsl_constants[] =
     RAINDROP__CONSTANT("SHORT", RAINDROP__SHORT)
     RAINDROP__CONSTANT("GRAVITY", RAINDROP__GRAVITY)
     RAINDROP__CONSTANT("VISCOSITY", RAINDROP__VISCOSITY)
-    RAINDROP__CONSTANT("DENSITY", RAINDROP__DENSITY);
+    RAINDROP__CONSTANT("DENSITY", RAINDROP__DENSITY)
+    RAINDROP__CONSTANT("TENSION", RAINDROP__TENSION)
+    RAINDROP__CONSTANT("PERIOD", RAINDROP__PERIOD)
+    RAINDROP__CONSTANT("LEAST_LAMP", RAINDROP__LEAST_LAMP);
+
+/* raindrop__hash and its like. */
+static const char raindrop__glsl_random[] =
+    SAT__GLSL(
+        uniform uint seed;
+        uint mix_bits(uint v) {
+            v = (v ^ (v >> 16)) * 0x7feb352du;
+            v = (v ^ (v >> 15)) * 0x846ca68bu;
+            return v ^ (v >> 16);
+        }
+        uint hash(uint s, uint i) { return mix_bits(i ^ mix_bits(s ^ mix_bits(seed ^ 0x9e3779b9u))); }
+        float uniform_of(uint bits) { return (float(bits >> 9) + 0.5) / 8388608.0; });
 
 /* Lookups in the environment's levels, laid out as an atlas: level 0, and to its right the others one above another. */
 static const char raindrop__glsl_environment[] =
@@ -4629,7 +4666,7 @@ static const char raindrop__glsl_veil[] =
         uniform vec3 right, up, back, sun, irradiance;
         uniform vec4 view; /* half width, half height, focal length in pixels; 1: depth is a texture */
         uniform vec4 rain; /* extinction, from, reach */
-        uniform vec2 planes;
+        uniform vec4 planes; /* normalised depth is x + y / distance, and z times what the texture holds + w */
         uniform sampler2D depth;)
     "#ifdef BOW\n"
     SAT__GLSL(uniform sampler2D bow;)
@@ -4637,10 +4674,13 @@ static const char raindrop__glsl_veil[] =
     SAT__GLSL(
         layout(location = 0) out vec4 colour;
         void main() {
-            vec3 d = vec3((gl_FragCoord.xy - view.xy) / view.z, 1.0);
-            float way = rain.z, at = view.w > 0.5 ? texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r : 1.0;
-            if (at < 1.0) way = min(way, length(d) * 2.0 * planes.x * planes.y
-                / (planes.y + planes.x - (2.0 * at - 1.0) * (planes.y - planes.x)));
+            vec3 d = vec3((vec2(sat_pixel()) + 0.5 - view.xy) / view.z, 1.0);
+            float way = rain.z;
+            if (view.w > 0.5) {
+                float at = texelFetch(depth, sat_pixel(), 0).r;
+                bool is_empty = planes.y > 0.0 ? at <= 0.0 : at >= 1.0;
+                if (!is_empty) way = min(way, length(d) * planes.y / (planes.z * at + planes.w - planes.x));
+            }
             if (way <= rain.y) discard;
             d = d.x * right + d.y * up - d.z * back;
             vec2 size = vec2(textureSize(far_drops, 0));
@@ -4673,6 +4713,26 @@ static const char raindrop__glsl_draw_vertex[] =
         flat out vec4 seen; /* centre in radii, view space, z forward; axis ratio. Of a far drop
                                                   raindrop__shape: half height, slope, half width, swapped */
         flat out vec4 far_colour;) /* colour; 1: a far drop */
+    "#ifdef SWING\n"
+    SAT__GLSL(
+        uniform vec2 swings; /* oscillation, seconds */
+        flat out vec4 beat; /* cycles and frequencies of two modes */
+        flat out vec4 wobble; /* amplitude, axis ratio without it; exponents of a far drop's light */
+        vec2 lean;
+        void swing_of(uint index) { /* raindrop__swing_of */
+            beat = wobble = vec4(0.0, 0.0, 0.0, 0.0);
+            wobble.y = motion.w;
+            if (drop.w <= 0.0004) return;
+            uint a = hash(8u, index), b = hash(9u, index);
+            vec2 rate = sqrt(8.0 * TENSION / DENSITY / (drop.w * drop.w * drop.w)) / 6.28318531 * vec2(1.0, 1.9364917);
+            rate = floor(rate * PERIOD) / PERIOD;
+            wobble.x = swings.x * clamp((drop.w - 0.0004) * 5000.0, 0.0, 1.0);
+            beat = vec4(vec2(uniform_of(a), uniform_of(b)) + fract(rate * swings.y), rate);
+            float turn = 6.28318531 * uniform_of(mix_bits(a));
+            lean = vec2(cos(turn), sin(turn));
+        }
+        float sine_of(float turns) { return sin(6.28318531 * fract(turns)); })
+    "#endif\n"
     "#ifdef SOFT\n"
     SAT__GLSL(
         uniform vec4 shutter; /* the camera's velocity, exposure */
@@ -4693,12 +4753,24 @@ static const char raindrop__glsl_draw_place[] =
     SAT__GLSL(
         void main() {
             vec3 rel = drop.xyz - eye, v = vec3(dot(rel, right), dot(rel, up), -dot(rel, back));)
-    "#ifdef FLAT\n"
-    SAT__GLSL(float ratio = motion.w, r = drop.w * pow(ratio, -1.0 / 3.0);)
+    /* r: half axis across; ball: radius of a ball around the drop, however it swings */
+    "#ifdef SWING\n"
+    "#ifdef QUADS\n"
+    SAT__GLSL(swing_of(uint(gl_InstanceID));)
+    "#else\n"
+    SAT__GLSL(swing_of(uint(gl_VertexID));)
+    "#endif\n"
+    SAT__GLSL(
+            float tall = pow(motion.w * (1.0 + wobble.x), 2.0 / 3.0),
+                wide = pow(motion.w * (1.0 - wobble.x), -1.0 / 3.0);
+            float ratio = motion.w * (1.0 + wobble.x * sine_of(beat.x)), r = drop.w * pow(ratio, -1.0 / 3.0),
+                ball = drop.w * max(tall, wide);)
+    "#elif defined FLAT\n"
+    SAT__GLSL(float ratio = motion.w, r = drop.w * pow(ratio, -1.0 / 3.0), ball = r;)
     "#else\n"
     SAT__GLSL(
             const float ratio = 1.0;
-            float r = drop.w;)
+            float r = drop.w, ball = r;)
     "#endif\n"
     SAT__GLSL(
             float d2 = dot(v, v), tangent2 = r * r / (d2 - r * r), stretch = sqrt(d2) / v.z;
@@ -4713,8 +4785,8 @@ static const char raindrop__glsl_draw_place[] =
     SAT__GLSL(path = vec4(0.0);)
     "#endif\n"
     SAT__GLSL(
-            bool kept = ratio > 0.0 && ratio <= 1.0 && r > 0.0 && d2 > 1.0001 * r * r && v.z - r > view.w
-                && v.z > 1.0001 * r && v.z >= slice.x && v.z < slice.y;
+            bool kept = motion.w > 0.0 && motion.w <= 1.0 && drop.w > 0.0 && d2 > 1.0001 * ball * ball
+                && v.z - ball > view.w && v.z > 1.0001 * ball && v.z >= slice.x && v.z < slice.y;
             if (kept && 3.14159265 * area_radius * area_radius >= limits.y) {
                 vec2 middle = view.xy + view.z * v.xy / v.z;
                 seen = vec4(v / r, ratio);
@@ -4727,12 +4799,20 @@ static const char raindrop__glsl_draw_place[] =
     "#else\n"
     /* tangents from the eye, exact off axis */
     SAT__GLSL(
-                vec2 q = sqrt(v.xy * v.xy + v.z * v.z - r * r), low = (v.xy * q - r * v.z) / (v.z * q + r * v.xy);
-                vec2 high = (v.xy * q + r * v.z) / (v.z * q - r * v.xy);
-                bool is_far = area_radius < (LOOK == 3 ? max(limits.x, LEAST_RADIUS) : LEAST_RADIUS);
+                vec2 q = sqrt(v.xy * v.xy + v.z * v.z - ball * ball),
+                    low = (v.xy * q - ball * v.z) / (v.z * q + ball * v.xy);
+                vec2 high = (v.xy * q + ball * v.z) / (v.z * q - ball * v.xy);
+                bool is_far = area_radius < max(limits.x, LEAST_RADIUS);
                 vec4 blurred = vec4(0.0);
                 vec2 reach = 0.5 * view.z * (high - low) + 1.0;
                 middle = view.xy + 0.5 * view.z * (low + high);)
+    "#ifdef GLINT\n"
+    SAT__GLSL(
+                vec3 light;
+                bool lit = glint(light, place.xy, area_radius, is_far);
+                place.z = area_radius;
+                is_far = true;)
+    "#endif\n"
     "#ifdef SOFT\n"
     SAT__GLSL(
                 path = blurred = path_of(v, area_radius, is_far);
@@ -4754,7 +4834,13 @@ static const char raindrop__glsl_draw_place[] =
                 if (is_far) {
                     vec3 d = v.x * right + v.y * up - v.z * back, at = fold(d);
                     vec2 size = vec2(textureSize(far_drops, 0));
-                    far_colour = vec4(textureLod(far_drops, (at.xy * (size - 2.0) + 1.0) / size, 0.0).rgb, 1.0);)
+                    far_colour = textureLod(far_drops, (at.xy * (size - 2.0) + 1.0) / size, 0.0);)
+    "#ifdef GLINT\n"
+    SAT__GLSL(far_colour.rgb = light;)
+    "#elif defined SWING\n"
+    SAT__GLSL(wobble.zw = clamp(wobble.x * far_colour.a, -0.6, 0.6) * vec2(1.0, 2.5);)
+    "#endif\n"
+    SAT__GLSL(far_colour.a = 1.0;)
     /* raindrop__far_shape */
     SAT__GLSL(
                     bool swapped = abs(blurred.x) > abs(blurred.y);
@@ -4779,14 +4865,105 @@ static const char raindrop__glsl_draw_place[] =
     "#endif\n"
     SAT__GLSL(
                 gl_Position = vec4(middle / view.xy - 1.0, limits.z + limits.w / v.z, 1.0);
-                if (sat_corner_of.z > 0) gl_Position.y = -gl_Position.y;
-            })
+                if (sat_corner_of.z > 0) gl_Position.y = -gl_Position.y;)
+    "#ifdef GLINT\n"
+    SAT__GLSL(if (!lit) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);)
+    "#endif\n"
+    SAT__GLSL(})
     "#ifndef QUADS\n"
     SAT__GLSL(
             vec2 reach = abs(right_reach) + abs(up_reach);
             gl_PointSize = max(2.0 * max(reach.x, reach.y), 1.0);)
     "#endif\n"
     SAT__GLSL(});
+
+/* raindrop__turned_b2, raindrop__path_share. */
+static const char raindrop__glsl_lamp[] =
+    SAT__GLSL(
+        uniform vec4 lamp; /* position, radius */
+        uniform vec3 intensity;
+        uniform vec3 axis;
+        uniform vec3 cone; /* angles of full light and of none, path: as RAINDROP__GLINTS */
+        uniform vec2 optics; /* index */
+        uniform vec2 orders; /* 0: order 0 has the later ones' light */
+        float turned_b2(float angle) {
+            float n = optics.x, c = cos(0.5 * angle), s = sin(0.5 * angle);
+            if (cone.z < 0.5) return c * c;
+            if (cone.z < 1.5) {
+                if (n < 1.0 ? n >= c : n * c <= 1.0) return min(n * n, 1.0);
+                return n * n * s * s / (1.0 + n * n - 2.0 * n * c);
+            }
+            float bow2 = clamp((4.0 - n * n) / 3.0, 0.0, 1.0), bow = sqrt(bow2);
+            float e = angle - 3.14159265 - 2.0 * asin(bow) + 4.0 * asin(min(bow / n, 1.0));
+            if (e <= 0.0) return bow2;
+            float bend = 2.0 * bow / ((1.0 - bow2) * sqrt(1.0 - bow2) + 1e-6)
+                - 4.0 * bow / (n * n * n * (1.0 - bow2 / (n * n)) * sqrt(1.0 - bow2 / (n * n)));
+            vec2 range = cone.z < 2.5 ? vec2(0.0, bow) : vec2(bow, 1.0);
+            float b = clamp(bow + (cone.z < 2.5 ? -1.0 : 1.0) * sqrt(2.0 * e / max(bend, 0.1)), range.x, range.y);
+            for (int i = 0; i < 6; i++) {
+                float slope = 2.0 / (sqrt((1.0 - b) * (1.0 + b)) + 1e-4) - 4.0 / sqrt(n * n - b * b);
+                b = clamp(b - (3.14159265 + 2.0 * asin(b) - 4.0 * asin(b / n) - angle) / slope, range.x, range.y);
+            }
+            return b * b;
+        }
+        float path_share(float b2) {
+            raindrop_ray ray = raindrop_trace(vec3(0.0, 0.0, -1.0), vec3(sqrt(b2), 0.0, 0.0), 1.0 - b2, optics.x);
+            vec2 f = ray.polarised, enter = 1.0 - f;
+            if (cone.z < 0.5) return ray.fresnel;
+            if (cone.z < 1.5) return orders.x > 0.5 ? ray.transmit : 1.0 - ray.fresnel;
+            return orders.x > 0.5 ? 0.5 * dot(enter, f) : 0.0;
+        });
+
+/* raindrop__light, raindrop__glint_of, raindrop__flicker_at. */
+static const char raindrop__glsl_glint[] =
+    SAT__GLSL(
+        float glint_b2(float angle, float per_distance) {
+            float b2 = turned_b2(angle);
+            for (int i = 0; per_distance > 0.0 && i < 8; i++) {
+                float off = asin(sqrt(b2) * per_distance);
+                b2 = 0.5 * (b2 + turned_b2(clamp(cone.z > 0.5 ? angle + off : angle - off, 0.0, 3.14159265)));
+            }
+            return b2;
+        }
+        float lamp_share(vec3 to) {
+            if (cone.x >= 3.14) return 1.0;
+            float at = acos(clamp(-dot(to, axis), -1.0, 1.0));
+            float share = at <= cone.x ? 1.0 : at < cone.y ? (cone.y - at) / (cone.y - cone.x) : 0.0;
+            return share * share * (3.0 - 2.0 * share);
+        })
+    SAT__GLSL(
+        bool glint(out vec3 light, inout vec2 middle, inout float radius, bool is_far) {
+            vec3 d = drop.xyz - eye, to = lamp.xyz - drop.xyz;
+            float away = length(to), distance = length(d) / drop.w, per = is_far ? 0.0 : min(1.0 / distance, 0.25);
+            light = vec3(0.0);
+            if (away <= drop.w || (cone.z > 1.5 && (optics.x < 1.1 || optics.x > 1.9))) return false;
+            d = normalize(d);
+            to /= away;
+            float cosine = clamp(dot(d, to), -1.0, 1.0), angle = acos(cosine), wide = max(lamp.w / max(away, lamp.w),
+                LEAST_LAMP), low = max(angle - wide, 0.0), high = min(angle + wide, 3.14159265);
+            float low_b2 = glint_b2(low, per), high_b2 = glint_b2(high, per), b2 = glint_b2(angle, per), b = sqrt(b2);
+            float g = abs(high_b2 - low_b2) / (4.0 * sin(0.5 * (low + high)) * sin(0.5 * (high - low)) + 1e-9);
+            g *= (1.0 - per * per) / sqrt(1.0 - 0.5 * (low_b2 + high_b2) * per * per);
+            light = path_share(b2) * g * lamp_share(to) / (away * away) * intensity;
+            vec3 side = to - cosine * d, other = abs(d.y) < 0.9 ? vec3(-d.z, 0.0, d.x) : vec3(0.0, d.z, -d.y);
+            side = normalize(dot(side, side) > 1e-12 ? side : other);
+            float off = b * per, turn = cone.z > 0.5 && optics.x > 1.0 ? -1.0 : 1.0;
+            vec3 ray = sqrt(1.0 - off * off) * d + turn * off * side,
+                normal = turn * b * sqrt(1.0 - off * off) * side - b * off * d - sqrt((1.0 - b) * (1.0 + b)) * ray;
+            float y2 = normal.y * normal.y, e = wobble.x / 1.5, old = radius;
+            wobble.zw = e * vec2(-4.0 * (1.5 * y2 - 0.5),
+                -15.0 * (5.0 * y2 - 1.0) * (normal.x * lean.x + normal.z * lean.y) / 2.07);
+            if (!is_far) {
+                middle = view.xy + view.z * vec2(dot(ray, right), dot(ray, up)) / -dot(ray, back);
+                radius = clamp(radius * wide * sqrt(g), 0.3, radius);
+            }
+            light *= old * old / (3.14159265 * radius * radius);
+            return g > 0.0 && light.r + light.g + light.b > 0.0;
+        });
+
+/* ------------------------------------------------------------------------------------------------
+   >> fragments   the fragments of drops
+   ------------------------------------------------------------------------------------------------ */
 
 /* Two lookups a ray, and raindrop__half_plane: what all looks share. */
 static const char raindrop__glsl_shade[] =
@@ -4908,16 +5085,43 @@ static const char raindrop__glsl_orders[] =
         })
     "#endif\n";
 
-/* raindrop_trace_spheroid behind raindrop__flat_cover. */
+/* raindrop_trace_spheroid behind raindrop__flat_cover; raindrop__flicker. */
 static const char raindrop__glsl_flat[] =
+    "#ifdef SWING\n"
+    SAT__GLSL(
+        uniform vec4 shutter;
+        flat in vec4 beat;
+        flat in vec4 wobble;
+        float bent, radii; /* axis ratio of the moment, and pixels in radii */
+        float sine_of(float turns) { return sin(6.28318531 * fract(turns)); }
+        float bessel(float x) {
+            float q = 0.25 * x * x;
+            return 1.0 + q * (1.0 + q * (1.0 / 4.0 + q * (1.0 / 36.0 + q * (1.0 / 576.0 + q / 14400.0))));
+        }
+        float flicker(float along) {
+            float span = shutter.w / (2.0 * seen.x), dt = along * span;
+            vec2 turn = 3.14159265 * beat.zw * span, x = wobble.zw;
+            if (turn.x > 0.01) x.x *= sin(turn.x) / turn.x;
+            if (turn.y > 0.01) x.y *= sin(turn.y) / turn.y;
+            return exp(x.x * sine_of(beat.x + beat.z * dt) + x.y * sine_of(beat.y + beat.w * dt))
+                / (bessel(x.x) * bessel(x.y));
+        }
+        void bend(float dt) {
+            bent = wobble.y * (1.0 + wobble.x * sine_of(beat.x + beat.z * dt));
+            radii = place.w * pow(bent / seen.w, 1.0 / 3.0);
+        })
+    "#else\n"
+    "#define bent seen.w\n"
+    "#define radii place.w\n"
+    "#endif\n"
     "#ifdef FLAT\n"
     SAT__GLSL(
         float trace_flat(out raindrop_ray ray, vec3 d, vec3 p) {
-            vec3 s = vec3(1.0, 1.0 / seen.w, 1.0), unit = d * s, q = p * s;
+            vec3 s = vec3(1.0, 1.0 / bent, 1.0), unit = d * s, q = p * s;
             float n = optics.x, d2 = dot(unit, unit);
             q -= dot(q, unit) / d2 * unit;
             vec2 rim = vec2(dot(q * s, right), dot(q * s, up));
-            float b = length(q) + 1e-9, length_of_rim = length(rim) + 1e-20, slope = place.w * length_of_rim / b + 1e-9;
+            float b = length(q) + 1e-9, length_of_rim = length(rim) + 1e-20, slope = radii * length_of_rim / b + 1e-9;
             q *= min(1.0, 0.999 / b);
             vec3 hit = q - sqrt((1.0 - dot(q, q)) / d2) * unit, normal = normalize(hit * s),
                 inner = refract(d, normal, 1.0 / n);
@@ -4960,16 +5164,16 @@ static const char raindrop__glsl_draw_trace[] =
         struct fragment { raindrop_ray ray; vec3 d, p; float one_minus_b2, cover; };
         fragment trace(vec2 at) {
             fragment f;
-            vec3 d = vec3((here() - view.xy) / view.z, 1.0), q = vec3(at * place.w, 0.0);
+            vec3 d = vec3((here() - view.xy) / view.z, 1.0), q = vec3(at * radii, 0.0);
             float l2 = dot(d, d), t = dot(q, d) / l2;
             vec3 p = q - t * d;
             float b2 = dot(p, p), b = sqrt(max(b2, 1e-12)),
-                slope = max(length(p.xy * (place.w - t / view.z)) / b, 1e-9);
+                slope = max(length(p.xy * (radii - t / view.z)) / b, 1e-9);
             f.d = (d.x * right + d.y * up - d.z * back) / sqrt(l2);
             f.p = p.x * right + p.y * up - p.z * back;)
     "#ifdef FLAT\n"
     SAT__GLSL(
-            if (seen.w < 1.0) {
+            if (bent < 1.0 || bent > 1.0) {
                 f.cover = trace_flat(f.ray, f.d, f.p);
                 return f;
             })
@@ -5030,8 +5234,14 @@ static const char raindrop__glsl_draw_soft[] =
             int samples = !moves ? 1 : r < 6.0 ? 4 : r < 24.0 ? 8 : 16;
             float blur = 2.0 * path.z + (moves ? max(min(2.0 * r, way) / float(samples), 1.0) : 1.0);
             vec3 sum = vec3(0.0);
-            for (int j = 0; j < samples; j++)
-                sum += shade(trace(at - along * mix(from, to, (float(j) + 0.5) / float(samples))).ray, blur);
+            for (int j = 0; j < samples; j++) {
+                float t = mix(from, to, (float(j) + 0.5) / float(samples));)
+    "#ifdef SWING\n"
+    SAT__GLSL(if (moves) bend(t / way * shutter.w);)
+    "#endif\n"
+    SAT__GLSL(
+                sum += shade(trace(at - along * t).ray, blur);
+            }
             colour.rgb = sum / float(samples);
         })
     "#endif\n";
@@ -5040,6 +5250,11 @@ static const char raindrop__glsl_draw_ray[] =
     SAT__GLSL(
         void main() {
             vec2 at = here() - place.xy;)
+    "#ifdef SWING\n"
+    SAT__GLSL(
+            bent = seen.w;
+            radii = place.w;)
+    "#endif\n"
     "#ifdef SOFT\n"
     SAT__GLSL(
             if (path.w > 0.0) {
@@ -5050,13 +5265,28 @@ static const char raindrop__glsl_draw_ray[] =
     SAT__GLSL(
             if (far_colour.w > 0.5) {
                 colour = vec4(far_colour.rgb, far_cover(at));
-                if (colour.a <= 0.0) discard;
+                if (colour.a <= 0.0) discard;)
+    "#ifdef SWING\n"
+    SAT__GLSL(
+                float along = seen.w > 0.5 ? at.x : at.y, way = seen.w > 0.5 ? path.x : path.y;
+                colour.rgb *= flicker(way < 0.0 ? -along : along);)
+    "#endif\n"
+    SAT__GLSL(
                 return;
             }
+)
+    "#ifdef GLINT\n"
+    SAT__GLSL(discard;)
+    "#else\n"
+    SAT__GLSL(
             fragment f = trace(at);
             if (f.cover <= 0.0) discard;)
-    "#if defined ORDERS && defined FLAT\n"
-    SAT__GLSL(colour = vec4(seen.w < 1.0 ? shade(f.ray, 1.0) : still_colour(f.d, f.p, f.one_minus_b2), f.cover);)
+    "#endif\n"
+    "#if defined GLINT\n"
+    "#elif defined ORDERS && defined FLAT\n"
+    SAT__GLSL(
+            bool is_flat = bent < 1.0 || bent > 1.0;
+            colour = vec4(is_flat ? shade(f.ray, 1.0) : still_colour(f.d, f.p, f.one_minus_b2), f.cover);)
     "#elif defined ORDERS\n"
     SAT__GLSL(colour = vec4(still_colour(f.d, f.p, f.one_minus_b2), f.cover);)
     "#else\n"
@@ -5064,7 +5294,10 @@ static const char raindrop__glsl_draw_ray[] =
     "#endif\n"
     SAT__GLSL(});
 
-/* raindrop__step and raindrop__reenter in floats. */
+/* ------------------------------------------------------------------------------------------------
+   >> rain shader   raindrop__step and raindrop__reenter in floats
+   ------------------------------------------------------------------------------------------------ */
+
 static const char raindrop__glsl_step[] =
     SAT__GLSL(float decay(float x) { return x < 1e-3 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x); })
     SAT__GLSL(float log_1p(float x) { return abs(x) < 1e-3 ? x * (1.0 - x * (0.5 - x / 3.0)) : log(1.0 + x); })
@@ -5141,17 +5374,9 @@ static const char raindrop__glsl_advance[] =
         uniform vec4 sizes; /* lambda, smallest, largest diameter in mm, the fixed one or 0 */
         uniform vec4 step_and; /* dt, settled, own drops, published speed */
         uniform vec2 fastest; /* terminal velocity of the largest, oblate */
-        uniform uint seed, stream;
+        uniform uint stream;
         const uint TURN = 0x2545f491u; /* RAINDROP__TURN */
         out vec4 next_drop, next_motion;
-        uint mix_bits(uint v) {
-            v = (v ^ (v >> 16)) * 0x7feb352du;
-            v = (v ^ (v >> 15)) * 0x846ca68bu;
-            return v ^ (v >> 16);
-        })
-    SAT__GLSL(uint hash(uint s, uint i) { return mix_bits(i ^ mix_bits(s ^ mix_bits(seed ^ 0x9e3779b9u))); })
-    SAT__GLSL(float uniform_of(uint bits) { return (float(bits >> 9) + 0.5) / 8388608.0; })
-    SAT__GLSL(
         float diameter(uint stream, uint i, bool at_plane) {
             float span = sizes.z - sizes.y, all = 1.0 - exp(-sizes.x * span), d = sizes.y;
             for (uint attempt = 0u; attempt < 256u; attempt++) {
@@ -5212,14 +5437,18 @@ static const char raindrop__glsl_advance[] =
 
 enum { RAINDROP__GL_TEXTURE_MIN_LOD_LINEAR = 0x2703 }; /* GL_LINEAR_MIPMAP_LINEAR */
 
-/* What a program knows beside still spheres that do without internal reflections: sums. */
-enum { RAINDROP__GL_SOFT = 1, RAINDROP__GL_FLAT = 2, RAINDROP__GL_ORDERS = 4, RAINDROP__GL_KINDS = 8 };
+/* The programs. Those of rays: of still spheres, plus RAINDROP__GL_SOFT and RAINDROP__GL_FLAT for what moves or is out
+   of focus and for what is flattened. */
+enum { RAINDROP__GL_SOFT = 1, RAINDROP__GL_FLAT = 2 };
+enum {
+    RAINDROP__GL_MAP, RAINDROP__GL_SPRITE, RAINDROP__GL_RAYS, RAINDROP__GL_SWING = RAINDROP__GL_RAYS + 4,
+    RAINDROP__GL_GLINT, RAINDROP__GL_VEIL, RAINDROP__GL_BOWS, RAINDROP__GL_ADVANCE, RAINDROP__GL_PROGRAMS
+};
 
 struct raindrop_gl {
     sat__gl gl;
     raindrop_gl_options options;
-    unsigned draw[4][RAINDROP__GL_KINDS], advance; /* programs; draw by look and what drops do, 0 until it is needed */
-    unsigned veil[2];                 /* programs, without and with bows; 0 until one is needed */
+    unsigned programs[RAINDROP__GL_PROGRAMS]; /* 0: not among those that options ask for */
     unsigned environment, far_drops, bow, map[2];
     float sun_direction[3], sun_irradiance[3];
     unsigned drops[2], arrays[2];     /* ping-pong buffers and their vertex arrays */
@@ -5229,6 +5458,7 @@ struct raindrop_gl {
     int flat;                         /* some drops are, or will be when they come back on top */
     float n;
     uint32_t step;
+    double time;
     raindrop_rain_options rain;
     sat_allocator allocator;
 };
@@ -5236,7 +5466,13 @@ struct raindrop_gl {
 static const sat__field raindrop__gl_fields[] = {
     SAT__FIELD(raindrop_gl_options, 'i', half_map, 1, 0, 1, ' '),
     SAT__FIELD(raindrop_gl_options, 'i', quads, 1, 0, 1, ' '),
-    SAT__FIELD(raindrop_gl_options, 'i', compile_all, 0, 0, 1, ' '),
+    SAT__FIELD(raindrop_gl_options, 'i', sprites, 1, 0, 1, ' '),
+    SAT__FIELD(raindrop_gl_options, 'i', motion, 1, 0, 1, ' '),
+    SAT__FIELD(raindrop_gl_options, 'i', oblate, 1, 0, 1, ' '),
+    SAT__FIELD(raindrop_gl_options, 'i', orders, 1, 0, 1, ' '),
+    SAT__FIELD(raindrop_gl_options, 'i', veil, 1, 0, 1, ' '),
+    SAT__FIELD(raindrop_gl_options, 'i', oscillation, 0, 0, 1, ' '),
+    SAT__FIELD(raindrop_gl_options, 'i', lamps, 0, 0, 1, ' '),
     SAT__FIELD(raindrop_gl_options, 'a', allocator, 0, 0, 0, ' '),
 };
 
@@ -5259,85 +5495,119 @@ RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl)
     return gl ? gl->gl.message : "there is no object";
 }
 
-/* The program of a look and a kind, built when it is first asked for. */
-static inline sat_result raindrop__gl_draw_program(raindrop_gl *g, int look, int kind)
+/* Whether the options ask for a program. */
+static inline int raindrop__gl_wants(const raindrop_gl_options *o, int program)
 {
-    const char *library[4], *vertex[3], *fragment[8];
+    switch (program) {
+    case RAINDROP__GL_MAP: return o->map != NULL;
+    case RAINDROP__GL_SPRITE: return o->sprites;
+    case RAINDROP__GL_SWING: return o->oscillation;
+    case RAINDROP__GL_GLINT: return o->lamps;
+    case RAINDROP__GL_VEIL:
+    case RAINDROP__GL_BOWS: return o->veil;
+    case RAINDROP__GL_ADVANCE: return 1;
+    default:
+        if (((program - RAINDROP__GL_RAYS) & RAINDROP__GL_SOFT) && !o->motion) return 0;
+        return !((program - RAINDROP__GL_RAYS) & RAINDROP__GL_FLAT) || o->oblate;
+    }
+}
+
+/* What a program of the drops knows. */
+static inline void raindrop__gl_define(raindrop_gl *g, int program)
+{
+    const int rays = program >= RAINDROP__GL_RAYS, swings = program >= RAINDROP__GL_SWING,
+              kind = rays ? program - RAINDROP__GL_RAYS : RAINDROP__GL_FLAT;
+    sat__gl_define(&g->gl, "LOOK", rays ? RAINDROP_LOOK_AUTO : program);
+    if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
+    if (swings || (kind & RAINDROP__GL_SOFT)) sat__gl_define(&g->gl, "SOFT", 1);
+    if (swings || (kind & RAINDROP__GL_FLAT)) sat__gl_define(&g->gl, "FLAT", 1);
+    if (rays && g->options.orders) sat__gl_define(&g->gl, "ORDERS", 1);
+    if (swings) sat__gl_define(&g->gl, "SWING", 1);
+    if (program == RAINDROP__GL_GLINT) sat__gl_define(&g->gl, "GLINT", 1);
+}
+
+static inline sat_result raindrop__gl_build_draw(raindrop_gl *g, int program)
+{
+    const char *library[4], *vertex[7], *fragment[8], **v = vertex, **f = fragment;
     sat__gl_shaders shaders;
-    if (g->draw[look][kind]) return SAT_OK;
     memset(&shaders, 0, sizeof shaders);
     library[0] = raindrop_gl_glsl();
     library[1] = raindrop__glsl_constants;
     library[2] = raindrop__glsl_environment;
-    vertex[0] = raindrop__glsl_draw_vertex;
-    vertex[1] = raindrop__glsl_draw_place;
-    fragment[0] = sat__gl_pixel();
-    fragment[1] = raindrop__glsl_shade;
-    if (look <= RAINDROP_LOOK_SPRITE) {
-        fragment[2] = raindrop__glsl_draw_sprite;
-        fragment[3] = NULL;
-    } else {
-        fragment[2] = raindrop__glsl_orders;
-        fragment[3] = raindrop__glsl_flat;
-        fragment[4] = raindrop__glsl_draw_trace;
-        fragment[5] = raindrop__glsl_draw_soft;
-        fragment[6] = raindrop__glsl_draw_ray;
-        fragment[7] = NULL;
+    library[3] = NULL;
+    if (program >= RAINDROP__GL_SWING) *v++ = raindrop__glsl_random;
+    *v++ = raindrop__glsl_draw_vertex;
+    if (program == RAINDROP__GL_GLINT) {
+        *v++ = raindrop__glsl_lamp;
+        *v++ = raindrop__glsl_glint;
     }
-    library[3] = vertex[2] = NULL;
+    *v++ = raindrop__glsl_draw_place;
+    *v = NULL;
+    *f++ = sat__gl_pixel();
+    *f++ = raindrop__glsl_shade;
+    if (program < RAINDROP__GL_RAYS) *f++ = raindrop__glsl_draw_sprite;
+    else {
+        *f++ = raindrop__glsl_orders;
+        *f++ = raindrop__glsl_flat;
+        *f++ = raindrop__glsl_draw_trace;
+        *f++ = raindrop__glsl_draw_soft;
+        *f++ = raindrop__glsl_draw_ray;
+    }
+    *f = NULL;
     shaders.name = "raindrop: drops";
     shaders.library = library;
     shaders.vertex = vertex;
     shaders.fragment = fragment;
-    sat__gl_define(&g->gl, "LOOK", look);
-    if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
-    if (kind & RAINDROP__GL_SOFT) sat__gl_define(&g->gl, "SOFT", 1);
-    if (kind & RAINDROP__GL_FLAT) sat__gl_define(&g->gl, "FLAT", 1);
-    if (kind & RAINDROP__GL_ORDERS) sat__gl_define(&g->gl, "ORDERS", 1);
-    return sat__gl_build(&g->gl, &g->draw[look][kind], &shaders);
+    raindrop__gl_define(g, program);
+    return sat__gl_build(&g->gl, &g->programs[program], &shaders);
 }
 
 /* One for environments with bows and one for those without. */
-static inline sat_result raindrop__gl_veil_program(raindrop_gl *g, int bow)
+static inline sat_result raindrop__gl_build_veil(raindrop_gl *g, int program)
 {
-    const char *library[3], *fragment[2];
+    const char *library[3], *fragment[3];
     sat__gl_shaders shaders;
-    if (g->veil[bow]) return SAT_OK;
     memset(&shaders, 0, sizeof shaders);
     library[0] = raindrop__glsl_constants;
     library[1] = raindrop__glsl_environment;
-    fragment[0] = raindrop__glsl_veil;
-    library[2] = fragment[1] = NULL;
+    fragment[0] = sat__gl_pixel();
+    fragment[1] = raindrop__glsl_veil;
+    library[2] = fragment[2] = NULL;
     shaders.name = "raindrop: veil";
     shaders.library = library;
     shaders.fragment = fragment;
-    if (bow) sat__gl_define(&g->gl, "BOW", 1);
-    return sat__gl_build(&g->gl, &g->veil[bow], &shaders);
+    if (program == RAINDROP__GL_BOWS) sat__gl_define(&g->gl, "BOW", 1);
+    return sat__gl_build(&g->gl, &g->programs[program], &shaders);
+}
+
+static inline sat_result raindrop__gl_build_advance(raindrop_gl *g)
+{
+    static const char *const varyings[] = {"next_drop", "next_motion", NULL};
+    const char *vertex[5];
+    sat__gl_shaders shaders;
+    memset(&shaders, 0, sizeof shaders);
+    vertex[0] = raindrop__glsl_constants;
+    vertex[1] = raindrop__glsl_random;
+    vertex[2] = raindrop__glsl_step;
+    vertex[3] = raindrop__glsl_advance;
+    vertex[4] = NULL;
+    shaders.name = "raindrop: advance";
+    shaders.vertex = vertex;
+    shaders.varyings = varyings;
+    return sat__gl_build(&g->gl, &g->programs[RAINDROP__GL_ADVANCE], &shaders);
 }
 
 static inline sat_result raindrop__gl_programs(raindrop_gl *g)
 {
-    static const char *const varyings[] = {"next_drop", "next_motion", NULL};
-    const char *vertex[4];
-    sat__gl_shaders shaders;
     sat_result result = SAT_OK;
-    int look, kind;
-    for (look = g->options.map ? 0 : 1; look < 4; look++)
-        for (kind = 0; kind < (g->options.compile_all ? RAINDROP__GL_KINDS : 1) && result == SAT_OK; kind++)
-            if (look > RAINDROP_LOOK_SPRITE || (kind & ~RAINDROP__GL_FLAT) == 0)
-                result = raindrop__gl_draw_program(g, look, kind);
-    if (result == SAT_OK && g->options.compile_all) result = raindrop__gl_veil_program(g, 0);
-    if (result == SAT_OK && g->options.compile_all) result = raindrop__gl_veil_program(g, 1);
-    if (result != SAT_OK) return result;
-    memset(&shaders, 0, sizeof shaders);
-    vertex[0] = raindrop__glsl_constants;
-    vertex[1] = raindrop__glsl_step;
-    vertex[2] = raindrop__glsl_advance;
-    vertex[3] = NULL;
-    shaders.name = "raindrop: advance";
-    shaders.vertex = vertex;
-    shaders.varyings = varyings;
-    return sat__gl_build(&g->gl, &g->advance, &shaders);
+    int i;
+    for (i = 0; i < RAINDROP__GL_PROGRAMS && result == SAT_OK; i++) {
+        if (!raindrop__gl_wants(&g->options, i)) continue;
+        if (i == RAINDROP__GL_ADVANCE) result = raindrop__gl_build_advance(g);
+        else if (i == RAINDROP__GL_VEIL || i == RAINDROP__GL_BOWS) result = raindrop__gl_build_veil(g, i);
+        else result = raindrop__gl_build_draw(g, i);
+    }
+    return result;
 }
 
 #ifndef RAINDROP_NO_MAP
@@ -5415,17 +5685,13 @@ RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *g)
 {
     sat_allocator memory;
     sat__gl *gl;
-    int i, kind;
+    int i;
     if (!g) return;
     gl = &g->gl;
     memory = g->allocator;
     if (gl->vertex_array) { /* the context was good enough to open */
-        for (i = 0; i < 4; i++)
-            for (kind = 0; kind < RAINDROP__GL_KINDS; kind++)
-                if (g->draw[i][kind]) gl->DeleteProgram(g->draw[i][kind]);
-        for (i = 0; i < 2; i++)
-            if (g->veil[i]) gl->DeleteProgram(g->veil[i]);
-        if (g->advance) gl->DeleteProgram(g->advance);
+        for (i = 0; i < RAINDROP__GL_PROGRAMS; i++)
+            if (g->programs[i]) gl->DeleteProgram(g->programs[i]);
         if (g->target) gl->DeleteFramebuffers(1, &g->target);
         gl->DeleteTextures(1, &g->scratch);
         gl->DeleteTextures(1, &g->environment);
@@ -5437,6 +5703,30 @@ RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *g)
     }
     sat__gl_close(gl);
     sat__release(&memory, g, sizeof *g);
+}
+
+RAINDROP_DEF sat_result raindrop_gl_set_options(raindrop_gl *g, const raindrop_gl_options *options)
+{
+    raindrop_gl_options o = options ? *options : raindrop_gl_defaults();
+    sat__text t;
+    int i, same;
+    if (!g || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
+    t = sat__text_begin(g->gl.message, sizeof g->gl.message);
+    if (!raindrop__fields_are_valid(&t, &o, raindrop__gl_fields, SAT__COUNT(raindrop__gl_fields)))
+        return SAT_ERR_ARGUMENT;
+    same = o.map == g->options.map && o.half_map == g->options.half_map && o.quads == g->options.quads;
+    if (!same) raindrop__say(&t, "map, half_map and quads are made at create");
+    for (i = 0; i < RAINDROP__GL_PROGRAMS && same; i++) {
+        same = !raindrop__gl_wants(&o, i) || g->programs[i];
+        if (!same)
+            raindrop__say(&t, "sprites, motion, oblate, veil, oscillation or lamps is 1 and was 0: made at create");
+    }
+    if (same && o.orders > g->options.orders) same = raindrop__say(&t, "orders is 1 and was 0: made at create");
+    if (!same) return SAT_ERR_MISMATCH;
+    o.orders = g->options.orders; /* compiled in */
+    o.allocator = g->options.allocator;
+    g->options = o;
+    return SAT_OK;
 }
 
 /* ---- environment */
@@ -5546,6 +5836,7 @@ RAINDROP_DEF sat_result raindrop_gl_set_rain(raindrop_gl *g, const raindrop_rain
     for (i = 0; i < rain->count && !g->flat; i++)
         g->flat = !(rain->drops[i].axis_ratio >= 1 && rain->drops[i].axis_ratio <= 1);
     g->step = rain->step;
+    g->time = rain->time;
     g->rain = rain->options;
     raindrop__gl_bound(g, rain);
     return result;
@@ -5589,22 +5880,22 @@ static inline void raindrop__gl_set_advance(raindrop_gl *g, double dt)
     sat__gl *gl = &g->gl;
     const raindrop_rain_options *o = &g->rain;
     float v[4];
-    sat__gl_set_float3(gl, g->advance, "wind", o->wind);
-    sat__gl_set_float3(gl, g->advance, "centre", o->centre);
-    sat__gl_set_float3(gl, g->advance, "box", o->box_size);
+    sat__gl_set_float3(gl, g->programs[RAINDROP__GL_ADVANCE], "wind", o->wind);
+    sat__gl_set_float3(gl, g->programs[RAINDROP__GL_ADVANCE], "centre", o->centre);
+    sat__gl_set_float3(gl, g->programs[RAINDROP__GL_ADVANCE], "box", o->box_size);
     v[0] = (float)raindrop__lambda(o->rate_mm_h);
     v[1] = (float)o->diameter_min_mm;
     v[2] = (float)o->diameter_max_mm;
     v[3] = (float)o->diameter_mm;
-    sat__gl_set_float4(gl, g->advance, "sizes", v);
+    sat__gl_set_float4(gl, g->programs[RAINDROP__GL_ADVANCE], "sizes", v);
     v[0] = (float)dt;
     v[1] = (float)g->settled;
     v[2] = (float)g->own;
     v[3] = o->speed;
-    sat__gl_set_float4(gl, g->advance, "step_and", v);
-    sat__gl_set_float2(gl, g->advance, "fastest", (float)raindrop_terminal_velocity(o->diameter_max_mm), (float)(o->oblate != 0));
-    sat__gl_set_uint(gl, g->advance, "seed", o->seed);
-    sat__gl_set_uint(gl, g->advance, "stream", g->step * 512u);
+    sat__gl_set_float4(gl, g->programs[RAINDROP__GL_ADVANCE], "step_and", v);
+    sat__gl_set_float2(gl, g->programs[RAINDROP__GL_ADVANCE], "fastest", (float)raindrop_terminal_velocity(o->diameter_max_mm), (float)(o->oblate != 0));
+    sat__gl_set_uint(gl, g->programs[RAINDROP__GL_ADVANCE], "seed", o->seed);
+    sat__gl_set_uint(gl, g->programs[RAINDROP__GL_ADVANCE], "stream", g->step * 512u);
 }
 
 RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt)
@@ -5615,9 +5906,10 @@ RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt)
     if (!(dt > 0) || !g->count) return SAT_OK;
     gl = &g->gl;
     g->step++;
+    g->time = fmod(g->time + fmod(dt, RAINDROP__PERIOD), RAINDROP__PERIOD);
     sat__gl_begin(gl, &state, 1);
     gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, g->target);
-    gl->UseProgram(g->advance);
+    gl->UseProgram(g->programs[RAINDROP__GL_ADVANCE]);
     raindrop__gl_set_advance(g, dt);
     gl->BindBuffer(SAT__GL_ARRAY_BUFFER, 0);
     gl->BindVertexArray(g->arrays[g->front]);
@@ -5638,7 +5930,9 @@ RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt)
 }
 #endif
 
-/* ---- picture */
+/* ------------------------------------------------------------------------------------------------
+   >> OpenGL picture   drops, glints and veil
+   ------------------------------------------------------------------------------------------------ */
 
 static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const raindrop__frame *frame,
                                          const float depth[2])
@@ -5655,7 +5949,7 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
     v[2] = frame->focal;
     v[3] = camera->depth_near;
     sat__gl_set_float4(gl, program, "view", v);
-    v[0] = frame->options.far_radius;
+    v[0] = frame->options.look == RAINDROP_LOOK_AUTO ? frame->options.far_radius : 0;
     v[1] = frame->options.coverage_threshold;
     v[2] = depth[0];
     v[3] = depth[1];
@@ -5666,6 +5960,8 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
     sat__gl_set_float2(gl, program, "lens", camera->aperture, camera->focus_distance);
     sat__gl_set_float2(gl, program, "orders", (float)frame->options.orders, frame->options.orders_radius);
     sat__gl_set_float2(gl, program, "optics", g->n, (float)(frame->options.exit_fresnel != 0));
+    sat__gl_set_float2(gl, program, "swings", frame->options.oscillation, (float)g->time);
+    sat__gl_set_uint(gl, program, "seed", g->rain.seed);
     sat__gl_set_float2(gl, program, "environment_size", (float)g->resolution, (float)g->levels);
     sat__gl_set_texture(gl, program, "environment", 0, g->environment);
     sat__gl_set_texture(gl, program, "far_drops", 1, g->far_drops);
@@ -5673,6 +5969,26 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
         sat__gl_set_texture(gl, program, "reflections", 2, g->map[0]);
         sat__gl_set_texture(gl, program, "refractions", 3, g->map[1]);
     }
+}
+
+/* What a picture needs, and the object was not made for. */
+static inline int raindrop__gl_has(const raindrop_gl *g, const raindrop__frame *frame, sat__text *t)
+{
+    const raindrop_gl_options *o = &g->options;
+    if (raindrop__is_sprite(frame))
+        return o->sprites || frame->options.look == RAINDROP_LOOK_MAP
+                   ? 1
+                   : raindrop__say(t, "look is RAINDROP_LOOK_SPRITE; raindrop_gl_options.sprites is 0");
+    if (!o->motion && (frame->camera.exposure > 0 || frame->camera.aperture > 0))
+        return raindrop__say(t, "exposure or aperture is above 0; raindrop_gl_options.motion is 0");
+    if (!o->oblate && g->flat) return raindrop__say(t, "drops are flattened; raindrop_gl_options.oblate is 0");
+    if (!o->orders && frame->options.orders > 0)
+        return raindrop__say(t, "orders is above 0; raindrop_gl_options.orders is 0");
+    if (!o->oscillation && frame->options.oscillation > 0)
+        return raindrop__say(t, "oscillation is above 0; raindrop_gl_options.oscillation is 0");
+    if (!o->lamps && frame->options.lamp_count > 0)
+        return raindrop__say(t, "lamp_count is above 0; raindrop_gl_options.lamps is 0");
+    return 1;
 }
 
 /* The message says what is wrong, in the words of raindrop_explain_render. */
@@ -5683,10 +5999,19 @@ static inline int raindrop__gl_frame_is_valid(raindrop_gl *g, const raindrop__fr
     if (!raindrop__camera_is_valid(&t, &frame->camera) || !raindrop__render_is_valid(&t, &frame->options)) return 0;
     if (frame->options.look == RAINDROP_LOOK_MAP && !g->options.map)
         return raindrop__say(&t, "map is NULL, which RAINDROP_LOOK_MAP needs");
-    if (frame->options.lamp_count > 0 || frame->options.oscillation > 0)
-        return raindrop__say(&t, "lamp_count or oscillation is above 0; OpenGL has neither");
+    if (!raindrop__gl_has(g, frame, &t)) return 0;
     if (!g->environment) return raindrop__say(&t, "there was no raindrop_gl_set_environment");
     return g->drops[0] ? 1 : raindrop__say(&t, "there was no raindrop_gl_set_rain");
+}
+
+/* The program of a picture. */
+static inline int raindrop__gl_program_of(const raindrop_gl *g, const raindrop__frame *frame)
+{
+    int kind = g->flat ? RAINDROP__GL_FLAT : 0;
+    if (raindrop__is_sprite(frame)) return (int)frame->options.look;
+    if (frame->options.oscillation > 0) return RAINDROP__GL_SWING;
+    if (frame->camera.exposure > 0 || frame->camera.aperture > 0) kind |= RAINDROP__GL_SOFT;
+    return RAINDROP__GL_RAYS + kind;
 }
 
 /* Depth as OpenGL keeps it is v[0] + v[1] / distance; 0 for matrices that are no perspective. */
@@ -5735,6 +6060,12 @@ static inline float raindrop__gl_deepest(const raindrop_gl *g, const raindrop_ca
     return depth > 0 ? depth : 0;
 }
 
+static inline void raindrop__gl_draw_drops(raindrop_gl *g)
+{
+    if (g->options.quads) g->gl.DrawArraysInstanced(SAT__GL_TRIANGLE_STRIP, 0, 4, g->count);
+    else g->gl.DrawArrays(SAT__GL_POINTS, 0, g->count);
+}
+
 static inline void raindrop__gl_draw_slices(raindrop_gl *g, unsigned program, const raindrop__frame *frame)
 {
     sat__gl *gl = &g->gl;
@@ -5748,8 +6079,33 @@ static inline void raindrop__gl_draw_slices(raindrop_gl *g, unsigned program, co
     for (i = slices - 1; i >= 0; i--) {
         sat__gl_set_float2(gl, program, "slice", deep * (float)(i * i),
                           i == slices - 1 ? 3e38f : deep * (float)((i + 1) * (i + 1)));
-        if (g->options.quads) gl->DrawArraysInstanced(SAT__GL_TRIANGLE_STRIP, 0, 4, g->count);
-        else gl->DrawArrays(SAT__GL_POINTS, 0, g->count);
+        raindrop__gl_draw_drops(g);
+    }
+}
+
+/* The lamps' glints, added, when the drops are drawn. */
+static inline void raindrop__gl_draw_glints(raindrop_gl *g, const raindrop__frame *frame)
+{
+    sat__gl *gl = &g->gl;
+    const unsigned program = g->programs[RAINDROP__GL_GLINT];
+    int i, path;
+    float v[4];
+    sat__gl_set_float2(gl, program, "slice", 0, 3e38f);
+    gl->BlendFuncSeparate(SAT__GL_SRC_ALPHA, SAT__GL_ONE, SAT__GL_ZERO, SAT__GL_ONE);
+    for (i = 0; i < frame->options.lamp_count; i++) {
+        const raindrop_lamp *lamp = &frame->options.lamps[i];
+        memcpy(v, lamp->position, sizeof lamp->position);
+        v[3] = lamp->radius;
+        sat__gl_set_float4(gl, program, "lamp", v);
+        sat__gl_set_float3(gl, program, "intensity", lamp->intensity);
+        sat__gl_set_float3(gl, program, "axis", lamp->direction);
+        v[0] = lamp->inner;
+        v[1] = lamp->outer;
+        for (path = 0; path < RAINDROP__GLINTS; path++) {
+            v[2] = (float)path;
+            sat__gl_set_float3(gl, program, "cone", v);
+            raindrop__gl_draw_drops(g);
+        }
     }
 }
 
@@ -5763,7 +6119,6 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, const sat_gl_target *
     sat_result result;
     unsigned program;
     float depth[2];
-    int kind = g && g->flat ? RAINDROP__GL_FLAT : 0;
     memset(&frame, 0, sizeof frame);
     frame.camera = camera ? *camera : raindrop_camera_defaults();
     frame.options = options ? *options : raindrop_render_defaults();
@@ -5775,13 +6130,8 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, const sat_gl_target *
     if (!raindrop__gl_depth(depth, &frame.camera, projection))
         return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "projection is no perspective", NULL);
     if (!g->count) return SAT_OK;
-    if (!raindrop__is_sprite(&frame) && (frame.camera.exposure > 0 || frame.camera.aperture > 0))
-        kind |= RAINDROP__GL_SOFT;
-    if (!raindrop__is_sprite(&frame) && frame.options.orders > 0) kind |= RAINDROP__GL_ORDERS;
-    result = raindrop__gl_draw_program(g, (int)frame.options.look, kind);
-    if (result != SAT_OK) return result;
     gl = &g->gl;
-    program = g->draw[frame.options.look][kind];
+    program = g->programs[raindrop__gl_program_of(g, &frame)];
     raindrop__set_frame(&frame);
     sat__gl_begin(gl, &state, 4);
     result = sat__gl_pass_to(gl, program, to, (unsigned)state.draw_framebuffer, width, height);
@@ -5792,6 +6142,12 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, const sat_gl_target *
     raindrop__gl_set_draw(g, program, &frame, depth);
     raindrop__gl_blend(g, depth);
     raindrop__gl_draw_slices(g, program, &frame);
+    if (frame.options.lamp_count > 0) {
+        program = g->programs[RAINDROP__GL_GLINT];
+        result = sat__gl_pass_to(gl, program, to, (unsigned)state.draw_framebuffer, width, height);
+        raindrop__gl_set_draw(g, program, &frame, depth);
+        if (result == SAT_OK) raindrop__gl_draw_glints(g, &frame);
+    }
     sat__gl_release_target(gl, to);
     sat__gl_end(gl, &state);
     return result;
@@ -5799,8 +6155,9 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, const sat_gl_target *
 
 /* ---- the veil */
 
+/* planes: raindrop__gl_depth. */
 static inline void raindrop__gl_set_veil(raindrop_gl *g, unsigned program, const raindrop__frame *frame, unsigned depth,
-                                         const raindrop_veil_options *o)
+                                         const float planes[2], const raindrop_veil_options *o)
 {
     sat__gl *gl = &g->gl;
     float v[4];
@@ -5819,45 +6176,61 @@ static inline void raindrop__gl_set_veil(raindrop_gl *g, unsigned program, const
     v[2] = o->reach;
     v[3] = 0;
     sat__gl_set_float4(gl, program, "rain", v);
-    sat__gl_set_float2(gl, program, "planes", frame->camera.depth_near, frame->camera.depth_far);
+    v[0] = planes[0];
+    v[1] = planes[1];
+    v[2] = o->clip_zero_to_one ? 1.0f : 2;
+    v[3] = o->clip_zero_to_one ? 0 : -1.0f;
+    sat__gl_set_float4(gl, program, "planes", v);
     sat__gl_set_texture(gl, program, "far_drops", 0, g->far_drops);
     sat__gl_set_texture(gl, program, "depth", 1, depth ? depth : g->far_drops);
     if (g->bow) sat__gl_set_texture(gl, program, "bow", 2, g->bow);
 }
 
-RAINDROP_DEF sat_result raindrop_gl_veil(raindrop_gl *g, int width, int height, unsigned depth,
-                                         const raindrop_camera *camera, const raindrop_veil_options *options)
+static inline int raindrop__gl_veil_is_valid(raindrop_gl *g, const raindrop__frame *frame,
+                                             const raindrop_veil_options *o)
+{
+    sat__text t = sat__text_begin(g->gl.message, sizeof g->gl.message);
+    if (!raindrop__size_is_valid(&t, frame->width, frame->height) || !raindrop__camera_is_valid(&t, &frame->camera) ||
+        !raindrop__fields_are_valid(&t, o, raindrop__veil_fields, SAT__COUNT(raindrop__veil_fields)))
+        return 0;
+    if (!g->options.veil) return raindrop__say(&t, "raindrop_gl_options.veil is 0");
+    return g->environment ? 1 : raindrop__say(&t, "there was no raindrop_gl_set_environment");
+}
+
+RAINDROP_DEF sat_result raindrop_gl_veil(raindrop_gl *g, const sat_gl_target *to, int width, int height, unsigned depth,
+                                         const raindrop_camera *camera, const float projection[16],
+                                         const raindrop_veil_options *options)
 {
     const raindrop_veil_options o = options ? *options : raindrop_veil_defaults();
     const float none[2] = {0, 0};
+    float planes[2];
     raindrop__frame frame;
     sat__gl_state state;
-    sat__text t;
     sat_result result;
+    unsigned program;
     if (!g || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
-    t = sat__text_begin(g->gl.message, sizeof g->gl.message);
     memset(&frame, 0, sizeof frame);
     frame.camera = camera ? *camera : raindrop_camera_defaults();
     frame.width = width;
     frame.height = height;
-    if (!raindrop__size_is_valid(&t, width, height) || !raindrop__camera_is_valid(&t, &frame.camera) ||
-        !raindrop__fields_are_valid(&t, &o, raindrop__veil_fields, SAT__COUNT(raindrop__veil_fields)))
-        return SAT_ERR_ARGUMENT;
-    if (!g->environment || (depth && !(frame.camera.depth_far > 0))) {
-        raindrop__say(&t, g->environment ? "depth needs a depth_far" : "there was no raindrop_gl_set_environment");
-        return SAT_ERR_ARGUMENT;
-    }
-    result = raindrop__gl_veil_program(g, g->bow != 0);
-    if (result != SAT_OK) return result;
+    if (!raindrop__gl_veil_is_valid(g, &frame, &o)) return SAT_ERR_ARGUMENT;
+    if (!sat__gl_target_is_valid(to)) return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "the target is none", NULL);
+    if (!raindrop__gl_depth(planes, &frame.camera, projection))
+        return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "projection is no perspective", NULL);
+    if (depth && !(fabsf(planes[1]) > 0))
+        return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "depth needs a projection or a depth_far", NULL);
+    program = g->programs[g->bow ? RAINDROP__GL_BOWS : RAINDROP__GL_VEIL];
     raindrop__set_frame(&frame);
     sat__gl_begin(&g->gl, &state, 3);
-    g->gl.UseProgram(g->veil[g->bow != 0]);
-    g->gl.Viewport(0, 0, width, height);
-    raindrop__gl_set_veil(g, g->veil[g->bow != 0], &frame, depth, &o);
-    raindrop__gl_blend(g, none);
-    sat__gl_draw(&g->gl);
+    result = sat__gl_pass_to(&g->gl, program, to, (unsigned)state.draw_framebuffer, width, height);
+    if (result == SAT_OK) {
+        raindrop__gl_set_veil(g, program, &frame, depth, planes, &o);
+        raindrop__gl_blend(g, none);
+        sat__gl_draw(&g->gl);
+        sat__gl_release_target(&g->gl, to);
+    }
     sat__gl_end(&g->gl, &state);
-    return SAT_OK;
+    return result;
 }
 
 #ifdef __cplusplus

@@ -116,7 +116,7 @@ static int frame_create(frame *f, sat_gl_get_proc *get_proc, int width, int heig
     if (!ok) return 0;
     gl_tools_timer_create(&f->scene.t, &f->timer, FRAME_STAGES);
     so.radius = 0.12, so.bottom_up = 1;
-    fo.self = ro.compile_all = 1;
+    fo.self = 1;
     to.key = 0.22, to.cd_per_unit = 1, to.mesopic = TONEMAP_MESOPIC_LOCAL;
     return frame_check(f, ssao_sat_gl_create(&f->ao, get_proc, width, height, &so), ssao_sat_gl_message(f->ao)) &&
            frame_check(f, fiv_gl_create(&f->shadows, get_proc, width, height, &fo), fiv_gl_message(f->shadows)) &&

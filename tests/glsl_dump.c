@@ -215,15 +215,15 @@ static void dump_fiv(void)
 #ifdef RAINDROP_GL
 static void dump_raindrop(void)
 {
-    /* map, quads, look, shutter, oblate, orders */
-    static const int most[] = {2, 2, 4, 2, 2, 2};
+    /* map, quads, look, shutter, oblate, orders, lamps and oscillation */
+    static const int most[] = {2, 2, 4, 2, 2, 2, 2};
     static float white[3 * 8 * 4];
     raindrop_environment *light;
     raindrop_map_options mo = raindrop_map_defaults();
     raindrop_map *map;
     sat_image image = sat_image_f32(white, 8, 4, 3);
     const char *parts[2];
-    int d[6] = {0};
+    int d[7] = {0};
     mo.resolution = 16;
     expect_ok(raindrop_map_create(&map, &mo), "map");
     expect_ok(raindrop_environment_create(&light, &image, NULL, NULL), "environment");
@@ -241,7 +241,11 @@ static void dump_raindrop(void)
         camera.exposure = d[3] ? 0.01f : 0;
         ro.oblate = d[4];
         ro.box_size[0] = ro.box_size[1] = ro.box_size[2] = 0.5f;
-        ao.orders = d[5];
+        ao.orders = o.orders = d[5];
+        o.motion = d[3];
+        o.oblate = d[4];
+        o.lamps = o.oscillation = d[6];
+        ao.oscillation = d[6] ? 0.1f : 0;
         ao.map = map;
         expect_ok(raindrop_rain_create(&rain, &ro), "rain");
         expect_ok(raindrop_gl_create(&gl, gl_fake_proc, &o), raindrop_gl_message(gl));
@@ -250,7 +254,7 @@ static void dump_raindrop(void)
         expect_ok(raindrop_gl_render(gl, NULL, 64, 32, &camera, NULL, &ao), raindrop_gl_message(gl));
         raindrop_gl_destroy(gl);
         raindrop_rain_destroy(rain);
-    } while (next(d, most, 6));
+    } while (next(d, most, 7));
     raindrop_environment_destroy(light);
     raindrop_map_destroy(map);
     parts[0] = raindrop_gl_glsl();

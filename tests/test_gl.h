@@ -135,7 +135,7 @@ static void gl_create(gl_scene *s, sat_gl_get_proc *get_proc)
     EXPECT_EQ(ssao_sat_gl_create(&s->ao, get_proc, GL_W, GL_H, NULL), SAT_OK);
     EXPECT_EQ(fiv_gl_create(&s->shadows, get_proc, GL_W, GL_H, NULL), SAT_OK);
     EXPECT_EQ(fiv_gl_set_scene(s->shadows, s->light, &s->instance, 1), SAT_OK);
-    rg.quads = rg.compile_all = 1;
+    rg.lamps = rg.oscillation = 1;
     ro.rate_mm_h = 300;
     ro.box_size[0] = ro.box_size[1] = ro.box_size[2] = 2;
     EXPECT_EQ(raindrop_environment_create(&s->mirror, &image, NULL, NULL), SAT_OK);
@@ -459,7 +459,7 @@ static void gl_frame_calls(gl_scene *s, sat_gl *tables, sat_gl *tiles, softassig
         ro.orders = round & 1;
         camera.exposure = round & 2 ? 0.01f : 0;
         EXPECT_EQ(raindrop_gl_render(s->rain, &target, GL_W, GL_H, &camera, NULL, &ro), SAT_OK);
-        EXPECT_EQ(raindrop_gl_veil(s->rain, GL_W, GL_H, 0, NULL, NULL), SAT_OK);
+        EXPECT_EQ(raindrop_gl_veil(s->rain, &target, GL_W, GL_H, 0, NULL, NULL, NULL), SAT_OK);
     }
     EXPECT_EQ(sat_gl_build(tables, round & 1 ? 99u : 0, 5, GL_W, GL_H), SAT_OK);
     EXPECT_EQ(sat_gl_scan(tables, 0, 5, GL_W, GL_H), SAT_OK);

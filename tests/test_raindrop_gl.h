@@ -646,7 +646,7 @@ TEST(raindrop_gl_veils_as_the_cpu)
             z > 0 ? (float)(((far + near) - 2 * far * near / z) / (far - near) * 0.5 + 0.5) : 1;
     }
     EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
-    EXPECT_EQ(raindrop_gl_veil(g, RG_W, RG_H, 0, NULL, NULL), SAT_ERR_ARGUMENT); /* no environment */
+    EXPECT_EQ(raindrop_gl_veil(g, NULL, RG_W, RG_H, 0, NULL, NULL, NULL), SAT_ERR_ARGUMENT); /* no environment */
     sat__gl_begin(&s.gl, &state, 1);
     EXPECT_EQ(sat__gl_texture(&s.gl, &texture, SAT__GL_DEPTH_COMPONENT32F, RG_W, RG_H, window), SAT_OK);
     EXPECT_EQ(sat__gl_framebuffer(&s.gl, &target, &s.texture, 1, 0), SAT_OK);
@@ -670,7 +670,7 @@ TEST(raindrop_gl_veils_as_the_cpu)
         sat__gl_upload(&s.gl, s.texture, SAT__GL_RGBA32F, RG_W, RG_H, s.gpu);
         sat__gl_end(&s.gl, &state);
         s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, target);
-        EXPECT_EQ(raindrop_gl_veil(g, RG_W, RG_H, texture, &s.camera, &o), SAT_OK);
+        EXPECT_EQ(raindrop_gl_veil(g, NULL, RG_W, RG_H, texture, &s.camera, NULL, &o), SAT_OK);
         sat__gl_begin(&s.gl, &state, 1);
         EXPECT_EQ(sat__gl_read(&s.gl, s.gpu, s.texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
         sat__gl_end(&s.gl, &state);
@@ -686,10 +686,11 @@ TEST(raindrop_gl_veils_as_the_cpu)
         raindrop_environment_destroy(environment);
     }
     o.reach = -1;
-    EXPECT_EQ(raindrop_gl_veil(g, RG_W, RG_H, texture, &s.camera, &o), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_veil(g, NULL, RG_W, RG_H, texture, &s.camera, NULL, &o), SAT_ERR_ARGUMENT);
     EXPECT(strcmp(raindrop_gl_message(g), "reach is -1; 0..1e18") == 0);
     s.camera.depth_far = 0;
-    EXPECT_EQ(raindrop_gl_veil(g, RG_W, RG_H, texture, &s.camera, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_veil(g, NULL, RG_W, RG_H, texture, &s.camera, NULL, NULL), SAT_ERR_ARGUMENT);
+    EXPECT(strcmp(raindrop_gl_message(g), "depth needs a projection or a depth_far") == 0);
     s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, 0);
     s.gl.DeleteFramebuffers(1, &target);
     s.gl.DeleteTextures(1, &texture);
@@ -790,7 +791,20 @@ TEST(raindrop_gl_glsl_traces_as_the_cpu)
 }
 
 /* Any two options away from their defaults, ends of their ranges among them: the CPU's picture and the GPU's. */
-enum { RG_OPTIONS = 14 };
+enum { RG_OPTIONS = 16 };
+
+static raindrop_lamp rg_lamps[2];
+
+static void rg_set_lamps(void)
+{
+    rg_lamps[0] = rg_lamps[1] = raindrop_lamp_defaults();
+    raindrop__set(rg_lamps[0].position, 0.5f, 2, -3);
+    raindrop__set(rg_lamps[0].intensity, 30, 25, 10);
+    raindrop__set(rg_lamps[1].position, -1, 3, 2);
+    raindrop__set(rg_lamps[1].intensity, 50, 80, 90);
+    rg_lamps[1].inner = 0.3f;
+    rg_lamps[1].outer = 0.6f;
+}
 
 static void rg_set(rg_scene *s, raindrop_render_options *o, raindrop_rain *rain, int option)
 {
@@ -810,12 +824,18 @@ static void rg_set(rg_scene *s, raindrop_render_options *o, raindrop_rain *rain,
     if (option == 12) s->camera.depth_near = 0.2f;
     if (option == 13)
         for (i = 0; i < rain->count; i++) rain->drops[i].axis_ratio = 0.8f;
+    if (option == 14) o->oscillation = 0.25f;
+    if (option == 15) {
+        o->lamps = rg_lamps;
+        o->lamp_count = 2;
+    }
 }
 
 TEST(raindrop_gl_takes_options_in_pairs)
 {
     rg_scene s;
     raindrop_gl *g = NULL;
+    raindrop_gl_options options = raindrop_gl_defaults();
     raindrop_rain *rain = rg_rain(150, 0.8f, 6);
     double worst = 0;
     int a, b, i;
@@ -823,7 +843,9 @@ TEST(raindrop_gl_takes_options_in_pairs)
         raindrop_rain_destroy(rain);
         return;
     }
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
+    rg_set_lamps();
+    options.lamps = options.oscillation = 1;
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &options), SAT_OK);
     EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
     for (a = 0; a < RG_OPTIONS; a++)
         for (b = a; b < RG_OPTIONS; b++) {
@@ -843,6 +865,127 @@ TEST(raindrop_gl_takes_options_in_pairs)
     REPORT("options in pairs, largest RMSE from the CPU", worst, "");
     raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
+
+/* Lamps and swinging drops, still and moving, near and far: the CPU's pictures; glints alone, so that a lamp is not lost
+   beside the sky. */
+TEST(raindrop_gl_has_lamps_and_oscillation)
+{
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_gl_options options = raindrop_gl_defaults();
+    int kind, i, changed;
+    double worst = 0;
+    if (!rg_open(&s)) return;
+    rg_set_lamps();
+    options.lamps = options.oscillation = 1;
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &options), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    for (kind = 0; kind < 16; kind++) {
+        raindrop_render_options o = raindrop_render_defaults();
+        raindrop_rain *rain = rg_rain(kind & 8 ? 3000 : 60, kind & 8 ? 4.0f : 0.3f, 3);
+        double error;
+        rain->time = 1.2345;
+        o.sort = 0;
+        if (kind & 1) o.lamps = rg_lamps;
+        if (kind & 1) o.lamp_count = 2;
+        o.oscillation = kind & 2 ? 0.2f : 0;
+        s.camera.exposure = kind & 4 ? 0.004f : 0;
+        error = rg_compare(&s, g, rain, &o);
+        if (!EXPECT(error < 5e-4)) printf("kind %d: %g\n", kind, error);
+        o.oscillation = 0;
+        o.lamp_count = 0;
+        EXPECT_EQ(raindrop_render(s.background, 0, RG_W, RG_H, NULL, &s.camera, rain, s.environment, &o, NULL), SAT_OK);
+        for (i = changed = 0; i < 3 * RG_W * RG_H; i++) changed += fabsf(s.background[i] / s.cpu[i] - 1) > 0.01f;
+        if (!EXPECT(kind & 3 ? changed > 5 : changed == 0)) printf("kind %d: %d\n", kind, changed); /* they are seen */
+        raindrop_environment_render(s.background, 0, RG_W, RG_H, &s.camera, s.environment, NULL);
+        if (error > worst) worst = error;
+        raindrop_rain_destroy(rain);
+    }
+    REPORT("lamps and oscillation, largest RMSE from the CPU", worst, "");
+    raindrop_gl_destroy(g);
+    rg_close(&s);
+}
+
+/* Phases go on on the GPU as on the CPU. */
+TEST(raindrop_gl_oscillates_in_time)
+{
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_gl_options options = raindrop_gl_defaults();
+    raindrop_rain *rain = rg_rain(10, 0.3f, 4);
+    if (!rg_open(&s)) {
+        raindrop_rain_destroy(rain);
+        return;
+    }
+    options.oscillation = 1;
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &options), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    EXPECT_EQ(raindrop_gl_advance(g, 3601.25), SAT_OK);
+    EXPECT_EQ(raindrop_rain_advance(rain, 3601.25), SAT_OK);
+    EXPECT_NEAR(g->time, rain->time, 0);
+    EXPECT_NEAR(rain->time, 1.25, 1e-9);
+    raindrop_rain_destroy(rain);
+    raindrop_gl_destroy(g);
+    rg_close(&s);
+}
+
+/* What the object was not made for is refused by name, in a picture and by set_options; nothing is made later. */
+TEST(raindrop_gl_refuses_what_it_was_not_made_for)
+{
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_gl_options o = raindrop_gl_defaults();
+    raindrop_rain *rain = rg_rain(10, 1, 2);
+    raindrop_render_options r;
+    int i;
+    static const char *const names[7] = {"look is", "exposure or", "drops are", "orders is", "oscillation is",
+                                         "lamp_count is", "raindrop_gl_options.veil is 0"};
+    if (!rg_open(&s)) {
+        raindrop_rain_destroy(rain);
+        return;
+    }
+    rg_set_lamps();
+    o.sprites = o.motion = o.oblate = o.orders = o.veil = 0;
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &o), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    for (i = 0; i < 8; i++) {
+        sat_result result;
+        int k;
+        r = raindrop_render_defaults();
+        r.orders = i == 3;
+        s.camera.exposure = i == 1 ? 0.01f : 0;
+        for (k = 0; k < rain->count; k++) rain->drops[k].axis_ratio = i == 2 ? 0.9f : 1;
+        if (i == 0) r.look = RAINDROP_LOOK_SPRITE;
+        if (i == 4) r.oscillation = 0.1f;
+        if (i == 5) r.lamps = rg_lamps, r.lamp_count = 1;
+        EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+        result = i == 6 ? raindrop_gl_veil(g, NULL, RG_W, RG_H, 0, NULL, NULL, NULL)
+                        : raindrop_gl_render(g, NULL, RG_W, RG_H, &s.camera, NULL, &r);
+        EXPECT_EQ(result, i < 7 ? SAT_ERR_ARGUMENT : SAT_OK);
+        if (i < 7 && !EXPECT(strstr(raindrop_gl_message(g), names[i]) == raindrop_gl_message(g)))
+            puts(raindrop_gl_message(g));
+    }
+    EXPECT_EQ(raindrop_gl_set_options(g, &o), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_options(g, NULL), SAT_ERR_MISMATCH);
+    EXPECT(strstr(raindrop_gl_message(g), "made at create") != NULL);
+    o.quads = 0;
+    EXPECT_EQ(raindrop_gl_set_options(g, &o), SAT_ERR_MISMATCH);
+    o.quads = 2;
+    EXPECT_EQ(raindrop_gl_set_options(g, &o), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_set_options(NULL, NULL), SAT_ERR_ARGUMENT);
+    raindrop_gl_destroy(g);
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
+    o = raindrop_gl_defaults();
+    o.veil = 0; /* what there is may be left aside, and taken up again */
+    EXPECT_EQ(raindrop_gl_set_options(g, &o), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    EXPECT_EQ(raindrop_gl_veil(g, NULL, RG_W, RG_H, 0, NULL, NULL, NULL), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(raindrop_gl_set_options(g, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_gl_veil(g, NULL, RG_W, RG_H, 0, NULL, NULL, NULL), SAT_OK);
+    raindrop_rain_destroy(rain);
+    raindrop_gl_destroy(g);
     rg_close(&s);
 }
 
@@ -935,26 +1078,33 @@ TEST(raindrop_gl_shaders_are_es)
     raindrop_gl_options o = raindrop_gl_defaults();
     raindrop_rain *rain = rg_rain(2000, 1, 2);
     raindrop_render_options r = raindrop_render_defaults();
-    int kind;
+    raindrop_lamp lamp = raindrop_lamp_defaults();
+    int kind, shaders;
     if (!rg_open(&s)) return;
     rg_get_string = s.gl.GetString;
     rg_shader_source = s.gl.ShaderSource;
     rg_real_procs = s.context.get_proc;
     o.map = s.map;
-    o.quads = 1;
+    o.oscillation = o.lamps = 1;
+    raindrop__set(lamp.position, 1, 2, -1);
     r.sort = 0;
     r.orders_radius = 1e9f;
     if (!EXPECT_EQ(raindrop_gl_create(&g, rg_es_procs, &o), SAT_OK)) puts(raindrop_gl_message(g));
     EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
-    for (kind = 0; kind < RAINDROP__GL_KINDS; kind++) {
+    shaders = rg_shaders; /* of every program; none is made later */
+    EXPECT(shaders >= 2 * RAINDROP__GL_PROGRAMS - 1);
+    for (kind = 0; kind < 16; kind++) {
         int i;
         for (i = 0; i < rain->count; i++) rain->drops[i].axis_ratio = kind & RAINDROP__GL_FLAT ? 0.8f : 1;
         s.camera.exposure = kind & RAINDROP__GL_SOFT ? 0.001f : 0;
-        r.orders = kind & RAINDROP__GL_ORDERS ? 2 : 0;
+        r.orders = kind & 4 ? 2 : 0;
+        r.oscillation = kind & 8 ? 0.1f : 0;
+        r.lamps = &lamp;
+        r.lamp_count = kind & 8 ? 1 : 0;
         EXPECT(rg_compare(&s, g, rain, &r) < 5e-4);
     }
     EXPECT_EQ(raindrop_gl_advance(g, 0.01), SAT_OK);
-    EXPECT_EQ(rg_shaders, 2 * (4 + RAINDROP__GL_KINDS) + 2 - 2);
+    EXPECT_EQ(rg_shaders, shaders);
     EXPECT(rg_longest < 4096);
     if (system("glslangValidator --version >/dev/null 2>&1") == 0) EXPECT_EQ(rg_valid, rg_shaders);
     raindrop_gl_destroy(g);
