@@ -868,8 +868,7 @@ TEST(raindrop_gl_takes_options_in_pairs)
     rg_close(&s);
 }
 
-/* Lamps and swinging drops, still and moving, near and far: the CPU's pictures; glints alone, so that a lamp is not lost
-   beside the sky. */
+/* Lamps and swinging drops, still and moving, near and far: the pictures of the CPU. */
 TEST(raindrop_gl_has_lamps_and_oscillation)
 {
     rg_scene s;
