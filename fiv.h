@@ -243,6 +243,8 @@ typedef struct fiv_occluder_options {
     int lazy;                /* 0; 0..1; 1 (without keep_masks): only what fiv_occluder_prepare asks for is computed */
     int sun_map;             /* 512; 64..4096; side of the square in which all split-off lights have their depth maps:
                                 one light the whole of it, two to four a quarter each, five to nine a ninth ... */
+    int contact_map;         /* 64; 0..256; side of each of the 384 depth maps along fixed directions that answer near
+                                contact and on the mesh itself; 8 at least; 0, and lazy: none */
     fiv_progress_fn *progress;     /* NULL */
     void *progress_user;
     sat_allocator allocator; /* malloc; not used after create */
@@ -259,8 +261,8 @@ typedef struct fiv_occluder_stats {
     size_t samples, rasterised;    /* positions of the occluder; masks made (shared ones once, stale ones not) */
     size_t inside;                 /* samples whose receiver lies inside the mesh */
     size_t spans;                  /* mask words; 2 bytes each */
-    size_t table_bytes, mask_bytes, mesh_bytes, map_bytes, bytes; /* vectors; masks; triangles; depth maps of the
-                                                                     lights; everything held */
+    size_t table_bytes, mask_bytes, mesh_bytes, map_bytes, bytes; /* vectors; masks; triangles; depth maps;
+                                                                     everything held */
 } fiv_occluder_stats;
 
 typedef struct fiv_occluder fiv_occluder;
@@ -290,7 +292,7 @@ FIV_DEF size_t fiv_occluder_save_size(const fiv_occluder *occluder);
    create alone. */
 FIV_DEF sat_result fiv_occluder_save(void *memory, size_t size, const fiv_occluder *occluder);
 /* Takes nothing on trust: SAT_ERR_DATA for anything but a complete save of this version. `options` gives sun_map,
-   allocator and threads; the rest comes from the save. Light it before use. */
+   contact_map, allocator and threads; the rest comes from the save. Light it before use. */
 FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, size_t size,
                                      const fiv_occluder_options *options);
 #endif
@@ -318,8 +320,12 @@ typedef struct fiv_irradiance_options {
     int partial;           /* 1; 0..1; 0: no correction where the horizon cuts an occluder (figure 23, left) */
     int overlap;           /* 1; 0..1; 0: no correction where occluders overlap (figure 21, left) */
     float cutoff;          /* 0.001; 0..1; an occluder that cannot take more than this part of I_tot is left out */
+    int contact;           /* 1; 0..1; from FIV_SCALED on: receivers in a cell with a sample inside the mesh, or from
+                              which it covers 1.5 to 2 sr, pass to its depth maps along fixed directions, as do those
+                              on the mesh itself; 0: they, too, are interpolated */
     int own_masks;         /* 64; 0..64; of each 64 receivers so many may get masks of their own, from FIV_SCALED on:
-                              those in a cell with a sample inside the mesh, or from which it may cover 2 sr; 0: none */
+                              those in a cell with a sample inside the mesh, or from which it may cover 2 sr: half the
+                              error of the depth maps at 100 times their time; 0: none */
     int own_triangles;     /* 20000; 0..2147483647; an occluder of more gets none: a mask takes 50 ns a triangle */
     float own_tolerance;   /* 0.01; 0..1; of up to 16 receivers in a row, within R / 16, those between two whose masks
                               take the same to this part of I_tot get what lies between; 0: each its own */
@@ -335,6 +341,7 @@ typedef struct fiv_irradiance_stats {
     size_t whole, clipped;              /* looked up: entirely above the horizon, cut by it */
     size_t overlaps;                    /* receivers that see occluders overlap */
     size_t masks;                       /* masks integrated for the last two */
+    size_t contacts;                    /* near contact, or on the mesh itself: by its depth maps */
     size_t own_receivers, own_masks;    /* near contact: with masks of their own, or between two; masks made */
     size_t rays;                        /* to split-off lights */
     size_t non_finite;                  /* receivers with NaN or infinity: black */
@@ -519,6 +526,7 @@ static const sat__field fiv__occluder_fields[] = {
     SAT__FIELD(fiv_occluder_options, 'i', keep_masks, 1, 0, 1, ' '),
     SAT__FIELD(fiv_occluder_options, 'i', lazy, 0, 0, 1, ' '),
     SAT__FIELD(fiv_occluder_options, 'i', sun_map, 512, 64, 4096, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', contact_map, 64, 0, 256, ' '),
     SAT__FIELD(fiv_occluder_options, 'a', allocator, 0, 0, 0, ' '),
     SAT__FIELD(fiv_occluder_options, 't', threads, 0, 0, 0, ' '),
 };
@@ -536,6 +544,7 @@ static int fiv__explain_occluder_options(sat__text *t, const fiv_occluder_option
     if (wrong) sat__text_field(t, wrong, o);
     else if (o->theta & 1) sat__text_add(t, "theta is odd");
     else if (!(o->first_shell < o->last_shell)) sat__text_add(t, "last_shell is not beyond first_shell");
+    else if (o->contact_map && o->contact_map < 8) sat__text_add(t, "contact_map is below 8; 0 or 8..256");
     else if (o->keep_masks && o->lazy) sat__text_add(t, "lazy is 1 with keep_masks; what deforms keeps none");
 #ifdef FIV_NO_MASKS
     else if (o->keep_masks) sat__text_add(t, "keep_masks is 1; 0 with FIV_NO_MASKS");
@@ -588,6 +597,7 @@ static const sat__field fiv__irradiance_fields[] = {
     SAT__FIELD(fiv_irradiance_options, 'i', partial, 1, 0, 1, ' '),
     SAT__FIELD(fiv_irradiance_options, 'i', overlap, 1, 0, 1, ' '),
     SAT__FIELD(fiv_irradiance_options, 'f', cutoff, 0.001, 0, 1, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', contact, 1, 0, 1, ' '),
     SAT__FIELD(fiv_irradiance_options, 'i', own_masks, FIV__TILE, 0, FIV__TILE, ' '),
     SAT__FIELD(fiv_irradiance_options, 'i', own_triangles, 20000, 0, 2147483647, ' '),
     SAT__FIELD(fiv_irradiance_options, 'f', own_tolerance, 0.01, 0, 1, ' '),
@@ -1783,7 +1793,6 @@ static void fiv__project(float *px, float *py, float box[4], const fiv__raster *
                 *xw = r->mesh->x[ax.w] + c->vertex;
     float ou = r->offset[ax.u], ov = r->offset[ax.v], ow = r->offset[ax.w], half = 0.5f * (float)r->size;
     int i;
-#ifdef SAT__VECTOR
     sat__f32x4 scale = sat__f32x4_set1(half * ax.sign), shift = sat__f32x4_set1(half - 0.5f);
     sat__f32x4 low_x = sat__f32x4_set1(1e30f), low_y = low_x, high_x = sat__f32x4_set1(-1e30f), high_y = high_x;
     float lanes[4][4];
@@ -1811,19 +1820,6 @@ static void fiv__project(float *px, float *py, float box[4], const fiv__raster *
         for (k = 1; k < 4; k++)
             if (i & 1 ? l[k] > box[i] : l[k] < box[i]) box[i] = l[k];
     }
-#else
-    box[0] = box[2] = 1e30f;
-    box[1] = box[3] = -1e30f;
-    for (i = 0; i < c->vertices; i++) {
-        float q = half * ax.sign / (xw[i] + ow);
-        px[i] = (xu[i] + ou) * q + (half - 0.5f);
-        py[i] = (xv[i] + ov) * q + (half - 0.5f);
-        box[0] = px[i] < box[0] ? px[i] : box[0];
-        box[1] = px[i] > box[1] ? px[i] : box[1];
-        box[2] = py[i] < box[2] ? py[i] : box[2];
-        box[3] = py[i] > box[3] ? py[i] : box[3];
-    }
-#endif
 }
 
 /* 1 when all texels of the box are set already. */
@@ -1993,7 +1989,6 @@ static int fiv__ray_meets_cluster(const fiv__mesh *mesh, const fiv__cluster *c, 
     const float *m[3];
     for (k = 0; k < 3; k++) m[k] = mesh->x[k] + c->vertex;
     for (i = 0; i < c->vertices; i += 4) {
-#ifdef SAT__VECTOR
         sat__f32x4 p[3];
         for (k = 0; k < 3; k++) p[k] = sat__f32x4_add(sat__f32x4_load(m[k] + i), sat__f32x4_set1(offset[k]));
         for (k = 0; k < 3; k++) {
@@ -2001,12 +1996,6 @@ static int fiv__ray_meets_cluster(const fiv__mesh *mesh, const fiv__cluster *c, 
                                           sat__f32x4_mul(p[1], sat__f32x4_set1(axes[k][1])));
             sat__f32x4_store(x[k] + i, sat__f32x4_add(v, sat__f32x4_mul(p[2], sat__f32x4_set1(axes[k][2]))));
         }
-#else
-        for (t = i; t < i + 4; t++)
-            for (k = 0; k < 3; k++)
-                x[k][t] = (m[0][t] + offset[0]) * axes[k][0] + (m[1][t] + offset[1]) * axes[k][1] +
-                          (m[2][t] + offset[2]) * axes[k][2];
-#endif
     }
     for (t = 0; t < c->triangles; t++) {
         const unsigned char *v = mesh->corner + 3 * (c->triangle + (size_t)t);
@@ -2242,7 +2231,9 @@ static void fiv__locate(fiv__cell *cell, const fiv__grid *g, const float c[3])
 
 enum {
     FIV__SUPPORT = 33,  /* side of the octahedral table of the support function */
-    FIV__BATCH = 256    /* masks between two calls of the progress function */
+    FIV__BATCH = 256,   /* masks between two calls of the progress function */
+    FIV__VIEWS = 8,     /* fixed directions along an edge of the cube */
+    FIV__ALL_VIEWS = 6 * FIV__VIEWS * FIV__VIEWS
 };
 enum { FIV__VALID, FIV__INSIDE, FIV__STALE, FIV__WANTED };
 
@@ -2267,6 +2258,10 @@ struct fiv_occluder {
     int map_side, cell_side, cells;              /* of the depth maps; of the cell of one; cells along the side */
     uint16_t *map;                               /* map_side^2 */
     float light_axes[FIV_MAX_LIGHTS][3][3];      /* right, up, towards the light, in the occluder's frame */
+    int contact_side;      /* of the depth map of a view; 0: none */
+    uint8_t *contact;      /* of all views: FIV__VIEWS beside each other, 6 FIV__VIEWS below each other */
+    float view_tangent[FIV__VIEWS], view_scale[FIV__VIEWS]; /* of a column or row of views; texels a radius */
+    float *contact_light;  /* FIV__TERMS arrays of FIV__ALL_VIEWS: the integral over the light around each */
     double *sums;          /* integrals of the environment in the occluder's frame */
     unsigned char *state;  /* FIV__VALID ... a sample */
     float *support;        /* largest extent along a direction, in radii */
@@ -2299,6 +2294,16 @@ static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
     o->keep_masks = options->keep_masks != 0;
     o->lazy = options->lazy != 0;
     o->map_side = options->sun_map;
+    o->contact_side = o->lazy ? 0 : options->contact_map;
+    for (k = 0; k < FIV__VIEWS; k++) {
+        float t = o->view_tangent[k] = fiv__texel_coordinate(k, FIV__VIEWS);
+        o->view_scale[k] = 0.5f * (float)(o->contact_side - 2) / sqrtf(1 + t * t);
+    }
+}
+
+static size_t fiv__contact_bytes(const fiv_occluder *o)
+{
+    return (size_t)FIV__ALL_VIEWS * (size_t)o->contact_side * (size_t)o->contact_side;
 }
 
 /* Arrays of its own; those of a share's masks are set by the caller. */
@@ -2311,7 +2316,9 @@ static void fiv__occluder_layout(fiv_occluder *o, sat__arena *arena)
 #ifndef FIV_NO_DELTA
     o->map = (uint16_t *)sat__carve(arena, (size_t)o->map_side * (size_t)o->map_side, sizeof(uint16_t));
 #endif
+    o->contact_light = (float *)sat__carve(arena, o->contact_side ? FIV__ALL_VIEWS : 0, FIV__TERMS * sizeof(float));
     if (o->share) return;
+    o->contact = (uint8_t *)sat__carve(arena, fiv__contact_bytes(o), 1);
     o->state = (unsigned char *)sat__carve(arena, n, 1);
     o->support = (float *)sat__carve(arena, FIV__SUPPORT * FIV__SUPPORT, sizeof(float));
     o->first = (uint32_t *)sat__carve(arena, o->keep_masks ? n + 1 : 0, sizeof(uint32_t));
@@ -2335,8 +2342,9 @@ static sat_result fiv__allocate_occluder(fiv_occluder **out, const fiv_occluder 
     fiv__occluder_layout(&o, &arena);
     o.stats.samples = fiv__grid_samples(&o.grid);
     o.stats.table_bytes = o.stats.samples * FIV__TERMS * (o.half_floats ? 2u : 4u);
+    o.stats.map_bytes = o.share ? 0 : fiv__contact_bytes(&o);
 #ifndef FIV_NO_DELTA
-    o.stats.map_bytes = (size_t)o.map_side * (size_t)o.map_side * sizeof(uint16_t);
+    o.stats.map_bytes += (size_t)o.map_side * (size_t)o.map_side * sizeof(uint16_t);
 #endif
     *made = o;
     *out = made;
@@ -2406,6 +2414,135 @@ static float fiv__reach(const fiv_occluder *o, const float d[3])
     v -= (float)y;
     p = o->support + y * FIV__SUPPORT + x;
     return (p[0] * (1 - u) + p[1] * u) * (1 - v) + (p[FIV__SUPPORT] * (1 - u) + p[FIV__SUPPORT + 1] * u) * v;
+}
+
+/* ---- depth maps: the mesh seen along a direction (parallel rays), how far it reaches against it. A texel is 0 where
+   there is nothing, else 1 + 65534 (z + 1) / 2, in bytes 1 + 254 (z + 1) / 2. */
+
+typedef struct fiv__canvas {
+    uint16_t *words; /* or */
+    uint8_t *bytes;
+    int pitch, side;
+} fiv__canvas;
+
+static inline float fiv__area(const float x[3], const float y[3])
+{
+    return (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
+}
+
+static inline void fiv__draw_texel(const fiv__canvas *c, int texel, float depth)
+{
+    if (c->words) {
+        uint16_t word = (uint16_t)(1.5f + (depth + 1) * 32767);
+        if (word > c->words[texel]) c->words[texel] = word;
+    } else {
+        uint8_t byte = (uint8_t)(1.5f + (depth + 1) * 127);
+        if (byte > c->bytes[texel]) c->bytes[texel] = byte;
+    }
+}
+
+/* One triangle, its corners in texels: the larger of what stands and its depth at each texel's centre. */
+static void fiv__draw_depth(const fiv__canvas *canvas, const float x[3], const float y[3], const float z[3])
+{
+    float area = fiv__area(x, y), zx, zy, top = fiv__max3(z[0], z[1], z[2]);
+    int row, x0, x1, y0 = sat__max_int(fiv__ceil(fiv__min3(y[0], y[1], y[2])), 0);
+    int y1 = sat__min_int(fiv__floor(fiv__max3(y[0], y[1], y[2])), canvas->side - 1);
+    if (y0 > y1 || area == 0) return;
+    zx = ((z[1] - z[0]) * (y[2] - y[0]) - (z[2] - z[0]) * (y[1] - y[0])) / area;
+    zy = ((z[2] - z[0]) * (x[1] - x[0]) - (z[1] - z[0]) * (x[2] - x[0])) / area;
+    top = top > 1 ? 1 : top;
+    for (row = y0; row <= y1; row++) {
+        float low = 1e30f, high = -1e30f, at = (float)row;
+        int i;
+        for (i = 0; i < 3; i++) {
+            int j = i == 2 ? 0 : i + 1, a = y[i] < y[j] ? i : j, b = i + j - a;
+            float cross;
+            if (y[a] > at || y[b] < at) continue;
+            cross = y[b] > y[a] ? x[a] + (at - y[a]) * (x[b] - x[a]) / (y[b] - y[a]) : x[a];
+            low = cross < low ? cross : low;
+            high = cross > high ? cross : high;
+            if (y[a] != y[b]) continue;
+            low = x[b] < low ? x[b] : low;
+            high = x[b] > high ? x[b] : high;
+        }
+        if (!(low <= high)) continue;
+        x0 = sat__max_int(fiv__ceil(low), 0);
+        x1 = sat__min_int(fiv__floor(high), canvas->side - 1);
+        for (; x0 <= x1; x0++) {
+            float depth = z[0] + ((float)x0 - x[0]) * zx + (at - y[0]) * zy;
+            depth = depth > top ? top : depth < -1 ? -1 : depth; /* on an edge: no farther than a corner */
+            fiv__draw_texel(canvas, row * canvas->pitch + x0, depth);
+        }
+    }
+}
+
+/* The whole mesh. to: right, up and towards the light, in texels and radii; of a closed mesh only what faces
+   `direction` is drawn. */
+static void fiv__draw_mesh(const fiv__canvas *canvas, const fiv__mesh *mesh, float to[3][3], float shift,
+                           const float direction[3])
+{
+    size_t i;
+    for (i = 0; i < mesh->cluster_count; i++) {
+        const fiv__cluster *c = &mesh->clusters[i];
+        float p[3][FIV__CLUSTER_VERTICES + 4], facing = -fiv__dot(c->axis, direction);
+        int v, k, t;
+        if (mesh->closed && c->cosine > 0 && facing > 0 && facing * facing >= 1.0001f - c->cosine * c->cosine)
+            continue;
+        for (v = 0; v < c->vertices; v++) {
+            float q[3];
+            for (k = 0; k < 3; k++) q[k] = mesh->x[k][c->vertex + (size_t)v];
+            p[0][v] = fiv__dot(q, to[0]) + shift;
+            p[1][v] = fiv__dot(q, to[1]) + shift;
+            p[2][v] = fiv__dot(q, to[2]);
+        }
+        for (t = 0; t < c->triangles; t++) {
+            const unsigned char *corner = mesh->corner + 3 * (c->triangle + (size_t)t);
+            float x[3], y[3], z[3];
+            for (k = 0; k < 3; k++) {
+                x[k] = p[0][corner[k]];
+                y[k] = p[1][corner[k]];
+                z[k] = p[2][corner[k]];
+            }
+            if (mesh->closed && !(fiv__area(x, y) * mesh->turn > 0)) continue;
+            fiv__draw_depth(canvas, x, y, z);
+        }
+    }
+}
+
+/* ---- views: depth maps along the middle of each of FIV__VIEWS^2 squares of a cube's face, in the occluder's frame, so
+   that neither light nor rotation enters. Rays are parallel to the direction, but the picture to the face: where a
+   point is seen then depends on the view's column alone, or its row alone, and its depth on the face alone. */
+
+static void fiv__draw_views(int begin, int end, int worker, void *context)
+{
+    fiv_occluder *o = (fiv_occluder *)context;
+    (void)worker;
+    for (; begin < end; begin++) {
+        int column = begin % FIV__VIEWS, row = begin / FIV__VIEWS, face = row / FIV__VIEWS, k;
+        float u = o->view_tangent[column], v = o->view_tangent[row % FIV__VIEWS];
+        float to[3][3], direction[3];
+        fiv__axes ax = fiv__face_axes(face);
+        fiv__canvas canvas;
+        canvas.words = NULL;
+        canvas.side = o->contact_side;
+        canvas.pitch = FIV__VIEWS * canvas.side;
+        canvas.bytes = o->contact + (size_t)(row * canvas.side) * (size_t)canvas.pitch + column * canvas.side;
+        for (k = 0; k < canvas.side; k++) memset(canvas.bytes + k * canvas.pitch, 0, (size_t)canvas.side);
+        memset(to, 0, sizeof to);
+        to[0][ax.u] = o->view_scale[column];
+        to[0][ax.w] = -ax.sign * u * to[0][ax.u];
+        to[1][ax.v] = o->view_scale[row % FIV__VIEWS];
+        to[1][ax.w] = -ax.sign * v * to[1][ax.v];
+        to[2][ax.w] = ax.sign;
+        fiv__cube_direction(direction, face, u, v);
+        fiv__normalise(direction, direction);
+        fiv__draw_mesh(&canvas, &o->mesh, to, 0.5f * (float)canvas.side - 0.5f, direction);
+    }
+}
+
+static void fiv__draw_contact(fiv_occluder *o)
+{
+    if (o->contact_side) sat__parallel_for(&o->threads, FIV__ALL_VIEWS, fiv__draw_views, o);
 }
 
 /* ---- precompute */
@@ -2594,6 +2731,7 @@ FIV_DEF sat_result fiv_occluder_create(fiv_occluder **out, const float *position
         fiv_occluder_destroy(made);
         return result;
     }
+    fiv__draw_contact(made);
     fiv__count_bytes(made);
     if (stats) *stats = made->stats;
     *out = made;
@@ -2619,9 +2757,8 @@ FIV_DEF sat_result fiv_occluder_share(fiv_occluder **out, const fiv_occluder *ma
 
 /* >> lighting */
 
-/* ---- split-off lights: a depth map each, seen along the light (orthographic), which says how far the mesh reaches
-   towards it. All of them share a square of map_side^2 texels: cells of a grid, the middle of each the bounding ball,
-   two texels at its border empty. A texel is 0 where there is nothing, else 1 + 65534 (z + 1) / 2. */
+/* ---- split-off lights: a depth map each, seen along the light. All of them share a square of map_side^2 texels:
+   cells of a grid, the middle of each the bounding ball, two texels at its border empty. */
 
 #ifndef FIV_NO_DELTA
 
@@ -2647,88 +2784,23 @@ static inline size_t fiv__map_cell(const fiv_occluder *o, int light)
     return (size_t)(light / o->cells * o->cell_side) * (size_t)o->map_side + (size_t)(light % o->cells * o->cell_side);
 }
 
-static inline float fiv__area(const float x[3], const float y[3])
-{
-    return (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
-}
-
-/* One triangle, its corners in texels of a cell: the larger of what stands and its depth at each texel's centre. */
-static void fiv__draw_depth(uint16_t *cell, int pitch, int side, const float x[3], const float y[3],
-                            const float z[3])
-{
-    float area = fiv__area(x, y), zx, zy, z0;
-    int row, x0, x1, y0 = sat__max_int(fiv__ceil(fiv__min3(y[0], y[1], y[2])), 0);
-    int y1 = sat__min_int(fiv__floor(fiv__max3(y[0], y[1], y[2])), side - 1);
-    if (y0 > y1 || area == 0) return;
-    zx = ((z[1] - z[0]) * (y[2] - y[0]) - (z[2] - z[0]) * (y[1] - y[0])) / area;
-    zy = ((z[2] - z[0]) * (x[1] - x[0]) - (z[1] - z[0]) * (x[2] - x[0])) / area;
-    z0 = fiv__max3(z[0], z[1], z[2]);
-    for (row = y0; row <= y1; row++) {
-        float low = 1e30f, high = -1e30f, at = (float)row;
-        int i;
-        for (i = 0; i < 3; i++) {
-            int j = i == 2 ? 0 : i + 1, a = y[i] < y[j] ? i : j, b = i + j - a;
-            float cross;
-            if (y[a] > at || y[b] < at) continue;
-            cross = y[b] > y[a] ? x[a] + (at - y[a]) * (x[b] - x[a]) / (y[b] - y[a]) : x[a];
-            low = cross < low ? cross : low;
-            high = cross > high ? cross : high;
-            if (y[a] != y[b]) continue;
-            low = x[b] < low ? x[b] : low;
-            high = x[b] > high ? x[b] : high;
-        }
-        if (!(low <= high)) continue;
-        x0 = sat__max_int(fiv__ceil(low), 0);
-        x1 = sat__min_int(fiv__floor(high), side - 1);
-        for (; x0 <= x1; x0++) {
-            float depth = z[0] + ((float)x0 - x[0]) * zx + (at - y[0]) * zy;
-            uint16_t word;
-            depth = depth > z0 ? z0 : depth < -1 ? -1 : depth; /* on an edge: no farther than a corner */
-            word = (uint16_t)(1.5f + (depth + 1) * 32767);
-            if (word > cell[row * pitch + x0]) cell[row * pitch + x0] = word;
-        }
-    }
-}
-
-/* The depth maps of some lights. Of a closed mesh only what faces the light is drawn. */
 static void fiv__draw_maps(int begin, int end, int worker, void *context)
 {
     fiv_occluder *o = (fiv_occluder *)context;
-    const fiv__mesh *mesh = &o->mesh;
-    float scale = fiv__map_scale(o), shift = scale + (float)FIV__MAP_BORDER - 0.5f;
+    float scale = fiv__map_scale(o), to[3][3];
     (void)worker;
     for (; begin < end; begin++) {
-        float (*axes)[3] = o->light_axes[begin];
-        uint16_t *cell = o->map + fiv__map_cell(o, begin);
-        size_t i;
-        int row;
-        for (row = 0; row < o->cell_side; row++)
-            memset(cell + row * o->map_side, 0, (size_t)o->cell_side * sizeof *cell);
-        for (i = 0; i < mesh->cluster_count; i++) {
-            const fiv__cluster *c = &mesh->clusters[i];
-            float p[3][FIV__CLUSTER_VERTICES + 4], facing = -fiv__dot(c->axis, axes[2]);
-            int v, k, t;
-            if (mesh->closed && c->cosine > 0 && facing > 0 && facing * facing >= 1.0001f - c->cosine * c->cosine)
-                continue;
-            for (v = 0; v < c->vertices; v++) {
-                float q[3];
-                for (k = 0; k < 3; k++) q[k] = mesh->x[k][c->vertex + (size_t)v];
-                p[0][v] = fiv__dot(q, axes[0]) * scale + shift;
-                p[1][v] = fiv__dot(q, axes[1]) * scale + shift;
-                p[2][v] = fiv__dot(q, axes[2]);
-            }
-            for (t = 0; t < c->triangles; t++) {
-                const unsigned char *corner = mesh->corner + 3 * (c->triangle + (size_t)t);
-                float x[3], y[3], z[3];
-                for (k = 0; k < 3; k++) {
-                    x[k] = p[0][corner[k]];
-                    y[k] = p[1][corner[k]];
-                    z[k] = p[2][corner[k]];
-                }
-                if (mesh->closed && !(fiv__area(x, y) * mesh->turn > 0)) continue;
-                fiv__draw_depth(cell, o->map_side, o->cell_side, x, y, z);
-            }
-        }
+        fiv__canvas canvas;
+        int k;
+        canvas.words = o->map + fiv__map_cell(o, begin);
+        canvas.bytes = NULL;
+        canvas.pitch = o->map_side;
+        canvas.side = o->cell_side;
+        for (k = 0; k < canvas.side; k++)
+            memset(canvas.words + k * canvas.pitch, 0, (size_t)canvas.side * sizeof *canvas.words);
+        memcpy(to, o->light_axes[begin], sizeof to);
+        for (k = 0; k < 6; k++) to[k / 3][k % 3] *= scale;
+        fiv__draw_mesh(&canvas, &o->mesh, to, scale + (float)FIV__MAP_BORDER - 0.5f, to[2]);
     }
 }
 
@@ -2762,6 +2834,21 @@ static void fiv__store_vector(fiv_occluder *o, size_t sample, const double sum[F
         if (o->half_floats)
             fiv__half_sample(o, sample)[k] = sat__half_from_float(v[k] > 65504 ? 65504 : v[k] < -65504 ? -65504 : v[k]);
         else o->table[FIV__TERMS * sample + (size_t)k] = v[k];
+}
+
+/* The light around each view. */
+static void fiv__light_views(fiv_occluder *o)
+{
+    int view, y, k, n = o->face;
+    for (view = 0; view < FIV__ALL_VIEWS && o->contact_side; view++) {
+        int column = view % FIV__VIEWS, row = view / FIV__VIEWS % FIV__VIEWS, face = view / FIV__VIEWS / FIV__VIEWS;
+        double sum[FIV__TERMS];
+        memset(sum, 0, sizeof sum);
+        for (y = row * n / FIV__VIEWS; y < (row + 1) * n / FIV__VIEWS; y++)
+            fiv__add_span(sum, o->sums + (size_t)((face * n + y) * (n + 1)) * FIV__TERMS, column * n / FIV__VIEWS,
+                          (column + 1) * n / FIV__VIEWS);
+        for (k = 0; k < FIV__TERMS; k++) o->contact_light[k * FIV__ALL_VIEWS + view] = (float)sum[k];
+    }
 }
 
 static void fiv__light_sample(fiv_occluder *o, size_t sample, const uint16_t *words, size_t count)
@@ -2894,6 +2981,7 @@ FIV_DEF sat_result fiv_occluder_light(fiv_occluder *o, const fiv_environment *e,
     g.radiance = NULL;
     fiv__turn_between(g.frame, e->rotation, o->rotation);
     sat__parallel_for(&o->threads, 6 * o->face, fiv__gather_rows, &g);
+    fiv__light_views(o);
 #ifndef FIV_NO_DELTA
     fiv__find_lights(o);
     sat__parallel_for(&o->threads, o->light_count, fiv__draw_maps, o);
@@ -2946,27 +3034,20 @@ static inline float fiv__sample_angle(const fiv_occluder *o, size_t sample)
     return o->half_floats ? fiv__half(fiv__half_sample(o, sample)[9]) : o->table[FIV__TERMS * sample + 9];
 }
 
-/* out += weight * sample, with the absolute value of the solid angle */
-static inline void fiv__add_sample_plain(float out[FIV__TERMS], float weight, const fiv_occluder *o, size_t sample)
-{
-    int k;
-    for (k = 0; k < 9; k++)
-        out[k] += weight * (o->half_floats ? fiv__half(fiv__half_sample(o, sample)[k])
-                                           : o->table[FIV__TERMS * sample + (size_t)k]);
-    out[9] += weight * fabsf(fiv__sample_angle(o, sample));
-}
-
-#ifdef SAT__VECTOR
 /* The upper half of each lane; the lower one is masked out. */
 static inline sat__f32x4 fiv__upper_halves(const uint16_t *p)
 {
-    sat__i32x4 v = sat__i32x4_load((const int32_t *)(const void *)p);
+    int32_t lanes[4];
+    sat__i32x4 v;
+    memcpy(lanes, p, sizeof lanes);
+    v = sat__i32x4_load(lanes);
     sat__i32x4 magnitude = sat__i32x4_and(sat__i32x4_shift_right(v, 3), sat__i32x4_set1(0x0fffe000));
     sat__f32x4 value = sat__f32x4_mul(sat__f32x4_from_bits(magnitude), sat__f32x4_set1(5.192296858534828e33f));
     return sat__f32x4_from_bits(
         sat__i32x4_or(sat__f32x4_bits(value), sat__i32x4_and(v, sat__i32x4_set1(-0x7fffffff - 1))));
 }
 
+/* out += weight * sample, with the absolute value of the solid angle */
 static inline void fiv__add_sample(float out[FIV__TERMS], float weight, const fiv_occluder *o, size_t sample)
 {
     sat__f32x4 w = sat__f32x4_set1(weight);
@@ -2990,9 +3071,6 @@ static inline void fiv__add_sample(float out[FIV__TERMS], float weight, const fi
         out[9] += weight * fabsf(v[9]);
     }
 }
-#else
-#define fiv__add_sample fiv__add_sample_plain
-#endif
 
 /* Vectors come back from the scale in which they are stored. */
 static inline void fiv__unscale(float v[FIV__TERMS], const fiv_occluder *o, float factor)
@@ -3065,6 +3143,120 @@ static int fiv__is_contact(const fiv_occluder *o, const fiv__cell *cell, const f
     for (q = 0; q < 8; q++)
         if (o->state[cell->index[q]] == FIV__INSIDE || fiv__sample_angle(o, cell->index[q]) > limit) return 1;
     return 0;
+}
+
+/* How much a receiver near contact, whose samples see light that it does not, is left to the views: 0..1. */
+static float fiv__contact_part(const fiv_occluder *o, const fiv__cell *cell, float angle)
+{
+    float inside = 0, part;
+    int q;
+    for (q = 0; q < 8; q++) inside += o->state[cell->index[q]] == FIV__INSIDE ? cell->weight[q] : 0;
+    part = 2 * angle - 3 > 8 * inside ? 2 * angle - 3 : 8 * inside;
+    return part > 0 ? (part < 1 ? part : 1) : 0;
+}
+
+/* A column, or a row, of the texels around a point, and its part of the way to the next one. The outermost texels are
+   empty. */
+static inline float fiv__view_texel(int *texel, float at, int side)
+{
+    at = at > 0 ? (at < (float)(side - 1) ? at : (float)(side - 1)) : 0;
+    *texel = sat__min_int((int)at, side - 2);
+    return at - (float)*texel;
+}
+
+/* Sums over all views, a lane a column. */
+typedef struct fiv__around {
+    float all[3][FIV__VIEWS], taken[3][FIV__VIEWS], angle[FIV__VIEWS];
+} fiv__around;
+
+/* A receiver as the views of a face see it. */
+typedef struct fiv__facing {
+    int column[FIV__VIEWS], beyond; /* texels; bytes above it stand between the receiver and the light */
+    float part[FIV__VIEWS], up[FIV__VIEWS];
+} fiv__facing;
+
+/* 0..1: bilinear between the comparisons at four texels. */
+static inline float fiv__view_covered(const uint8_t *p, int pitch, int beyond, float right, float down)
+{
+    int a = p[0] > beyond, b = p[1] > beyond, c = p[pitch] > beyond, d = p[pitch + 1] > beyond, count = a + b + c + d;
+    if (!(count & 3)) return (float)(count >> 2);
+    return ((a ? 1 - right : 0) + (b ? right : 0)) * (1 - down) + ((c ? 1 - right : 0) + (d ? right : 0)) * down;
+}
+
+/* A channel of the light around a row of views: all of it, and what is covered of it. */
+static inline void fiv__add_channel(float all[FIV__VIEWS], float taken[FIV__VIEWS], const float *light,
+                                  const float normal[3], const float over[FIV__VIEWS], const float covered[FIV__VIEWS])
+{
+    int x;
+    for (x = 0; x < FIV__VIEWS; x += 4) {
+        sat__f32x4 e = sat__f32x4_mul(sat__f32x4_load(light + x), sat__f32x4_set1(normal[0]));
+        e = sat__f32x4_add(e, sat__f32x4_mul(sat__f32x4_load(light + x + FIV__ALL_VIEWS), sat__f32x4_set1(normal[1])));
+        e = sat__f32x4_add(e, sat__f32x4_mul(sat__f32x4_load(light + x + 2 * FIV__ALL_VIEWS),
+                                             sat__f32x4_set1(normal[2])));
+        e = sat__f32x4_mul(sat__f32x4_max(e, sat__f32x4_set1(0)), sat__f32x4_load(over + x));
+        sat__f32x4_store(all + x, sat__f32x4_add(sat__f32x4_load(all + x), e));
+        e = sat__f32x4_mul(e, sat__f32x4_load(covered + x));
+        sat__f32x4_store(taken + x, sat__f32x4_add(sat__f32x4_load(taken + x), e));
+    }
+}
+
+/* A row of views. `row`: the texels around the receiver's height; light: the first view's. */
+static void fiv__add_views(fiv__around *sum, const fiv__facing *f, const uint8_t *row, int side, float down,
+                           float height, const float *light, const float normal[3])
+{
+    float covered[FIV__VIEWS], over[FIV__VIEWS];
+    int x, c;
+    for (x = 0; x < FIV__VIEWS; x++) {
+        over[x] = height + f->up[x] > 0 ? 1.0f : 0.0f;
+        covered[x] = over[x] > 0 ? fiv__view_covered(row + x * side + f->column[x], FIV__VIEWS * side, f->beyond,
+                                                     f->part[x], down)
+                                 : 0;
+    }
+    for (c = 0; c < 3; c++)
+        fiv__add_channel(sum->all[c], sum->taken[c], light + 3 * c * FIV__ALL_VIEWS, normal, over, covered);
+    for (x = 0; x < FIV__VIEWS; x++) sum->angle[x] += light[9 * FIV__ALL_VIEWS + x] * covered[x];
+}
+
+/* What an occluder takes of the light above the horizon, as a part of `diffuse`, and the solid angle that it covers
+   there: the light around each view counts as its middle is covered. */
+static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o, const float offset[3],
+                             const float normal[3], const float diffuse[3])
+{
+    int side = o->contact_side, face, x, y, c;
+    float shift = 0.5f * (float)(side - 1), least = 0.5f / (float)(side - 2), all[3] = {0, 0, 0};
+    const float *tangent = o->view_tangent, *scale = o->view_scale;
+    fiv__around sum;
+    fiv__facing f;
+    memset(&sum, 0, sizeof sum);
+    for (face = 0; face < 6; face++) {
+        fiv__axes ax = fiv__face_axes(face);
+        float depth = -offset[ax.w] * ax.sign, ahead = normal[ax.w] * ax.sign, reach = 1 + (depth + least + 1) * 127;
+        float wide = fabsf(normal[ax.u]);
+        if (ahead + wide + fabsf(normal[ax.v]) <= 0) continue;
+        f.beyond = reach > 0 ? (reach < 255 ? (int)reach : 255) : 0;
+        for (x = 0; x < FIV__VIEWS; x++) {
+            f.part[x] = fiv__view_texel(&f.column[x], (-offset[ax.u] - depth * tangent[x]) * scale[x] + shift, side);
+            f.up[x] = normal[ax.u] * tangent[x];
+        }
+        for (y = 0; y < FIV__VIEWS; y++) {
+            int line, row = face * FIV__VIEWS + y;
+            float height = ahead + normal[ax.v] * tangent[y];
+            float down = fiv__view_texel(&line, (-offset[ax.v] - depth * tangent[y]) * scale[y] + shift, side);
+            if (height + wide <= 0) continue;
+            fiv__add_views(&sum, &f, o->contact + (size_t)(row * side + line) * (size_t)(FIV__VIEWS * side), side, down,
+                           height, o->contact_light + row * FIV__VIEWS, normal);
+        }
+    }
+    *angle = 0;
+    for (x = 0; x < FIV__VIEWS; x++) *angle += sum.angle[x];
+    for (c = 0; c < 3; c++) {
+        taken[c] = 0;
+        for (x = 0; x < FIV__VIEWS; x++) {
+            all[c] += sum.all[c][x];
+            taken[c] += sum.taken[c][x];
+        }
+        taken[c] = all[c] > 0 ? diffuse[c] * (taken[c] / all[c]) : 0;
+    }
 }
 
 /* The integral over the texels of a mask above the horizon. */
@@ -3436,6 +3628,7 @@ static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], fiv__re
     const fiv_occluder *o = instance->occluder;
     float offset[3], world[3], distance, height, normal[3], v[FIV__TERMS], below = 1, above = 1, cut = 0, back[3];
     int k, published = r->options->accuracy <= FIV_TRILINEAR, masks = 0, own = 0, inside = 0;
+    float contact = 0, around[3], angle;
     fiv__cell cell;
     if (!fiv__place(offset, world, &distance, instance, r->point)) return 0;
     height = fiv__dot(world, r->normal);
@@ -3472,6 +3665,7 @@ static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], fiv__re
             inside = o->state[cell.index[0]] != FIV__STALE;
             r->stats->missing += !inside;
         }
+        if (o->contact_side && r->options->contact && !own) contact = inside ? 1 : fiv__contact_part(o, &cell, v[9]);
     }
     if (own) {
         fiv__find_own(v, r, instance, normal);
@@ -3483,7 +3677,12 @@ static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], fiv__re
     if (masks) fiv__shade_masks(shadow->rgb, o, &cell, normal, &r->stats->masks);
 #endif
     if (!masks && !own) fiv__shade(shadow->rgb, v, normal, published || !r->options->partial ? 0 : cut);
-    if (inside && !own) memcpy(shadow->rgb, r->diffuse, sizeof shadow->rgb); /* dark all around */
+    if (contact > 0) {
+        fiv__look_around(around, &angle, o, offset, normal, r->diffuse);
+        for (k = 0; k < 3; k++) shadow->rgb[k] += contact * (around[k] - shadow->rgb[k]);
+        v[9] += contact * (angle - v[9]);
+        r->stats->contacts++;
+    } else if (inside && !own) memcpy(shadow->rgb, r->diffuse, sizeof shadow->rgb); /* dark all around */
     fiv__cover_lights(covered, r, o, offset, r->options->rays && !published);
     shadow->occluder = o;
     shadow->radius = distance > 1 ? 1 / distance : 1;
@@ -3825,6 +4024,7 @@ static void fiv__add_stats(fiv_irradiance_stats *sum, const fiv_irradiance_stats
     sum->clipped += s->clipped;
     sum->overlaps += s->overlaps;
     sum->masks += s->masks;
+    sum->contacts += s->contacts;
     sum->own_receivers += s->own_receivers;
     sum->own_masks += s->own_masks;
     sum->rays += s->rays;
@@ -3877,54 +4077,9 @@ FIV_DEF sat_result fiv_irradiance(float *rgb, const float *points, const float *
 
 /* ---- self-shadows: all that is not covered lies above the horizon (eq 13), so that what remains is N (FIV - FIV_occ).
    That holds on the surface, and no longer at the nearest sample above it; FIV_SCALED therefore cuts the open part at
-   the horizon as a cap, and FIV_MASK cuts the masks themselves. */
+   the horizon as a cap. Where there are views, they say what is open. */
 
 #ifndef FIV_NO_SELF
-
-static void fiv__self_diffuse(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const fiv__cell *cell,
-                              const float normal[3])
-{
-    float v[FIV__TERMS], open[FIV__TERMS], world[3], total = 0;
-    int c, k, q;
-    memset(v, 0, sizeof v);
-    for (q = 0; q < 8; q++) { /* whole vectors, not rho^2 times them: what is open does not fall with the distance */
-        float radius = o->grid.shell[cell->shell + (q >> 2)];
-        if (o->state[cell->index[q]] != FIV__VALID) continue;
-        fiv__add_sample(v, cell->weight[q] / (radius * radius), o, cell->index[q]);
-        total += cell->weight[q];
-    }
-    fiv__unscale(v, o, 1);
-    for (c = 0; c < 3; c++) {
-        for (k = 0; k < 3; k++) world[k] = (float)r->environment->vector[3 * c + k];
-        fiv__turn_back(open + 3 * c, o->rotation, world);
-        for (k = 0; k < 3; k++) open[3 * c + k] -= total > 1e-4f ? v[3 * c + k] / total : open[3 * c + k];
-    }
-    open[9] = total > 1e-4f ? 12.5663706f - v[9] / total : 0;
-    fiv__shade(rgb, open, normal, r->options->accuracy >= FIV_SCALED && r->options->partial ? 1.0f : 0.0f);
-}
-
-#ifndef FIV_NO_MASKS
-static void fiv__self_masks(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const fiv__cell *cell,
-                            const float normal[3])
-{
-    double sum[FIV__TERMS], taken[3] = {0, 0, 0}, total = 0;
-    int q, c, k;
-    for (q = 0; q < 8; q++) {
-        size_t s = cell->index[q];
-        double weight = (double)cell->weight[q];
-        if (weight < 1e-4 || o->state[s] != FIV__VALID) continue;
-        fiv__integrate_above(sum, o->sums, o->words + o->first[s], o->first[s + 1] - o->first[s], o->face, normal);
-        r->stats->masks++;
-        total += weight;
-        for (c = 0; c < 3; c++)
-            for (k = 0; k < 3; k++) taken[c] += weight * sum[3 * c + k] * (double)normal[k];
-    }
-    for (c = 0; c < 3; c++) {
-        double v = total > 0 ? (double)r->diffuse[c] - taken[c] / total : 0;
-        rgb[c] = v > 0 ? (float)v : 0;
-    }
-}
-#endif
 
 /* A point in a fold may lie among samples that are all inside the mesh: step out along the normal until a quarter
    of the weight is valid. */
@@ -3940,6 +4095,43 @@ static void fiv__locate_outside(fiv__cell *cell, const fiv_occluder *o, const fl
             if (o->state[cell->index[q]] == FIV__VALID) valid += cell->weight[q];
         if (valid > 0.25f) return;
     }
+}
+
+static void fiv__self_samples(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const float offset[3],
+                              const float normal[3])
+{
+    float v[FIV__TERMS], open[FIV__TERMS], world[3], total = 0;
+    int c, k, q;
+    fiv__cell cell;
+    fiv__locate_outside(&cell, o, offset, normal);
+    if (r->options->accuracy == FIV_NEAREST) fiv__take_nearest(&cell);
+    memset(v, 0, sizeof v);
+    for (q = 0; q < 8; q++) { /* whole vectors, not rho^2 times them: what is open does not fall with the distance */
+        float radius = o->grid.shell[cell.shell + (q >> 2)];
+        if (o->state[cell.index[q]] != FIV__VALID) continue;
+        fiv__add_sample(v, cell.weight[q] / (radius * radius), o, cell.index[q]);
+        total += cell.weight[q];
+    }
+    fiv__unscale(v, o, 1);
+    for (c = 0; c < 3; c++) {
+        for (k = 0; k < 3; k++) world[k] = (float)r->environment->vector[3 * c + k];
+        fiv__turn_back(open + 3 * c, o->rotation, world);
+        for (k = 0; k < 3; k++) open[3 * c + k] -= total > 1e-4f ? v[3 * c + k] / total : open[3 * c + k];
+    }
+    open[9] = total > 1e-4f ? 12.5663706f - v[9] / total : 0;
+    fiv__shade(rgb, open, normal, r->options->accuracy >= FIV_SCALED && r->options->partial ? 1.0f : 0.0f);
+}
+
+/* By the views, from a texel above the surface. */
+static void fiv__self_views(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const float offset[3],
+                            const float normal[3])
+{
+    float lifted[3], angle, lift = 2 / (float)(o->contact_side - 2);
+    int k;
+    for (k = 0; k < 3; k++) lifted[k] = offset[k] - normal[k] * lift;
+    fiv__look_around(rgb, &angle, o, lifted, normal, r->diffuse);
+    for (k = 0; k < 3; k++) rgb[k] = r->diffuse[k] > rgb[k] ? r->diffuse[k] - rgb[k] : 0;
+    r->stats->contacts++;
 }
 
 /* A receiver on the mesh looks at its depth maps from two texels above it. */
@@ -3960,22 +4152,17 @@ static void fiv__receive_self(float rgb[3], fiv__receiver *r, const fiv_instance
     const fiv_occluder *o = self->occluder;
     float offset[3], world[3], distance, own_normal[3], covered[FIV_MAX_LIGHTS], own[FIV_MAX_LIGHTS], open[3];
     int64_t taken[3];
-    fiv__cell cell;
     int k;
     rgb[0] = rgb[1] = rgb[2] = 0;
     if (!fiv__start_receiver(r, point, normal)) return;
     fiv__gather_shadows(taken, covered, r);
     if (fiv__place(offset, world, &distance, self, point)) {
         fiv__turn_back(own_normal, o->rotation, r->normal);
-        fiv__locate_outside(&cell, o, offset, own_normal);
-        if (r->options->accuracy == FIV_NEAREST) fiv__take_nearest(&cell);
+        if (o->contact_side && r->options->contact && r->options->accuracy >= FIV_SCALED)
+            fiv__self_views(open, r, o, offset, own_normal);
+        else fiv__self_samples(open, r, o, offset, own_normal);
         for (k = 0; k < 3; k++) offset[k] -= own_normal[k] * fiv__self_lift(o);
         fiv__cover_lights(own, r, o, offset, 0);
-#ifndef FIV_NO_MASKS
-        if (r->options->accuracy == FIV_MASK) fiv__self_masks(open, r, o, &cell, own_normal);
-        else
-#endif
-            fiv__self_diffuse(open, r, o, &cell, own_normal);
         for (k = 0; k < 3; k++) r->diffuse[k] = open[k] < r->diffuse[k] ? open[k] : r->diffuse[k];
         for (k = 0; k < r->environment->light_count; k++) covered[k] = own[k] > covered[k] ? own[k] : covered[k];
     }
@@ -4165,6 +4352,7 @@ static int fiv__read_header(fiv_occluder *from, fiv__save *s, const unsigned cha
     if (!fiv__occluder_options_are_valid(&o) || !sat__is_finite(s->radius) || s->radius < 0) return 0;
     if (!sat__is_finite(s->centre[0]) || !sat__is_finite(s->centre[1]) || !sat__is_finite(s->centre[2])) return 0;
     o.sun_map = from->map_side;
+    o.contact_map = from->contact_side;
     fiv__set_grid(from, &o);
     samples = fiv__grid_samples(&from->grid);
     if (s->triangles > 0x7fffffff / 3 || s->clusters < 0) return 0;
@@ -4250,6 +4438,7 @@ FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, siz
     if (!sat__resolve_allocator(&from.allocator, &options_used.allocator)) return SAT_ERR_ARGUMENT;
     from.threads = options_used.threads;
     from.map_side = options_used.sun_map;
+    from.contact_side = options_used.contact_map;
     if (!fiv__read_header(&from, &s, p, size)) return SAT_ERR_DATA;
     result = fiv__allocate_occluder(&o, &from);
     if (result) return result;
@@ -4277,6 +4466,7 @@ FIV_DEF sat_result fiv_occluder_load(fiv_occluder **out, const void *memory, siz
         fiv_occluder_destroy(o);
         return SAT_ERR_DATA;
     }
+    fiv__draw_contact(o);
     fiv__count_bytes(o);
     *out = o;
     return SAT_OK;
@@ -4777,7 +4967,7 @@ static void fiv__gl_sample(float out[4], const fiv_occluder *o, size_t sample, i
     int k;
     memset(v, 0, sizeof v);
     if (angle >= 0) {
-        fiv__add_sample_plain(v, 1, o, sample);
+        fiv__add_sample(v, 1, o, sample);
         for (k = 0; k < 9; k++) v[k] *= scale;
         v[10] = 1;
     }

@@ -1,8 +1,10 @@
-/* Prints a hash of everything the lanes of sat.h, or tonemap.h, compute from inputs of all kinds. Compiled with and
-   without SAT_NO_SIMD it prints the same: vectors and plain C give the same bits. tests/check_house.sh compares. */
+/* Prints a hash of everything the lanes of sat.h, tonemap.h or fiv.h compute from inputs of all kinds. Compiled with
+   and without SAT_NO_SIMD it prints the same: vectors and plain C give the same bits. tests/check_house.sh compares. */
 #define LIGHTSCAN_IMPLEMENTATION
 #ifdef SAME_BITS_TONEMAP
 #include "tonemap.h"
+#elif defined(SAME_BITS_FIV)
+#include "fiv.h"
 #else
 #define SAT_SIBLING
 #include "sat.h"
@@ -20,7 +22,7 @@ static void add(const void *p, size_t size)
     for (; size > 0; size--) hash = (hash ^ *c++) * 1099511628211u;
 }
 
-#ifndef SAME_BITS_TONEMAP
+#if !defined(SAME_BITS_TONEMAP) && !defined(SAME_BITS_FIV)
 /* NaN counts as NaN: its bits are the processor's. */
 static void add_floats(sat__f32x4 v)
 {
@@ -77,6 +79,69 @@ int main(void)
     int i;
     for (i = 0; i < 100000; i++) all_lanes();
     printf("lanes %016llx\n", (unsigned long long)hash);
+    return 0;
+}
+
+#elif defined(SAME_BITS_FIV)
+enum { RING = 24, TUBE = 9, RECEIVERS = 512 };
+
+static float draw_unit(void) { return (float)(draw() >> 8) / 16777216.0f; }
+
+/* A torus; open where some triangles are left out. */
+static fiv_occluder *ring(int left_out, const fiv_occluder_options *o)
+{
+    static float positions[3 * RING * TUBE];
+    static unsigned indices[6 * RING * TUBE];
+    fiv_occluder *made = NULL;
+    int i, j, n = 0;
+    for (i = 0; i < RING; i++)
+        for (j = 0; j < TUBE; j++) {
+            float *p = positions + 3 * (i * TUBE + j);
+            float a = 6.2831853f * (float)i / RING, b = 6.2831853f * (float)j / TUBE;
+            unsigned at[4];
+            int k;
+            p[0] = (1 + 0.4f * cosf(b)) * cosf(a), p[1] = 0.4f * sinf(b), p[2] = (1 + 0.4f * cosf(b)) * sinf(a);
+            for (k = 0; k < 4; k++) at[k] = (unsigned)((i + (k >> 1)) % RING * TUBE + (j + (k & 1)) % TUBE);
+            indices[n++] = at[0], indices[n++] = at[1], indices[n++] = at[2];
+            indices[n++] = at[2], indices[n++] = at[1], indices[n++] = at[3];
+        }
+    fiv_occluder_create(&made, positions, RING * TUBE, indices, (size_t)(n / 3 - left_out), o, NULL);
+    return made;
+}
+
+int main(void)
+{
+    static float sky[32 * 16 * 3], points[3 * RECEIVERS], normals[3 * RECEIVERS], rgb[3 * RECEIVERS];
+    sat_image image = sat_image_f32(sky, 32, 16, 3);
+    fiv_environment *e = NULL;
+    int i, variant;
+    for (i = 0; i < 32 * 16 * 3; i++) sky[i] = draw_unit() * (draw() % 211 ? 1.0f : 3000.0f);
+    for (i = 0; i < 3 * RECEIVERS; i++) {
+        points[i] = (draw_unit() - 0.5f) * (i % 2 ? 3.0f : 8.0f);
+        normals[i] = draw() % 97 ? draw_unit() - 0.5f : sat__float_from_bits(draw());
+    }
+    if (fiv_environment_create(&e, &image, NULL, NULL) != SAT_OK) return 1;
+    for (variant = 0; variant < 4; variant++) {
+        fiv_occluder_options o = fiv_occluder_defaults();
+        fiv_irradiance_options io = fiv_irradiance_defaults();
+        fiv_instance two[2];
+        memset(two, 0, sizeof two);
+        o.theta = 12, o.phi = 7, o.rho = 6;
+        o.storage = variant & 1 ? FIV_STORAGE_HALF_OCTAHEDRAL : FIV_STORAGE_FLOAT;
+        io.own_masks = variant & 2 ? 64 : 0;
+        io.accuracy = variant == 3 ? FIV_MASK : FIV_SCALED;
+        two[0].occluder = two[1].occluder = ring(variant & 2 ? 7 : 0, &o);
+        two[0].scale = 1, two[1].scale = 0.5f, two[1].position[0] = 1.5f;
+        if (!two[0].occluder) return 1;
+        if (fiv_occluder_light((fiv_occluder *)(uintptr_t)two[0].occluder, e, NULL) != SAT_OK) return 1;
+        if (fiv_irradiance(rgb, points, normals, RECEIVERS, e, two, 2, &io, NULL) != SAT_OK) return 1;
+        add(rgb, sizeof rgb);
+        if (fiv_self_irradiance(rgb, points, normals, RECEIVERS, e, two, two + 1, 1, &io, NULL) != SAT_OK) return 1;
+        add(rgb, sizeof rgb);
+        fiv_occluder_destroy((fiv_occluder *)(uintptr_t)two[0].occluder);
+    }
+    fiv_environment_destroy(e);
+    printf("fiv %016llx\n", (unsigned long long)hash);
     return 0;
 }
 

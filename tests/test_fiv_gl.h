@@ -134,7 +134,7 @@ static void test_cpu(float rgb[3], int i, size_t count)
     fiv_instance others[3];
     size_t j, n = 0;
     o.cutoff = 0;
-    o.own_masks = o.rays = 0; /* what the shader does */
+    o.contact = o.own_masks = o.rays = 0; /* what the shader does */
     o.penumbra = test_penumbra;
     for (j = 0; j < count; j++)
         if (!(point[3] >= (float)j + 2 && point[3] < (float)j + 3)) others[n++] = scene.instances[j];

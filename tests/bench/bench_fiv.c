@@ -255,7 +255,7 @@ static double error_of(run *r, int step, double *seconds)
     r->options.accuracy = steps[step].accuracy;
     r->options.partial = steps[step].partial;
     r->options.overlap = steps[step].overlap;
-    r->options.own_masks = r->options.rays = 0; /* what interpolation can do */
+    r->options.own_masks = r->options.rays = r->options.contact = 0; /* what interpolation can do */
     r->options.penumbra = 0;
     if (seconds) *seconds = median_time(run_once, r, bench_rounds(7));
     else run_once(r);
@@ -511,7 +511,7 @@ static void partial_occluders(bench *b)
                     io.accuracy = a == 0 ? FIV_TRILINEAR : (fiv_accuracy)a;
                     io.partial = a > 0;
                     io.cutoff = 0;
-                    io.own_masks = 0;
+                    io.own_masks = io.contact = 0;
                     check(fiv_irradiance(rgb, p, n, 1, b->environment, &instance, 1, &io, NULL), "irradiance");
                     for (k = 0; k < 3; k++) square[a] += pow(((double)rgb[k] - truth[k]) / (double)open[k], 2) / 600;
                 }
@@ -675,7 +675,7 @@ static void resting_row(bench *b, const char *light, int big, double gap)
     fiv_irradiance_stats stats;
     fiv_occluder *occluder;
     fiv_instance instance;
-    double error[2], seconds[2], points = b->side * b->side;
+    double error[3], seconds[3], points = b->side * b->side;
     run r;
     if (big) o.theta = 64, o.phi = 33, o.rho = 30;
     check(fiv_occluder_create(&occluder, b->mesh.positions, b->mesh.vertices, b->mesh.indices, b->mesh.triangles, &o,
@@ -690,10 +690,13 @@ static void resting_row(bench *b, const char *light, int big, double gap)
     seconds[1] = median_time(run_once, &r, bench_rounds(3));
     light_points(&r, &stats);
     error[1] = reference_nrmse(b->truth, b->rgb, (size_t)points);
+    r.options.own_masks = 0;
+    seconds[2] = median_time(run_once, &r, bench_rounds(5));
+    error[2] = reference_nrmse(b->truth, b->rgb, (size_t)points);
     fiv_occluder_destroy(occluder);
-    bench_row("%s\t%s\t%.3f\t%dx%dx%d\t%.4f\t%.4f\t%.3f\t%.2f\t%.1f\t%.1f", b->mesh_name, light, gap, o.theta, o.phi,
-              o.rho, error[0], error[1], 1e6 * seconds[0] / points, 1e6 * seconds[1] / points,
-              100 * (double)stats.own_receivers / points, 100 * (double)stats.rays / points);
+    bench_row("%s\t%s\t%.3f\t%dx%dx%d\t%.4f\t%.4f\t%.4f\t%.3f\t%.3f\t%.2f\t%.1f\t%.1f", b->mesh_name, light, gap,
+              o.theta, o.phi, o.rho, error[0], error[2], error[1], 1e6 * seconds[0] / points, 1e6 * seconds[2] / points,
+              1e6 * seconds[1] / points, 100 * (double)stats.own_receivers / points, 100 * (double)stats.rays / points);
 }
 
 static void resting(int side)
@@ -703,8 +706,8 @@ static void resting(int side)
     static const double gaps[2] = {0, 0.002};
     static const int lights[2] = {0, 4};
     int i, g, l, big, last = bench_smoke() ? 1 : 5;
-    bench_table("What rests on a floor 3 R wide: own masks near contact, rays where the depth map of a sun is not sure",
-                "mesh\tenvironment\tgap_R\tsamples\tnrmse_interpolated\tnrmse\tpoint_us_interpolated\tpoint_us\town_masks_percent\trays_percent");
+    bench_table("What rests on a floor 3 R wide: views, or own masks, near contact; rays where the depth map of a sun is not sure",
+                "mesh\tenvironment\tgap_R\tsamples\tnrmse_interpolated\tnrmse_views\tnrmse\tpoint_us_interpolated\tpoint_us_views\tpoint_us\town_masks_percent\trays_percent");
     bench_note("nrmse: eq 17 against rays to every texel of the light and to each split-off light.");
     for (i = 0; i < last; i += bench_quick() ? 3 : 1) { /* the box and the bunny in a short run */
         bench b;
@@ -818,7 +821,7 @@ static void suns_row(bench *b, const fiv_occluder *o, const char *light, double 
     run r;
     fiv_instance instance = instance_of(b, o);
     fiv_irradiance_stats stats;
-    double points = b->side * b->side, error[4], seconds[3];
+    double points = b->side * b->side, error[5], seconds[4];
     size_t i;
     s.b = b;
     s.sums = (double *)need(malloc((b->lights + 1) * sizeof(double)));
@@ -835,7 +838,7 @@ static void suns_row(bench *b, const fiv_occluder *o, const char *light, double 
     error[0] = reference_nrmse(b->truth, b->rgb, (size_t)points);
     r.b = b, r.instances = &instance, r.count = 1;
     r.options = fiv_irradiance_defaults();
-    r.options.own_masks = r.options.rays = 0;
+    r.options.own_masks = r.options.rays = r.options.contact = 0;
     seconds[1] = median_time(run_once, &r, bench_rounds(5));
     error[1] = reference_nrmse(b->truth, b->rgb, (size_t)points);
     r.options = fiv_irradiance_defaults();
@@ -845,10 +848,13 @@ static void suns_row(bench *b, const fiv_occluder *o, const char *light, double 
     r.options.penumbra = 0;
     light_points(&r, &stats);
     error[3] = reference_nrmse(b->truth, b->rgb, (size_t)points);
+    r.options.own_masks = 0;
+    seconds[3] = median_time(run_once, &r, bench_rounds(5));
+    error[4] = reference_nrmse(b->truth, b->rgb, (size_t)points);
     free(s.sums);
-    bench_row("%s\t%.3f\t%d\t%.4f\t%.4f\t%.4f\t%.4f\t%.2f\t%.4f\t%.4f\t%.1f\t%.1f", light, gap,
-              fiv_environment_get_stats(b->environment).lights, error[0], error[1], error[2], error[3],
-              1e6 * seconds[0] / points, seconds[1] / seconds[0], seconds[2] / seconds[0],
+    bench_row("%s\t%.3f\t%d\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.2f\t%.4f\t%.4f\t%.4f\t%.1f\t%.1f", light, gap,
+              fiv_environment_get_stats(b->environment).lights, error[0], error[1], error[4], error[2], error[3],
+              1e6 * seconds[0] / points, seconds[1] / seconds[0], seconds[3] / seconds[0], seconds[2] / seconds[0],
               100 * (double)stats.own_receivers / points, 100 * (double)stats.rays / points);
 }
 
@@ -864,8 +870,8 @@ static void suns(int side)
     size_t n;
     memset(&b, 0, sizeof b);
     bench_table("Suns: a floor 4 R wide below the bunny, beside 128 rays a receiver to lights drawn by what they give",
-                "environment\tgap_R\tlights\tnrmse_128_rays\tnrmse_maps\tnrmse\tnrmse_points\trays_us\tmaps_over_rays\ttime_over_rays\town_percent\tray_percent");
-    bench_note("maps: depth maps alone, neither own masks nor rays; points: penumbra 0, as the truth has it.");
+                "environment\tgap_R\tlights\tnrmse_128_rays\tnrmse_maps\tnrmse_views\tnrmse\tnrmse_points\trays_us\tmaps_over_rays\tviews_over_rays\ttime_over_rays\town_percent\tray_percent");
+    bench_note("maps: depth maps of the lights alone, neither views, own masks nor rays; views: near contact 384 depth maps in place of own masks, and penumbra 0; points: penumbra 0, as the truth has it.");
 #ifndef HAVE_EMBREE
     bench_missing("Embree", "libembree-dev");
 #endif
