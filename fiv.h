@@ -434,9 +434,9 @@ typedef struct fiv_gl_view {
 } fiv_gl_view;
 
 /* Irradiance of every pixel, in the target `to`, or, when NULL, in fiv_gl_texture() (RGBA32F). `points` and `normals`
-   are float textures of world coordinates, at least of the created size; a normal of 0 gives 0. With a view, `points`
-   is a depth texture without comparison instead. With options.self an alpha says what a receiver lies on, that of
-   `points`, with a view that of `normals`: 2 + i the surface of instance i, which shadows itself as in
+   are float textures of world coordinates, at least of the created size (from to->from on); a normal of 0 gives 0. With
+   a view, `points` is a depth texture without comparison instead. With options.self an alpha says what a receiver lies
+   on, that of `points`, with a view that of `normals`: 2 + i the surface of instance i, which shadows itself as in
    fiv_self_irradiance; any other value, such as the 1 of RGB textures, nothing that casts shadows. */
 FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *gl, const sat_gl_target *to, unsigned points, unsigned normals,
                                      const fiv_gl_view *view);
@@ -4784,7 +4784,7 @@ static const char fiv__glsl_main[] =
         out vec4 value;
         void main() {
             ivec2 p = sat_pixel();
-            vec4 point = texelFetch(fiv_points, p, 0), normal = texelFetch(fiv_normals, p, 0);
+            vec4 point = texelFetch(fiv_points, p + sat_from, 0), normal = texelFetch(fiv_normals, p + sat_from, 0);
             float on = point.w;
             if (fiv_depth.z > 0.5) {
                 vec3 clip = vec3((vec2(p) + 0.5) * fiv_depth.xy - 1.0,
@@ -4896,7 +4896,7 @@ static sat_result fiv__gl_program(fiv_gl *g)
     sat__gl *gl = &g->gl;
     sat__gl_shaders shaders;
     const char *body[3];
-    body[0] = sat__gl_pixel();
+    body[0] = SAT__GL_FROM SAT__GL_PIXEL;
     body[1] = fiv__glsl_main;
     body[2] = NULL;
     memset(&shaders, 0, sizeof shaders);
@@ -5270,6 +5270,7 @@ FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *g, const sat_gl_target *to, unsigne
     if (result == SAT_OK) {
         fiv__gl_uniforms(g, g->program, 0);
         fiv__gl_set_view(g, view);
+        sat__gl_set_from(&g->gl, g->program, to);
         sat__gl_set_texture(&g->gl, g->program, "fiv_points", 5, points);
         sat__gl_set_texture(&g->gl, g->program, "fiv_normals", 6, normals);
         sat__gl_draw(&g->gl);

@@ -483,6 +483,7 @@ typedef struct sat_gl_target {
     int layer;
     int x, y;           /* where the picture's corner (0, 0) lies in it: two views side by side, a part of the window */
     int flip;           /* 0; 1: rows in the reverse order, from top-down to bottom-up and back */
+    int from_x, from_y; /* where it lies in the pictures that the call reads: one of two views, a part of an atlas */
 } sat_gl_target;
 
 static inline sat_gl_target sat_gl_to(sat_gl_place place, unsigned name, int layer, int x, int y, int flip)
@@ -494,6 +495,7 @@ static inline sat_gl_target sat_gl_to(sat_gl_place place, unsigned name, int lay
     target.x = x;
     target.y = y;
     target.flip = flip;
+    target.from_x = target.from_y = 0;
     return target;
 }
 static inline sat_gl_target sat_gl_to_texture(unsigned texture)
@@ -2125,8 +2127,16 @@ static inline void sat__gl_pass(sat__gl *gl, unsigned program, unsigned framebuf
         })
 static inline const char *sat__gl_pixel(void) { return SAT__GL_PIXEL; }
 
+/* What is added to a pixel of the picture where its inputs are fetched. */
+#define SAT__GL_FROM SAT__GLSL(uniform ivec2 sat_from;)
+static inline void sat__gl_set_from(sat__gl *gl, unsigned program, const sat_gl_target *to)
+{
+    gl->Uniform2i(gl->GetUniformLocation(program, "sat_from"), to ? to->from_x : 0, to ? to->from_y : 0);
+}
+
 static inline int sat__gl_target_is_valid(const sat_gl_target *target)
 {
+    if (target && (target->from_x < 0 || target->from_y < 0)) return 0;
     if (!target || target->place == SAT_GL_OWN) return 1;
     return (unsigned)target->place <= (unsigned)SAT_GL_FRAMEBUFFER && target->layer >= 0 &&
            (target->name != 0 || target->place == SAT_GL_FRAMEBUFFER);

@@ -383,7 +383,8 @@ typedef struct ssao_sat_gl ssao_sat_gl;
 SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *get_proc, int width, int height,
                                            const ssao_sat_options *options);
 /* depth: a 2D texture whose red is the depth (R32F, R16F, or a depth format without comparison). normals: its red,
-   green, blue are the view-space normal, signed; 0: from depth. to: its red gets the accessibility; NULL: the
+   green, blue are the view-space normal, signed; 0: from depth. Both may be larger than the picture, which lies at
+   to->from. to: its red gets the accessibility; NULL: the
    object's own R32F, ssao_sat_gl_texture(). Of `input` only width, height,
    depth_kind, projection, clip_zero_to_one and sky count. */
 SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth, unsigned normals,
@@ -2739,14 +2740,15 @@ SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void)
                 return vec3((view[0].xz * (vec2(pixel) + 0.5) + view[0].yw) * (view[1].w > 0.5 ? 1.0 : z), z);
             })
         SAT__GLSL(
-            vec3 ssao_sat_tangent(vec4 view[3], sampler2D depth, ivec2 pixel, float z, ivec2 along) {
+            /* part: where the picture lies in the texture: corner and size */
+            vec3 ssao_sat_tangent(vec4 view[3], sampler2D depth, ivec4 part, ivec2 pixel, float z, ivec2 along) {
                 vec3 p = ssao_sat_position(view, pixel, z), t = vec3(0.0);
                 float nearest = 0.0;
                 bool found = false;
                 for (int side = -1; side <= 1; side += 2) {
                     ivec2 q = pixel + side * along;
-                    if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, textureSize(depth, 0)))) continue;
-                    float zq = ssao_sat_distance(view, q, texelFetch(depth, q, 0).r);
+                    if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, part.zw))) continue;
+                    float zq = ssao_sat_distance(view, q, texelFetch(depth, part.xy + q, 0).r);
                     if (!(zq > 0.0)) continue;
                     float off = abs(view[1].w > 0.5 ? zq - z : 1.0 / zq - 1.0 / z);
                     if (found && off >= nearest) continue;
@@ -2757,9 +2759,9 @@ SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void)
                 return t;
             })
         SAT__GLSL(
-            vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z) {
-                vec3 u = ssao_sat_tangent(view, depth, pixel, z, ivec2(1, 0)),
-                    v = ssao_sat_tangent(view, depth, pixel, z, ivec2(0, 1));
+            vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec4 part, ivec2 pixel, float z) {
+                vec3 u = ssao_sat_tangent(view, depth, part, pixel, z, ivec2(1, 0)),
+                    v = ssao_sat_tangent(view, depth, part, pixel, z, ivec2(0, 1));
                 float facing = view[1].w > 0.5 ? 1.0 : 0.0;
                 if (dot(u, u) * dot(v, v) <= 0.0) return vec3(0.0, 0.0, -1.0);
                 vec3 n = cross(normalize(u), normalize(v));
@@ -2767,6 +2769,10 @@ SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void)
                 n = normalize(n);
                 facing = facing > 0.5 ? n.z : dot(n, ssao_sat_position(view, pixel, z));
                 return facing > 0.0 ? -n : n;
+            })
+        SAT__GLSL(
+            vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z) {
+                return ssao_sat_depth_normal(view, depth, ivec4(ivec2(0), textureSize(depth, 0)), pixel, z);
             })
         "#endif\n";
 }
@@ -2776,19 +2782,19 @@ static const char ssao_sat__gl_common[] =
     SAT__GLSL(
         uniform sampler2D depth, normals, edges;
         uniform vec4 view[3];
-        uniform ivec2 size, picture;
+        uniform ivec2 size, picture, sat_from;
         float distance_at(ivec2 pixel) {
-            return ssao_sat_distance(view, pixel, texelFetch(depth, min(pixel, picture - 1), 0).r);
+            return ssao_sat_distance(view, pixel, texelFetch(depth, sat_from + min(pixel, picture - 1), 0).r);
         })
     SAT__GLSL(vec3 normal_at(ivec2 pixel, float z) {)
     "#if NORMALS\n"
     SAT__GLSL(
-            vec3 n = texelFetch(normals, pixel, 0).xyz * vec3(1.0, 1.0, view[2].w);
+            vec3 n = texelFetch(normals, sat_from + pixel, 0).xyz * vec3(1.0, 1.0, view[2].w);
             float square = dot(n, n);
             if (!isnan(square) && !isinf(square) && square > 1e-20) return n / sqrt(square);)
     "#endif\n"
     SAT__GLSL(
-            return ssao_sat_depth_normal(view, depth, pixel, z);
+            return ssao_sat_depth_normal(view, depth, ivec4(sat_from, picture), pixel, z);
         })
     SAT__GLSL(
         /* the same in orthographic views */
@@ -3201,6 +3207,7 @@ struct ssao_sat_gl {
     sat__gl gl;
     ssao_sat_options options;
     int width, height, step, columns, rows, tiles, is_built;
+    int from[2]; /* where the picture lies in the inputs of this call */
     unsigned programs[2][SSAO_SAT__GL_PROGRAMS]; /* without and with normals */
     ssao_sat__gl_target range[2], shares, edges, table[2], open, out;
     ssao_sat__camera camera;
@@ -3418,6 +3425,7 @@ static unsigned ssao_sat__gl_pass(ssao_sat_gl *g, int which, const ssao_sat__gl_
     gl->Uniform4fv(gl->GetUniformLocation(program, "view"), 3, g->view);
     sat__gl_set_int2(gl, program, "size", g->columns, g->rows);
     sat__gl_set_int2(gl, program, "picture", g->width, g->height);
+    sat__gl_set_int2(gl, program, "sat_from", g->from[0], g->from[1]);
     sat__gl_set_texture(gl, program, "depth", 0, depth);
     if (normals) sat__gl_set_texture(gl, program, "normals", 1, normals);
     if (which >= SSAO_SAT__GL_WORDS) sat__gl_set_texture(gl, program, "edges", 2, g->edges.texture);
@@ -3546,6 +3554,8 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, const sat_gl_target *
     side = ssao_sat__largest_side(gl->columns, gl->rows, gl->step);
     gl->limit = (float)(gl->options.max_pixels < side ? gl->options.max_pixels : side);
     if (gl->camera.aspect > 1) gl->limit /= gl->camera.aspect;
+    gl->from[0] = to ? to->from_x : 0;
+    gl->from[1] = to ? to->from_y : 0;
     sat__gl_begin(&gl->gl, &state, 5);
     result = ssao_sat__gl_run(gl, to, depth, normals);
     sat__gl_end(&gl->gl, &state);

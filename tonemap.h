@@ -322,9 +322,9 @@ typedef struct tonemap_gl tonemap_gl;
 /* On an OpenGL error *out only answers tonemap_gl_message, and is to be destroyed; on the others it is NULL. */
 TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_proc, int width, int height,
                                          const tonemap_options *options);
-/* Maps the first texels of the 2D texture hdr (float RGB or RGBA, at least of the created size, level 0) to sRGB codes
-   and alpha 1: in the target `to` (8 bits a channel; the window's framebuffer: sat_gl_to_framebuffer(0, 0, 0)), or,
-   when NULL, in tonemap_gl_texture(). */
+/* Maps the first texels (or those at to->from) of the 2D texture hdr (float RGB or RGBA, at least of the created size,
+   level 0) to sRGB codes and alpha 1: in the target `to` (8 bits a channel; the window's framebuffer:
+   sat_gl_to_framebuffer(0, 0, 0)), or, when NULL, in tonemap_gl_texture(). */
 TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, const sat_gl_target *to, unsigned hdr, double dt);
 TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl);
 /* Other options from the next picture on; the adaptation goes on. Costs nothing: key, white, exposure, the seconds, the
@@ -2654,7 +2654,7 @@ static const char tonemap__glsl_luminance[] =
         uniform vec3 luma;
         out float value;
         void main() {
-            vec3 rgb = texelFetch(hdr, ivec2(gl_FragCoord.xy), 0).rgb;
+            vec3 rgb = texelFetch(hdr, ivec2(gl_FragCoord.xy) + sat_from, 0).rgb;
             float y = luma.r * rgb.r + luma.g * rgb.g + luma.b * rgb.b;
             uint bits = floatBitsToUint(y);
             value = bits > 0x7f800000u && bits != 0x80000000u ? -1.0 : tonemap_sane(y); /* -1: unusable */
@@ -3040,7 +3040,7 @@ static const char tonemap__glsl_map[] =
         })
     SAT__GLSL(
         vec3 tonemap_display(ivec2 p) {
-            vec3 rgb = texelFetch(hdr, p, 0).rgb;
+            vec3 rgb = texelFetch(hdr, p + sat_from, 0).rgb;
             vec4 first = texelFetch(state, ivec2(0), 0), second = texelFetch(state, ivec2(1, 0), 0);
             float y = texelFetch(luminance, p, 0).x, scale = tonemap_scale(), key = tonemap_key(), own = y * scale,
                 la = own, beyond = 1.0;
@@ -3119,7 +3119,7 @@ enum {
 };
 
 static const sat__gl_program tonemap__programs[TONEMAP__GL_PROGRAMS] = {
-    {"tonemap: luminance", 0, "hdr", NULL, NULL, {tonemap__glsl_luminance}},
+    {"tonemap: luminance", 0, "hdr", NULL, NULL, {SAT__GL_FROM, tonemap__glsl_luminance}},
     {"tonemap: log-average", 0, "source mask", "#define TONEMAP_FIRST\n", NULL, {tonemap__glsl_reduce}},
     {"tonemap: reduction", 0, "source", NULL, NULL, {tonemap__glsl_reduce}},
     {"tonemap: histogram", TONEMAP__IF_HISTOGRAM, "luminance mask", NULL, tonemap__glsl_scatter, {tonemap__glsl_count}},
@@ -3130,7 +3130,7 @@ static const sat__gl_program tonemap__programs[TONEMAP__GL_PROGRAMS] = {
     {"tonemap: a and b", TONEMAP__IF_GUIDED, "source", NULL, NULL, {tonemap__glsl_down, tonemap__glsl_fit}},
     {"tonemap: sums of a and b", TONEMAP__IF_GUIDED, "source", NULL, NULL, {tonemap__glsl_along}},
     {"tonemap: mapping", 0, "hdr luminance state table steps", NULL, NULL,
-     {tonemap__glsl_frame, SAT__GL_PIXEL, tonemap__glsl_down, tonemap__glsl_search, tonemap__glsl_curves,
+     {tonemap__glsl_frame, SAT__GL_FROM SAT__GL_PIXEL, tonemap__glsl_down, tonemap__glsl_search, tonemap__glsl_curves,
       tonemap__glsl_map}}};
 
 /* What they draw into, in the order of the table; of the state [0] is the new one. */
@@ -3351,18 +3351,19 @@ TONEMAP_DEF void tonemap_gl_destroy(tonemap_gl *gl)
 
 /* ---- the passes of a picture */
 
-static inline void tonemap__gl_measure(tonemap_gl *g, unsigned hdr)
+static inline void tonemap__gl_measure(tonemap_gl *g, const sat_gl_target *to, unsigned hdr)
 {
     sat__gl *gl = &g->gl;
-    const sat__gl_target *from = &g->target[TONEMAP__T_LUMINANCE], *to = &g->target[TONEMAP__T_LEVEL];
+    const sat__gl_target *from = &g->target[TONEMAP__T_LUMINANCE], *level = &g->target[TONEMAP__T_LEVEL];
     unsigned program = g->program[TONEMAP__GL_LUMINANCE];
     int i;
     SAT__GL_START(gl, program, from, hdr);
+    sat__gl_set_from(gl, program, to);
     sat__gl_set_float3(gl, program, "luma", g->colours.luma);
     sat__gl_draw(gl);
-    for (i = 0; i < g->levels; i++, from = to++) {
+    for (i = 0; i < g->levels; i++, from = level++) {
         program = g->program[i ? TONEMAP__GL_REDUCE : TONEMAP__GL_LOGARITHMS];
-        SAT__GL_START(gl, program, to, from->texture, g->mask);
+        SAT__GL_START(gl, program, level, from->texture, g->mask);
         sat__gl_set_int2(gl, program, "size", from->width, from->height);
         sat__gl_draw(gl);
     }
@@ -3432,6 +3433,7 @@ static inline sat_result tonemap__gl_map(tonemap_gl *g, const sat_gl_target *to,
     if (result != SAT_OK) return result;
     SAT__GL_INPUTS(gl, hdr, t[TONEMAP__T_LUMINANCE].texture, t[TONEMAP__T_STATE].texture,
                    g->sat ? sat_gl_table(g->sat) : t[TONEMAP__T_PAIR].texture, t[TONEMAP__T_STEPS].texture);
+    sat__gl_set_from(gl, program, to);
     sat__gl_set_float(gl, program, "cd_per_unit", (float)g->options.cd_per_unit);
     sat__gl_set_float(gl, program, "lux_per_cd", (float)g->options.lux_per_cd);
     sat__gl_set_float(gl, program, "peak", (float)g->options.peak);
@@ -3456,7 +3458,7 @@ TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, const sat_gl_target *to,
         return SAT_ERR_ARGUMENT;
     if (!tonemap__in_range(dt, 0, 1e300) && !tonemap__is_infinite(dt)) return SAT_ERR_ARGUMENT;
     sat__gl_begin(&gl->gl, &state, TONEMAP__GL_UNITS);
-    tonemap__gl_measure(gl, hdr);
+    tonemap__gl_measure(gl, to, hdr);
     if (gl->histogram) tonemap__gl_count(gl);
     tonemap__gl_adapt(gl, dt);
     result = tonemap__gl_local(gl);

@@ -250,6 +250,66 @@ TEST(pictures_go_where_the_target_says)
     gl_close();
 }
 
+/* A picture in the middle of larger textures gives the bits it gives alone, whatever lies around it. */
+TEST(inputs_may_lie_anywhere_in_their_textures)
+{
+    static float big[4 * GL_BIG_W * GL_BIG_H], small[4 * GL_N];
+    static unsigned char own[16 * GL_N], there[16 * GL_N];
+    static const int corners[][2] = {{0, 0}, {41, 20}, {3, 17}};
+    static gl_scene s;
+    sat_gl_target to = sat_gl_to(SAT_GL_OWN, 0, 0, 0, 0, 0);
+    sat__gl_state state;
+    int call, k, i, normals;
+    if (!gl_open()) return;
+    gl_create(&s, gl_screen.get_proc);
+    gl_fill(&s);
+    for (call = 0; call < GL_RAIN; call++)
+        for (k = 0; k < 3; k++)
+            for (normals = call != GL_AO; normals < 2; normals++) {
+                unsigned *inputs[3], kept[3], internal = gl_format(call), framebuffer = 0;
+                int count = 0, j;
+                if (call == GL_TONE) inputs[count++] = &s.hdr;
+                if (call == GL_AO) inputs[count++] = &s.depth;
+                if (call == GL_SHADOWS) inputs[count++] = &s.points;
+                if (call != GL_TONE) inputs[count++] = &s.normals;
+                kept[2] = s.normals;
+                if (!normals) s.normals = 0, count = 1; /* from depth */
+                EXPECT_EQ(gl_call(&s, call, NULL), SAT_OK);
+                sat__gl_begin(&gl_f, &state, 1);
+                EXPECT_EQ(sat__gl_read(&gl_f, own, gl_own(&s, call), internal, GL_W, GL_H), SAT_OK);
+                for (j = 0; j < count; j++) {
+                    kept[j] = *inputs[j];
+                    EXPECT_EQ(sat__gl_framebuffer(&gl_f, &framebuffer, &kept[j], 1, 0), SAT_OK);
+                    gl_f.ReadPixels(0, 0, GL_W, GL_H, SAT__GL_RGBA, SAT__GL_FLOAT, small);
+                    gl_f.DeleteFramebuffers(1, &framebuffer);
+                    support_fill(big, 4 * GL_BIG_W * GL_BIG_H, 0.1, 900, 5);
+                    for (i = 0; i < GL_N; i++)
+                        memcpy(big + 4 * ((corners[k][1] + i / GL_W) * GL_BIG_W + corners[k][0] + i % GL_W),
+                               small + 4 * i, 16);
+                    sat__gl_end(&gl_f, &state);
+                    *inputs[j] = gl_texture(SAT__GL_RGBA32F, GL_BIG_W, GL_BIG_H, big);
+                    sat__gl_begin(&gl_f, &state, 1);
+                }
+                sat__gl_end(&gl_f, &state);
+                to.from_x = corners[k][0];
+                to.from_y = corners[k][1];
+                EXPECT_EQ(gl_call(&s, call, &to), SAT_OK);
+                sat__gl_begin(&gl_f, &state, 1);
+                EXPECT_EQ(sat__gl_read(&gl_f, there, gl_own(&s, call), internal, GL_W, GL_H), SAT_OK);
+                EXPECT(memcmp(own, there, sizeof(float) * GL_N * (internal == SAT__GL_RGBA32F ? 4 : 1)) == 0);
+                for (j = 0; j < count; j++) {
+                    gl_f.DeleteTextures(1, inputs[j]);
+                    *inputs[j] = kept[j];
+                }
+                sat__gl_end(&gl_f, &state);
+                s.normals = kept[2];
+            }
+    to.from_y = -1;
+    for (call = 0; call < GL_RAIN; call++) EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_ARGUMENT);
+    gl_destroy(&s);
+    gl_close();
+}
+
 TEST(targets_that_cannot_be_are_refused)
 {
     static gl_scene s;

@@ -54,7 +54,7 @@ static double seconds_luminance(sat__gl *gl, const frame *f, int calls, int roun
     for (k = 0; k < rounds; ++k) {
         start = support_clock();
         for (i = 0; i < calls; ++i) {
-            tonemap__gl_measure(f->map, f->hdr);
+            tonemap__gl_measure(f->map, NULL, f->hdr);
             tonemap__gl_adapt(f->map, 0);
         }
         timer.finish();
