@@ -27,10 +27,11 @@
        softassign_solve(detection_of_track, &p, NULL, NULL);
 
    WHAT IT DOES
-     * the optimum (AUTO, EXACT), or an answer certified to a gap (FAST), from a matrix, a function or features
+     * the optimum (AUTO, EXACT), or an answer certified to a gap (FAST), from a matrix of floats, doubles or integers,
+       dense or sparse, from a function or from features
      * a lower bound with every answer of every method: cost, lower_bound, gap (Slomp 2012, eq 3.2 to 3.5)
      * capacities, forbidden pairs, minimum use, minimum distance of repeats, a bonus for staying (video)
-     * rows left out at a price, the largest instead of the least, the dual prices of the optimum
+     * rows left out at a price, the largest instead of the least, dual prices, the margin of each pair of the optimum
      * a solver that goes on from its prices, stops at any time and then still has a valid answer
      * the methods of Slomp 2012, chapter 3: greedy, annealing, softassign as published, ants; GPU passes (section 3.7)
      * features of eq 3.1 from pictures, and the drawing of the mosaic
@@ -48,13 +49,13 @@
      SAT_NO_SIMD, SAT_NO_STDLIB, SAT_ASSERT as in sat.h. A method left out returns SAT_ERR_ARGUMENT.
 
    MEMORY, THREADS, ERRORS
-     AUTO reads a given matrix where it stands, and copies it (up to 64 million cells) only with a bonus, maximise or
-     unassigned_cost. softassign_solve allocates once (ENTROPIC and
-     PUBLISHED twice) and releases; a solver allocates in create only. Lists take 12 x neighbours bytes a row: 3.2 MB in
-     all for 900 x 8192, 27 MB for 8192 x 65536 (the matrix: 30, 2147 MB). One solver, one thread at a time; different
-     solvers at once. sat_threads speeds up lists, sweeps and checks. Errors name a row or a column in the stats and
-     leave column_of_row as it was: NaN and -infinity SAT_ERR_NON_FINITE, too large SAT_ERR_ARGUMENT, more rows than
-     places or forbidden pairs that leave no choice SAT_ERR_LIMIT.
+     AUTO reads a given matrix of floats or doubles where it stands, and copies it (up to 64 million cells) only with a
+     bonus, maximise or unassigned_cost; integers, and sparse ones of an eighth and more, are copied. softassign_solve
+     allocates once (ENTROPIC and PUBLISHED twice) and releases; a solver allocates in create only. Lists take 12 x
+     neighbours bytes a row: 3.2 MB in all for 900 x 8192, 27 MB for 8192 x 65536 (the matrix: 30, 2147 MB). One
+     solver, one thread at a time; different solvers at once. sat_threads speeds up lists, sweeps and checks. Errors
+     name a row or a column in the stats and leave column_of_row as it was: NaN and -infinity SAT_ERR_NON_FINITE, too
+     large SAT_ERR_ARGUMENT, more rows than places or forbidden pairs that leave no choice SAT_ERR_LIMIT.
 
    ROWS, LIGHT, FAILURES
      Strides of matrices are in floats, those of pictures in bytes: 0 packed, negative the bottom row first with the
@@ -204,13 +205,22 @@ typedef enum softassign_method {
 /* The cost of a pair; the same pair must always get the same number. */
 typedef float softassign_cost_fn(int row, int column, void *user);
 
-/* Rows are patches, columns are tiles. Costs come from the first of these that is given: a dense matrix, a
-   function, or features, whose Euclidean distance (Slomp 2012, eq 3.1) is computed when it is needed.
-   Infinite costs forbid a pair; NaN, -infinity and |cost| > 1e30 are refused, as are features beyond +-1e16. */
+/* Rows are patches, columns are tiles. Costs come from the first of these that is given: a matrix of floats, doubles or
+   integers, dense or sparse; a function; or features, whose Euclidean distance (Slomp 2012, eq 3.1) is computed when it
+   is needed. Infinite costs forbid a pair; NaN, -infinity and |cost| > 1e30 are refused, as are features beyond
+   +-1e16. */
 typedef struct softassign_problem {
     int rows, columns;                     /* >= 1 */
     const float *cost;                     /* cost[row * stride + column] */
-    ptrdiff_t stride;                      /* in floats, not bytes; 0: packed */
+    const double *cost_double;             /* the same in doubles, whose differences count as they are. These two: all
+                                              methods but ENTROPIC and PUBLISHED */
+    const int *cost_int;                   /* the same in integers, all exact; 2147483647 forbids a pair (maximise:
+                                              -2147483648) */
+    ptrdiff_t stride;                      /* in elements, not bytes; 0: packed */
+    const int *row_start;                  /* not NULL: the matrix is sparse (CSR), what it lacks is forbidden: row i
+                                              has the values row_start[i] to row_start[i + 1] - 1; rows + 1 numbers
+                                              from 0 */
+    const int *column_index;               /* of each value, rising in a row */
     softassign_cost_fn *cost_fn;
     void *cost_user;
     const float *row_features;             /* rows x feature_count, packed */
@@ -225,7 +235,7 @@ typedef struct softassign_problem {
                                               upper one */
     float unassigned_cost;                 /* > 0: a row may stay without a column (-1) at this price, and never takes a
                                               dearer one (maximise: at this gain); 0: every row gets a column. These
-                                              two: as minimum_use */
+                                              two: AUTO, EXACT and FAST */
 } softassign_problem;
 
 /* What a call found out. gap = (cost - lower_bound) / cost holds at any moment: no assignment costs less than
@@ -295,6 +305,9 @@ typedef struct softassign_options {
     double *column_price;      /* NULL; the bonus), equal where i got j; v_j <= 0, and 0 where j has room, unless rows =
                                   columns. cost_ij - u_i - v_j bounds what forcing the pair would add. Not with
                                   minimum_use */
+    double *row_margin;        /* NULL; AUTO, EXACT: receive what the best assignment without the row's pair is
+                                  worse by; infinite where there is none. One more path a row. Not with minimum_use,
+                                  min_distance */
     float *soft;               /* NULL; ENTROPIC, PUBLISHED: receives the soft matrix, rows x columns */
     ptrdiff_t soft_stride;     /* in floats; 0: packed */
     sat_allocator allocator;   /* malloc */
@@ -335,7 +348,8 @@ SOFTASSIGN_DEF sat_result softassign_mosaic(unsigned char *out, ptrdiff_t stride
    Full calls: anytime, and frame after frame
    ------------------------------------------------------------------------------------------------ */
 
-/* A solver for problems of one size; one allocation here, none in the steps. Methods: AUTO and EXACT. */
+/* A solver for problems of one size; maximise, unassigned_cost and the kind of costs are as each frame says. One
+   allocation here, none in the steps. Methods: AUTO and EXACT. minimum_use is refused. */
 typedef struct softassign softassign;
 SOFTASSIGN_DEF sat_result softassign_create(softassign **out, int rows, int columns, const softassign_options *options);
 /* Works on for about work_budget units (a unit is a row looked at, 1 to 100 microseconds) and writes a valid assignment
@@ -441,6 +455,7 @@ extern "C" {
 #define SOFTASSIGN__LARGEST_FEATURE 1e16f
 #define SOFTASSIGN__DENSE_CELLS 100000 /* below, lists do not pay */
 #define SOFTASSIGN__MATRIX_CELLS 67108864 /* a given matrix up to this is tried without lists */
+#define SOFTASSIGN__SPARSE 8           /* a sparse matrix with fewer of its cells than one in this goes to lists */
 #define SOFTASSIGN__DIMS 16            /* coordinates of the cheap bound; the last is the norm of what the others
                                           leave */
 #define SOFTASSIGN__BOUND_FEATURES 1024 /* features beyond these are left out of the cheap bound */
@@ -539,6 +554,10 @@ static int softassign__explain_options(sat__text *t, const softassign_options *o
         sat__text_add(t, "grid_width is 0; min_distance above 0 needs the grid");
     else if ((o->row_price || o->column_price) && (int)o->method > (int)SOFTASSIGN_EXACT)
         sat__text_add(t, "row_price or column_price is given; only AUTO and EXACT have them");
+    else if (o->row_margin && (int)o->method > (int)SOFTASSIGN_EXACT)
+        sat__text_add(t, "row_margin is given; only AUTO and EXACT have it");
+    else if (o->row_margin && o->min_distance > 0)
+        sat__text_add(t, "row_margin is given; min_distance does not go with it");
     else return 1;
     return 0;
 }
@@ -566,18 +585,50 @@ static int softassign__explain_element(sat__text *t, const char *name, int index
     return 0;
 }
 
+static inline int softassign__is_matrix(const softassign_problem *p)
+{
+    return p->cost || p->cost_double || p->cost_int;
+}
+static inline int softassign__is_features(const softassign_problem *p)
+{
+    return !softassign__is_matrix(p) && !p->cost_fn;
+}
+
+/* A sparse matrix whose rows follow each other, columns rising. */
+static int softassign__explain_sparse(sat__text *t, const softassign_problem *p)
+{
+    int i, k;
+    if (!softassign__is_matrix(p)) sat__text_add(t, "row_start is given; cost, cost_double and cost_int are NULL");
+    else if (!p->column_index) sat__text_add(t, "row_start is given; column_index is NULL");
+    else if (!softassign__explain_element(t, "row_start", 0, p->row_start[0], 0, 0)) return 0;
+    else {
+        for (i = 0; i < p->rows; i++)
+            if (!softassign__explain_element(t, "row_start", i + 1, p->row_start[i + 1], p->row_start[i], 2147483647))
+                return 0;
+        for (i = 0; i < p->rows; i++)
+            for (k = p->row_start[i]; k < p->row_start[i + 1]; k++)
+                if (!softassign__explain_element(t, "column_index", k, p->column_index[k],
+                                                 k > p->row_start[i] ? p->column_index[k - 1] + 1 : 0, p->columns - 1))
+                    return 0;
+        return 1;
+    }
+    return 0;
+}
+
 /* Where the costs come from, and the lists that go with columns and rows. */
 static int softassign__explain_costs(sat__text *t, const softassign_problem *p)
 {
-    int i;
+    int i, features = p && softassign__is_features(p);
     if (!p) sat__text_add(t, "problem is NULL");
     else if (p->rows < 1) sat__text_range(t, "rows", p->rows, 1, 2147483647, ' ');
     else if (p->columns < 1) sat__text_range(t, "columns", p->columns, 1, 2147483647, ' ');
-    else if (p->cost && p->stride && p->stride < p->columns && p->stride > -(ptrdiff_t)p->columns && p->rows > 1)
+    else if (softassign__is_matrix(p) && !p->row_start && p->stride && p->stride < p->columns &&
+             p->stride > -(ptrdiff_t)p->columns && p->rows > 1)
         sat__text_add(t, "stride is shorter than a row of the matrix");
-    else if (!p->cost && !p->cost_fn && !p->row_features) sat__text_add(t, "cost, cost_fn and row_features are NULL");
-    else if (!p->cost && !p->cost_fn && !p->column_features) sat__text_add(t, "column_features is NULL");
-    else if (!p->cost && !p->cost_fn && p->feature_count < 1)
+    else if (p->row_start && !softassign__explain_sparse(t, p)) return 0;
+    else if (features && !p->row_features) sat__text_add(t, "cost, cost_fn and row_features are NULL");
+    else if (features && !p->column_features) sat__text_add(t, "column_features is NULL");
+    else if (features && p->feature_count < 1)
         sat__text_range(t, "feature_count", p->feature_count, 1, 2147483647, ' ');
     else if (p->maximise < 0 || p->maximise > 1) sat__text_range(t, "maximise", p->maximise, 0, 1, ' ');
     else if (!(p->unassigned_cost >= 0 && p->unassigned_cost <= SOFTASSIGN__LARGEST_COST))
@@ -603,6 +654,10 @@ static int softassign__explain_problem(sat__text *t, const softassign_problem *p
         if (!softassign__explain_element(t, "minimum_use", j, p->minimum_use[j], 0, p->capacity ? p->capacity[j] : o->capacity_default)) return 0;
     if (p->minimum_use && !exact) sat__text_add(t, "minimum_use is given; only AUTO, EXACT and FAST take it");
     else if (p->minimum_use && (o->row_price || o->column_price)) sat__text_add(t, "minimum_use is given; row_price and column_price do not go with it");
+    else if (p->minimum_use && o->row_margin) sat__text_add(t, "minimum_use is given; row_margin does not go with it");
+    else if (!p->cost && (p->cost_double || p->cost_int) &&
+             (o->method == SOFTASSIGN_ENTROPIC || o->method == SOFTASSIGN_PUBLISHED))
+        sat__text_add(t, "cost_double or cost_int is given; ENTROPIC and PUBLISHED read floats");
     else if (p->maximise && !exact) sat__text_add(t, "maximise is 1; only AUTO, EXACT and FAST take it");
     else if (p->unassigned_cost > 0 && !exact) sat__text_add(t, "unassigned_cost is above 0; only AUTO, EXACT and FAST take it");
     else if (p->unassigned_cost > 0 && o->min_distance > 0) sat__text_add(t, "unassigned_cost is above 0; min_distance does not go with it");
@@ -666,18 +721,22 @@ struct softassign {
     sat_allocator allocator;
     size_t bytes;
     void *block;
-    int rows, columns, max_slots, padded, list, has_lists;
+    int rows, columns, max_slots, padded, list, has_lists; /* columns: one more where rows may stay without one */
+    int most_columns;      /* the same with that one in any case, in a solver made by softassign_create */
     int dense;             /* costs stand in `matrix`, or */
-    int in_place;          /* in problem.cost, as they are */
+    int in_place;          /* in problem.cost or cost_double, as they are */
+    int wide;              /* costs are doubles or integers */
     size_t paths_from;     /* stats.work when the paths on the matrix began */
     int dense_paths;       /* and paths are searched on it, without lists */
     int unit_capacities;   /* every slot holds one row */
     int all_open;          /* no slot has a capacity of 0 */
+    int projected;         /* costs are distances of features, which projections bound from below */
 
     softassign_problem problem;
     int slot_count, dims;
     float shrink, slack;   /* bound = distance of the projections * shrink - slack */
     float *matrix;         /* dense: rows x columns costs, the bonus included */
+    double *wide_matrix;   /* the same memory where `wide` */
     float *coarse;         /* per 16 slots: dims x 16 projected coordinates */
     float *row_coarse;     /* rows x dims */
     double *basis;         /* dims x features */
@@ -688,13 +747,15 @@ struct softassign {
     float *price_f;
     int *used, *first_row; /* per slot: how many rows it holds, and the first of them */
     int *slot_of_row, *next_row;
-    float *cost_of_row;    /* cost of the row's slot, with the switching bonus */
+    double *cost_of_row;   /* cost of the row's slot, with the switching bonus */
     float bonus;
 
     int *list_slot;        /* rows x list, by value when listed */
-    float *list_cost, *list_value;
+    float *list_cost, *list_value; /* costs: see softassign__listed_cost */
     int *list_length;
     int *row_result;       /* checks: a row's sat_result; the memory of list_length, which comes later */
+    double *row_largest;   /* checks: its largest finite |cost|, where `wide`; the memory of row_distance */
+    double scale;          /* the largest of those, 0 where not `wide` */
     float *pheromone;      /* ants: of the columns in the lists; the memory of list_value, which they do not read */
     int *order;            /* ants: rows; the memory of `closed` of the paths */
     int *holders;          /* rows that hold a slot in an assignment beside the solver's; the memory of `touched` */
@@ -706,7 +767,7 @@ struct softassign {
     double *bid;           /* auction: what the row pays for its place */
     double *dense_price, *closed_distance; /* the same on the matrix: prices of open slots, distances of closed ones */
     int *parent, *stamp, *row_stamp, *touched, *closed, *heap, *heap_at;
-    float *parent_cost;
+    double *parent_cost;
     int epoch, heap_size;
     float *column_sum, *soft_row;
 
@@ -761,34 +822,81 @@ static float softassign__distance(const float *a, const float *b, int n)
     return sqrtf((lanes[0] + lanes[1]) + (lanes[2] + lanes[3]));
 }
 
-/* Row `row` of a given matrix. */
-static inline const float *softassign__cost_row(const softassign_problem *p, int row)
+/* Where the cost of a pair stands in a given matrix; -1: nowhere. */
+static inline ptrdiff_t softassign__element(const softassign_problem *p, int row, int column)
 {
-    return p->cost + (ptrdiff_t)row * (p->stride ? p->stride : p->columns);
+    int low, high;
+    if (!p->row_start) return (ptrdiff_t)row * (p->stride ? p->stride : p->columns) + column;
+    low = p->row_start[row];
+    high = p->row_start[row + 1];
+    while (low < high) {
+        int middle = low + (high - low) / 2;
+        if (p->column_index[middle] < column) low = middle + 1;
+        else high = middle;
+    }
+    return low < p->row_start[row + 1] && p->column_index[low] == column ? low : -1;
 }
 
-/* The cost of a pair as the problem states it. */
-static inline float softassign__pair(const softassign_problem *p, int row, int column)
+/* An element of a given matrix, as it is minimised. */
+static inline double softassign__value(const softassign_problem *p, ptrdiff_t at)
 {
-    if (p->cost) return softassign__cost_row(p, row)[column];
-    if (p->cost_fn) return p->cost_fn(row, column, p->cost_user);
-    return softassign__distance(p->row_features + (size_t)row * (size_t)p->feature_count,
-                                p->column_features + (size_t)column * (size_t)p->feature_count, p->feature_count);
+    double value;
+    if (p->cost) value = (double)p->cost[at];
+    else if (p->cost_double) value = p->cost_double[at];
+    else if (p->cost_int[at] == (p->maximise ? -2147483647 - 1 : 2147483647)) return (double)SOFTASSIGN__INFINITY;
+    else value = (double)p->cost_int[at];
+    return p->maximise ? -value : value;
 }
 
-static inline const float *softassign__matrix_row(const softassign *s, int row)
+/* The cost of a pair as the problem states it, negative where it asks for the largest total. The column behind the
+   last stands for none. */
+static double softassign__pair(const softassign_problem *p, int row, int column)
 {
-    return s->in_place ? softassign__cost_row(&s->problem, row) : s->matrix + (size_t)row * (size_t)s->columns;
+    double value;
+    if (column >= p->columns) value = (double)p->unassigned_cost;
+    else if (softassign__is_matrix(p)) {
+        ptrdiff_t at = softassign__element(p, row, column);
+        return at < 0 && p->row_start ? (double)SOFTASSIGN__INFINITY : softassign__value(p, at);
+    } else if (p->cost_fn) value = (double)p->cost_fn(row, column, p->cost_user);
+    else
+        value = (double)softassign__distance(p->row_features + (size_t)row * (size_t)p->feature_count,
+                                             p->column_features + (size_t)column * (size_t)p->feature_count,
+                                             p->feature_count);
+    return p->maximise ? -value : value;
 }
+
+/* A row of the matrix: floats, or doubles. */
+typedef struct softassign__row {
+    const float *f;
+    const double *d;
+} softassign__row;
+
+static inline softassign__row softassign__matrix_row(const softassign *s, int row)
+{
+    softassign__row r = {NULL, NULL};
+    ptrdiff_t at = s->in_place ? softassign__element(&s->problem, row, 0) : (ptrdiff_t)row * s->columns;
+    if (s->wide) r.d = (s->in_place ? s->problem.cost_double : s->wide_matrix) + at;
+    else r.f = (s->in_place ? s->problem.cost : s->matrix) + at;
+    return r;
+}
+
+static inline double softassign__row_cost(softassign__row r, int j) { return r.f ? (double)r.f[j] : r.d[j]; }
 
 /* The cost that is minimised: less the bonus for staying. */
-static inline float softassign__cost(const softassign *s, int row, int slot)
+static inline double softassign__cost(const softassign *s, int row, int slot)
 {
     int column = softassign__column(s, slot);
-    float cost;
-    if (s->dense) return softassign__matrix_row(s, row)[column];
+    double cost;
+    if (s->dense) return softassign__row_cost(softassign__matrix_row(s, row), column);
     cost = softassign__pair(&s->problem, row, column);
-    return s->problem.previous && s->problem.previous[row] == column ? cost - s->bonus : cost;
+    if (!s->problem.previous || s->problem.previous[row] != column) return cost;
+    return s->wide ? cost - (double)s->bonus : (double)((float)cost - s->bonus);
+}
+
+/* The cost of an entry of a list: floats stand there, doubles do not. */
+static inline double softassign__listed_cost(const softassign *s, int row, size_t at)
+{
+    return s->wide ? softassign__cost(s, row, s->list_slot[at]) : (double)s->list_cost[at];
 }
 
 /* keys[j] <= cost - price for every slot, from the projections: |P(a - b)| <= |a - b| for orthonormal P. */
@@ -849,7 +957,7 @@ static void softassign__dense_keys(const softassign *s, int row, softassign__scr
 {
     int j, l;
     for (j = 0; j < s->slot_count; j++) {
-        float cost = softassign__cost(s, row, j), price = s->price_f[j];
+        float cost = (float)softassign__cost(s, row, j), price = s->price_f[j];
         w->keys[j] = cost < SOFTASSIGN__INFINITY && s->capacity[j] > 0
                          ? (cost - price) - (fabsf(cost) + fabsf(price)) * 3e-7f
                          : SOFTASSIGN__INFINITY;
@@ -863,11 +971,16 @@ static void softassign__dense_keys(const softassign *s, int row, softassign__scr
     }
 }
 
-/* Slots without capacity, and what pads the last block, are in nobody's sight: no block minimum stands for them. */
+/* Slots without capacity, and what pads the last block, are in nobody's sight: no block minimum stands for them. The
+   column that stands for none has no features. */
 static void softassign__hide_closed(const softassign *s, softassign__scratch *w)
 {
-    int b, j;
-    for (b = s->all_open ? s->slot_count / SOFTASSIGN__BLOCK * SOFTASSIGN__BLOCK : 0; b < s->padded;
+    int b, j, none = s->problem.columns;
+    if (none < s->columns) {
+        float cost = (float)softassign__pair(&s->problem, 0, none), price = s->price_f[none];
+        w->keys[none] = (cost - price) - (fabsf(cost) + fabsf(price)) * 3e-7f;
+    }
+    for (b = s->all_open ? sat__min_int(none, s->slot_count) / SOFTASSIGN__BLOCK * SOFTASSIGN__BLOCK : 0; b < s->padded;
          b += SOFTASSIGN__BLOCK) {
         float least = SOFTASSIGN__INFINITY;
         for (j = b; j < b + SOFTASSIGN__BLOCK; j++) {
@@ -881,7 +994,7 @@ static void softassign__hide_closed(const softassign *s, softassign__scratch *w)
 static void softassign__keys(const softassign *s, int row, softassign__scratch *w)
 {
     int j, stay;
-    if (s->problem.cost || s->problem.cost_fn || s->dense) {
+    if (s->dense || !s->projected) {
         softassign__dense_keys(s, row, w);
         return;
     }
@@ -986,6 +1099,7 @@ static void softassign__project_range(int begin, int end, int worker, void *cont
     for (i = begin; i < end; i++) {
         double norm;
         int is_row = i >= s->slot_count, j = i - s->slot_count;
+        if (!is_row && softassign__column(s, i) >= s->problem.columns) continue;
         if (is_row)
             norm = softassign__project(s, s->problem.row_features + (size_t)j * (size_t)wide, p->features,
                                        p->directions, s->row_coarse + (size_t)j * (size_t)d, 1);
@@ -1013,6 +1127,7 @@ static void softassign__start_bound(softassign *s)
     else
         for (a = 0; a < (n + 1) * n; a++) s->basis[a] = a < n * n && a % (n + 1) == 0 ? 1 : 0;
     for (w = 0; w < 2 * workers; w++) p.norm[w] = 0;
+    memset(s->coarse, 0, (size_t)s->padded * (size_t)s->dims * sizeof(float)); /* what has no features reads as zeros */
     sat__parallel_for(&s->options.threads, s->slot_count + s->rows, softassign__project_range, &p);
     for (w = 1; w < workers; w++)
         for (a = 0; a < 2; a++)
@@ -1020,10 +1135,6 @@ static void softassign__start_bound(softassign *s)
     s->shrink = 1 - 1.2e-7f * (float)(s->problem.feature_count + 32);
     if (s->shrink < 0) s->shrink = 0;
     s->slack = (float)((p.norm[0] + p.norm[1]) * 4.8e-7 + 1e-18 * sqrt((double)s->problem.feature_count + 4));
-    for (a = s->slot_count; a < s->padded; a++) /* the last block reads as zeros behind the slots */
-        for (w = 0; w < s->dims; w++)
-            s->coarse[(a / SOFTASSIGN__BLOCK) * s->dims * SOFTASSIGN__BLOCK + w * SOFTASSIGN__BLOCK +
-                      a % SOFTASSIGN__BLOCK] = 0;
 }
 
 /* ------------------------------------------------------------------------------------------------
@@ -1095,23 +1206,43 @@ static void softassign__sort(softassign__candidate *v, int n)
         }
 }
 
+/* Rows are read from a sparse matrix. */
+static inline int softassign__is_sparse(const softassign *s) { return s->problem.row_start && !s->dense; }
+
+/* Appends a slot that the row may get; returns the new count. */
+static inline int softassign__append(const softassign *s, int row, softassign__scratch *w, int count, int slot)
+{
+    softassign__candidate *c = &w->candidates[count];
+    double cost = softassign__cost(s, row, slot);
+    if (s->projected) w->distances++;
+    if (s->capacity[slot] == 0 || !(cost < (double)SOFTASSIGN__INFINITY)) return count;
+    c->cost = (float)cost;
+    c->value = cost - s->price[slot];
+    c->slot = slot;
+    return count + 1;
+}
+
 /* Evaluates the slots with low < key <= high and appends them. */
 static int softassign__gather(const softassign *s, int row, softassign__scratch *w, int count, float low, float high)
 {
     int b, j, n = s->padded / SOFTASSIGN__BLOCK;
     for (b = 0; b < n; b++) {
         if (!(w->block_min[b] <= high)) continue;
-        for (j = b * SOFTASSIGN__BLOCK; j < (b + 1) * SOFTASSIGN__BLOCK; j++) {
-            softassign__candidate *c = &w->candidates[count];
-            if (!(w->keys[j] <= high) || w->keys[j] <= low || j >= s->slot_count || s->capacity[j] == 0) continue;
-            c->cost = softassign__cost(s, row, j);
-            if (!s->problem.cost && !s->problem.cost_fn) w->distances++;
-            if (!(c->cost < SOFTASSIGN__INFINITY)) continue;
-            c->value = (double)c->cost - s->price[j];
-            c->slot = j;
-            count++;
-        }
+        for (j = b * SOFTASSIGN__BLOCK; j < (b + 1) * SOFTASSIGN__BLOCK; j++)
+            if (w->keys[j] <= high && w->keys[j] > low && j < s->slot_count && s->capacity[j] > 0)
+                count = softassign__append(s, row, w, count, j);
     }
+    return count;
+}
+
+/* All slots of a row of a sparse matrix: its columns, none, and mandatory slots. */
+static int softassign__gather_sparse(const softassign *s, int row, softassign__scratch *w)
+{
+    const softassign_problem *p = &s->problem;
+    int k, j, count = 0;
+    for (k = p->row_start[row]; k < p->row_start[row + 1]; k++)
+        count = softassign__append(s, row, w, count, p->column_index[k]);
+    for (j = p->columns; j < s->slot_count; j++) count = softassign__append(s, row, w, count, j);
     return count;
 }
 
@@ -1125,13 +1256,14 @@ static void softassign__list_row(softassign *s, int row, softassign__scratch *w)
     size_t at = (size_t)row * (size_t)s->list;
     float cut = SOFTASSIGN__INFINITY;
     double limit = (double)SOFTASSIGN__INFINITY;
-    softassign__keys(s, row, w);
-    if (blocks > k) { /* at least k keys are not above the k-th smallest block minimum */
+    if (!softassign__is_sparse(s)) softassign__keys(s, row, w);
+    if (blocks > k && !softassign__is_sparse(s)) { /* at least k keys are not above the k-th smallest block minimum */
         memcpy(w->select, w->block_min, (size_t)blocks * sizeof(float));
         cut = softassign__select(w->select, blocks, k - 1);
         if (!(cut < 3e38f)) cut = SOFTASSIGN__INFINITY;
     }
-    count = softassign__gather(s, row, w, 0, -SOFTASSIGN__INFINITY, cut);
+    count = softassign__is_sparse(s) ? softassign__gather_sparse(s, row, w)
+                                     : softassign__gather(s, row, w, 0, -SOFTASSIGN__INFINITY, cut);
     if (count >= k) softassign__partition(w->candidates, count, k - 1);
     if (cut < SOFTASSIGN__INFINITY) { /* a slot that is better than the k-th so far has a key below it */
         float reach = cut;
@@ -1179,7 +1311,7 @@ static double softassign__list_least(const softassign *s, int row)
     size_t at = (size_t)row * (size_t)s->list, end = at + (size_t)s->list_length[row];
     double least = (double)SOFTASSIGN__INFINITY;
     for (; at < end; at++) {
-        double value = (double)s->list_cost[at] - s->price[s->list_slot[at]];
+        double value = softassign__listed_cost(s, row, at) - s->price[s->list_slot[at]];
         if (value < least) least = value;
     }
     return least;
@@ -1312,7 +1444,7 @@ static void softassign__unassign(softassign *s, int row)
     s->slot_of_row[row] = -1;
 }
 
-static void softassign__assign(softassign *s, int row, int slot, float cost)
+static void softassign__assign(softassign *s, int row, int slot, double cost)
 {
     softassign__unassign(s, row);
     s->slot_of_row[row] = slot;
@@ -1383,9 +1515,12 @@ static int softassign__heap_pop(softassign *s)
 }
 
 typedef struct softassign__search {
-    double nearest; /* distance of the nearest free slot met so far */
-    int root;
+    double nearest; /* distance of the nearest end met so far */
+    double rise;    /* from a free slot to the end: 0, or of a margin */
+    int root, avoided; /* the pair that a margin does without; -1 */
     double root_cost, root_price; /* reference of the root, which has no slot of its own */
+    int row;        /* the row that is looked from, */
+    double base, own_cost, own_price, shift; /* its distance, its reference, and base - (own_cost - own_price) */
 } softassign__search;
 
 enum { SOFTASSIGN__OPEN = 1, SOFTASSIGN__CLOSED = 2 };
@@ -1400,45 +1535,63 @@ static void softassign__new_epoch(softassign *s)
     s->epoch = 1;
 }
 
-static void softassign__relax(softassign *s, softassign__search *q, int row, int slot, float cost, double base,
-                              double own_cost, double own_price)
+static void softassign__look_from(const softassign *s, softassign__search *q, int row, double base)
 {
-    double w = base + (((double)cost - own_cost) - (s->price[slot] - own_price));
+    q->row = row;
+    q->base = base;
+    q->own_cost = row == q->root ? q->root_cost : s->cost_of_row[row];
+    q->own_price = row == q->root ? q->root_price : s->price[s->slot_of_row[row]];
+    q->shift = base - (q->own_cost - q->own_price);
+}
+
+/* The distance at which a slot surfaces whose cost - price is at least `value`, never above it. */
+static inline double softassign__surface(const softassign__search *q, double value)
+{
+    return value + q->shift - (fabs(value) + fabs(q->shift)) * 4e-16;
+}
+
+static void softassign__open(softassign *s, int slot, double distance)
+{
     int known = s->stamp[slot] - 4 * s->epoch;
-    if (known == SOFTASSIGN__CLOSED || w >= q->nearest) {
-        if (known == SOFTASSIGN__CLOSED || w > q->nearest || !softassign__is_free(s, slot)) return;
-    }
-    if (w < base) w = base; /* rounding */
-    if (known == SOFTASSIGN__OPEN && w >= s->distance[slot]) return;
-    s->distance[slot] = w;
-    s->parent[slot] = row;
-    s->parent_cost[slot] = cost;
+    s->distance[slot] = distance;
     if (known == SOFTASSIGN__OPEN) softassign__heap_up(s, s->heap_at[slot]);
     else {
         s->stamp[slot] = 4 * s->epoch + SOFTASSIGN__OPEN;
         softassign__heap_push(s, slot);
     }
-    if (w < q->nearest && softassign__is_free(s, slot)) q->nearest = w;
+}
+
+static void softassign__relax(softassign *s, softassign__search *q, int slot, double cost)
+{
+    double w = q->base + ((cost - q->own_cost) - (s->price[slot] - q->own_price));
+    int known = s->stamp[slot] - 4 * s->epoch;
+    if (slot == q->avoided) { /* the end of a circle, which must not begin with the pair itself */
+        if (q->row != q->root && w < q->nearest) q->nearest = w < q->base ? q->base : w;
+        return;
+    }
+    if (known == SOFTASSIGN__CLOSED || w >= q->nearest) {
+        if (known == SOFTASSIGN__CLOSED || w > q->nearest || !softassign__is_free(s, slot)) return;
+    }
+    if (w < q->base) w = q->base; /* rounding */
+    if (known == SOFTASSIGN__OPEN && w >= s->distance[slot]) return;
+    s->parent[slot] = q->row;
+    s->parent_cost[slot] = cost;
+    softassign__open(s, slot, w);
+    if (w + q->rise < q->nearest && softassign__is_free(s, slot)) q->nearest = w + q->rise;
 }
 
 /* Relaxes the row's list at distance `base`, and leaves a node for the rest. */
 static void softassign__relax_list(softassign *s, softassign__search *q, int row, double base)
 {
     size_t at = (size_t)row * (size_t)s->list, end = at + (size_t)s->list_length[row];
-    double own_cost = q->root_cost, own_price = q->root_price, shift, beyond;
-    if (row != q->root) {
-        own_cost = (double)s->cost_of_row[row];
-        own_price = s->price[s->slot_of_row[row]];
-    }
-    shift = base - (own_cost - own_price);
+    double beyond;
+    softassign__look_from(s, q, row, base);
     for (; at < end; at++) {
-        if ((double)s->list_value[at] + shift - (fabs((double)s->list_value[at]) + fabs(shift)) * 4e-16 > q->nearest)
-            break; /* sorted */
-        softassign__relax(s, q, row, s->list_slot[at], s->list_cost[at], base, own_cost, own_price);
+        if (softassign__surface(q, (double)s->list_value[at]) > q->nearest) break; /* sorted */
+        softassign__relax(s, q, s->list_slot[at], softassign__listed_cost(s, row, at));
     }
     if (s->list_limit[row] >= (double)SOFTASSIGN__INFINITY) return;
-    beyond = s->list_limit[row] + shift;
-    beyond -= (fabs(s->list_limit[row]) + fabs(shift)) * 4e-16;
+    beyond = softassign__surface(q, s->list_limit[row]);
     if (beyond >= q->nearest) return;
     s->row_distance[row] = beyond < base ? base : beyond;
     softassign__heap_push(s, s->slot_count + row);
@@ -1448,25 +1601,24 @@ static void softassign__relax_list(softassign *s, softassign__search *q, int row
 static void softassign__relax_row(softassign *s, softassign__search *q, int row, double base)
 {
     softassign__scratch *w = &s->scratch[0];
-    double own_cost = q->root_cost, own_price = q->root_price, shift;
-    int j;
-    if (row != q->root) {
-        own_cost = (double)s->cost_of_row[row];
-        own_price = s->price[s->slot_of_row[row]];
-    }
-    shift = base - (own_cost - own_price);
-    softassign__keys(s, row, w);
+    int j, count;
+    softassign__look_from(s, q, row, base);
     s->stats.rows_expanded++;
+    if (softassign__is_sparse(s)) {
+        count = softassign__gather_sparse(s, row, w);
+        for (j = 0; j < count; j++)
+            softassign__relax(s, q, w->candidates[j].slot, softassign__cost(s, row, w->candidates[j].slot));
+        return;
+    }
+    softassign__keys(s, row, w);
     for (j = 0; j < s->slot_count; j++) {
         int known = s->stamp[j] - 4 * s->epoch;
-        double least = (double)w->keys[j] + shift;
-        float cost;
-        least -= (fabs((double)w->keys[j]) + fabs(shift)) * 4e-16;
+        double least = softassign__surface(q, (double)w->keys[j]), cost;
         if (s->capacity[j] == 0 || least > q->nearest || known == SOFTASSIGN__CLOSED) continue;
         if (known == SOFTASSIGN__OPEN && least >= s->distance[j]) continue;
         cost = softassign__cost(s, row, j);
-        if (!s->problem.cost && !s->problem.cost_fn) w->distances++;
-        if (cost < SOFTASSIGN__INFINITY) softassign__relax(s, q, row, j, cost, base, own_cost, own_price);
+        if (s->projected) w->distances++;
+        if (cost < (double)SOFTASSIGN__INFINITY) softassign__relax(s, q, j, cost);
     }
 }
 
@@ -1491,16 +1643,18 @@ static int softassign__augment(softassign *s, int root)
     size_t at = (size_t)root * (size_t)s->list, q_at;
     double least = (double)SOFTASSIGN__INFINITY;
     q.root = root;
+    q.avoided = -1;
+    q.rise = 0;
     q.nearest = (double)SOFTASSIGN__INFINITY;
     softassign__new_epoch(s);
     s->heap_size = 0;
     s->stats.paths++;
     if (softassign__list_least(s, root) > s->list_limit[root]) softassign__relist(s, root);
     for (q_at = at; q_at < at + (size_t)s->list_length[root]; q_at++) {
-        double price = s->price[s->list_slot[q_at]], value = (double)s->list_cost[q_at] - price;
-        if (value < least) {
-            least = value;
-            q.root_cost = (double)s->list_cost[q_at];
+        double price = s->price[s->list_slot[q_at]], cost = softassign__listed_cost(s, root, q_at);
+        if (cost - price < least) {
+            least = cost - price;
+            q.root_cost = cost;
             q.root_price = price;
         }
     }
@@ -1548,25 +1702,19 @@ static void softassign__relax_column(softassign *s, int from, double base, doubl
     int i;
     for (i = 0; i < s->rows; i++) {
         int j = s->slot_of_row[i], known;
-        float cost;
-        double w;
+        double w, cost;
         if (j < 0 || j == from) continue;
         known = s->stamp[j] - 4 * s->epoch;
         if (known == SOFTASSIGN__CLOSED) continue;
         cost = softassign__cost(s, i, from);
-        if (!(cost < SOFTASSIGN__INFINITY)) continue;
-        w = (((double)cost - (double)s->cost_of_row[i]) - (s->price[from] - s->price[j]));
+        if (!(cost < (double)SOFTASSIGN__INFINITY)) continue;
+        w = ((cost - s->cost_of_row[i]) - (s->price[from] - s->price[j]));
         w = base + (w > 0 ? w : 0);
         if (w >= *nearest || (known == SOFTASSIGN__OPEN && w >= s->distance[j])) continue;
-        s->distance[j] = w;
         s->parent[j] = i; /* the row of j that moves to `from` */
         s->parent_cost[j] = cost;
         s->touched[j] = from;
-        if (known == SOFTASSIGN__OPEN) softassign__heap_up(s, s->heap_at[j]);
-        else {
-            s->stamp[j] = 4 * s->epoch + SOFTASSIGN__OPEN;
-            softassign__heap_push(s, j);
-        }
+        softassign__open(s, j, w);
     }
     s->scratch[0].distances += (size_t)s->rows;
     s->stats.work += (size_t)s->rows / 16 + 1;
@@ -1616,34 +1764,49 @@ static void softassign__finish(softassign *s, int slot)
    slots, which are full in every assignment: any v).
    ------------------------------------------------------------------------------------------------ */
 
+#ifdef SAT__SSE2
+/* Four costs of a row as doubles. */
+static inline void softassign__load4(softassign__row r, int j, __m128d *low, __m128d *high)
+{
+    if (r.f) {
+        __m128 four = _mm_loadu_ps(r.f + j);
+        *low = _mm_cvtps_pd(four);
+        *high = _mm_cvtps_pd(_mm_movehl_ps(four, four));
+    } else {
+        *low = _mm_loadu_pd(r.d + j);
+        *high = _mm_loadu_pd(r.d + j + 2);
+    }
+}
+#endif
+
 /* 1 when one of eight values cost - price is below the limit. */
-static inline int softassign__eight_below(const float *cost, const double *price, double limit)
+static inline int softassign__eight_below(softassign__row cost, int j, const double *price, double limit)
 {
 #ifdef SAT__SSE2
-    __m128 c = _mm_loadu_ps(cost), e = _mm_loadu_ps(cost + 4);
-    __m128d top = _mm_set1_pd(limit), a = _mm_sub_pd(_mm_cvtps_pd(c), _mm_loadu_pd(price)),
-            b = _mm_sub_pd(_mm_cvtps_pd(_mm_movehl_ps(c, c)), _mm_loadu_pd(price + 2)),
-            d = _mm_sub_pd(_mm_cvtps_pd(e), _mm_loadu_pd(price + 4)),
-            f = _mm_sub_pd(_mm_cvtps_pd(_mm_movehl_ps(e, e)), _mm_loadu_pd(price + 6));
-    return _mm_movemask_pd(_mm_cmplt_pd(_mm_min_pd(_mm_min_pd(a, b), _mm_min_pd(d, f)), top)) != 0;
+    __m128d a, b, d, f;
+    softassign__load4(cost, j, &a, &b);
+    softassign__load4(cost, j + 4, &d, &f);
+    a = _mm_min_pd(_mm_sub_pd(a, _mm_loadu_pd(price + j)), _mm_sub_pd(b, _mm_loadu_pd(price + j + 2)));
+    d = _mm_min_pd(_mm_sub_pd(d, _mm_loadu_pd(price + j + 4)), _mm_sub_pd(f, _mm_loadu_pd(price + j + 6)));
+    return _mm_movemask_pd(_mm_cmplt_pd(_mm_min_pd(a, d), _mm_set1_pd(limit))) != 0;
 #else
-    int j, below = 0;
-    for (j = 0; j < 8; j++) below |= (double)cost[j] - price[j] < limit;
+    int k, below = 0;
+    for (k = j; k < j + 8; k++) below |= softassign__row_cost(cost, k) - price[k] < limit;
     return below;
 #endif
 }
 
 /* The smallest and the second smallest cost - price of a row; ties go to the smaller index. Returns the index. Few
    eights hold one that is below the second smallest so far. */
-static int softassign__two_smallest(const float *cost, const double *price, int n, double *smallest, double *second)
+static int softassign__two_smallest(softassign__row cost, const double *price, int n, double *smallest, double *second)
 {
     double m1 = (double)SOFTASSIGN__INFINITY, m2 = m1;
     int j = 0, end, best = -1;
     while (j < n) {
-        for (end = j + 8; end <= n && j > 0 && !softassign__eight_below(cost + j, price + j, m2); end += 8) j += 8;
+        for (end = j + 8; end <= n && j > 0 && !softassign__eight_below(cost, j, price, m2); end += 8) j += 8;
         if (end > n) end = n;
         for (; j < end; j++) {
-            double value = (double)cost[j] - price[j];
+            double value = softassign__row_cost(cost, j) - price[j];
             if (value < m1) {
                 m2 = m1;
                 m1 = value;
@@ -1657,14 +1820,14 @@ static int softassign__two_smallest(const float *cost, const double *price, int 
 }
 
 /* The smallest cost - price of a row, which is known to be at most `known`. */
-static double softassign__smallest(const float *cost, const double *price, int n, double known)
+static double softassign__smallest(softassign__row cost, const double *price, int n, double known)
 {
     int j = 0, k;
     for (; j + 8 <= n; j += 8)
-        for (k = softassign__eight_below(cost + j, price + j, known) ? j : j + 8; k < j + 8; k++)
-            if ((double)cost[k] - price[k] < known) known = (double)cost[k] - price[k];
+        for (k = softassign__eight_below(cost, j, price, known) ? j : j + 8; k < j + 8; k++)
+            if (softassign__row_cost(cost, k) - price[k] < known) known = softassign__row_cost(cost, k) - price[k];
     for (; j < n; j++)
-        if ((double)cost[j] - price[j] < known) known = (double)cost[j] - price[j];
+        if (softassign__row_cost(cost, j) - price[j] < known) known = softassign__row_cost(cost, j) - price[j];
     return known;
 }
 
@@ -1675,16 +1838,16 @@ static double softassign__row_bound(softassign *s, int row)
     int stay = s->problem.previous ? s->problem.previous[row] : -1, own = s->slot_of_row[row];
     double least;
     if (s->dense_paths) { /* with the switching bonus, which only lowers it */
-        least = own >= 0 ? (double)s->cost_of_row[row] - s->price[own] : (double)SOFTASSIGN__INFINITY;
+        least = own >= 0 ? s->cost_of_row[row] - s->price[own] : (double)SOFTASSIGN__INFINITY;
         return softassign__smallest(softassign__matrix_row(s, row), s->price, s->columns, least);
     }
-    if (s->phase == SOFTASSIGN__DONE && own >= 0 && s->list_limit[row] < (double)s->cost_of_row[row] - s->price[own])
+    if (s->phase == SOFTASSIGN__DONE && own >= 0 && s->list_limit[row] < s->cost_of_row[row] - s->price[own])
         softassign__relist(s, row);
     least = s->list_limit[row];
     for (end = at + (size_t)s->list_length[row]; at < end; at++) {
         int slot = s->list_slot[at];
-        double cost = (double)s->list_cost[at], value;
-        if (!s->proving && softassign__column(s, slot) == stay) cost = (double)softassign__pair(&s->problem, row, stay);
+        double cost = softassign__listed_cost(s, row, at), value;
+        if (!s->proving && softassign__column(s, slot) == stay) cost = softassign__pair(&s->problem, row, stay);
         value = cost - s->price[slot];
         if (value < least) least = value;
     }
@@ -1702,8 +1865,8 @@ static void softassign__certify(softassign *s)
         if (!s->raised[j] || s->capacity[j] == 0 || s->dense_paths) continue;
         s->scratch[0].distances += (size_t)s->rows;
         for (i = 0; i < s->rows; i++) {
-            double value = (double)(s->proving ? softassign__cost(s, i, j)
-                                               : softassign__pair(&s->problem, i, softassign__column(s, j))) -
+            double value = (s->proving ? softassign__cost(s, i, j)
+                                       : softassign__pair(&s->problem, i, softassign__column(s, j))) -
                            s->price[j];
             if (value < least[i]) least[i] = value;
         }
@@ -1730,7 +1893,7 @@ static int softassign__best_two(softassign *s, int row, double *best, double *se
         for (entry = -1, end = at + (size_t)s->list_length[row]; at < end; at++) {
             double value;
             if ((double)s->list_value[at] >= m2) break; /* sorted, and values only rise */
-            value = (double)s->list_cost[at] - s->price[s->list_slot[at]];
+            value = softassign__listed_cost(s, row, at) - s->price[s->list_slot[at]];
             if (value < m1) {
                 m2 = m1;
                 m1 = value;
@@ -1776,7 +1939,7 @@ static int softassign__auction(softassign *s, double eps, size_t budget)
             softassign__unassign(s, out);
             stack[size++] = out;
         }
-        softassign__assign(s, row, slot, s->list_cost[at]);
+        softassign__assign(s, row, slot, softassign__listed_cost(s, row, at));
         s->bid[row] = s->price[slot] - (second - best) - eps;
         if (!softassign__is_free(s, slot))
             softassign__set_price(s, slot, s->bid[softassign__cheapest_place(s, slot)]);
@@ -1794,7 +1957,7 @@ static int softassign__auction(softassign *s, double eps, size_t budget)
 
 /* One row that a path has reached, and the slots it is compared with. */
 typedef struct softassign__dense_step {
-    const float *cost;
+    softassign__row cost;
     double base, own_cost, own_price; /* distance, cost and price of the row's own slot */
     const double *price;              /* of open slots */
     double *distance, *block;         /* block: the smallest distance of SOFTASSIGN__STEP slots */
@@ -1812,35 +1975,42 @@ static void softassign__dense_swap(softassign *s, int row, int slot)
     if (out >= 0) s->slot_of_row[out] = -1;
 }
 
+/* The least cost of every column goes to price, the row that has it to from. */
+static void softassign__least_of_columns(softassign *s, int *from)
+{
+    int n = s->columns, i, j;
+    float *least = s->column_sum; /* of floats: half the memory to go through */
+    for (j = 0; j < n; j++) {
+        s->price[j] = (double)(least[j] = SOFTASSIGN__INFINITY);
+        from[j] = -1;
+    }
+    for (i = 0; i < n; i++) {
+        softassign__row cost = softassign__matrix_row(s, i);
+        for (j = 0; j < n; j++) {
+#ifdef SAT__SSE2
+            for (; cost.f && j + 4 <= n; j += 4)
+                if (_mm_movemask_ps(_mm_cmplt_ps(_mm_loadu_ps(cost.f + j), _mm_loadu_ps(least + j)))) break;
+            if (j >= n) break;
+#endif
+            if (!(softassign__row_cost(cost, j) < s->price[j])) continue;
+            s->price[j] = softassign__row_cost(cost, j);
+            least[j] = (float)s->price[j];
+            from[j] = i;
+        }
+    }
+    for (j = 0; j < n; j++)
+        if (from[j] < 0) s->price[j] = 0;
+}
+
 /* Every column is used in a square problem, so its price may have any sign: it starts at the least cost, and the row of
    that cost takes it; a row that got just one pays down to its second best (Jonker and Volgenant 1987). */
 static void softassign__reduce_columns(softassign *s)
 {
     int n = s->columns, i, j, *from = s->parent, *times = s->holders;
-    float *least = s->parent_cost;
-    for (j = 0; j < n; j++) {
-        least[j] = SOFTASSIGN__INFINITY;
-        from[j] = -1;
-        times[j] = 0;
-    }
-    for (i = 0; i < n; i++) {
-        const float *cost = softassign__matrix_row(s, i);
-        for (j = 0; j < n; j++) {
-#ifdef SAT__SSE2
-            for (; j + 4 <= n; j += 4)
-                if (_mm_movemask_ps(_mm_cmplt_ps(_mm_loadu_ps(cost + j), _mm_loadu_ps(least + j)))) break;
-            if (j >= n) break;
-#endif
-            if (!(cost[j] < least[j])) continue;
-            least[j] = cost[j];
-            from[j] = i;
-        }
-    }
-    for (j = n - 1; j >= 0; j--) {
-        s->price[j] = from[j] < 0 ? 0 : (double)least[j];
-        if (from[j] < 0) continue;
-        if (!times[from[j]]++) softassign__dense_swap(s, from[j], j);
-    }
+    softassign__least_of_columns(s, from);
+    for (i = 0; i < n; i++) times[i] = 0;
+    for (j = n - 1; j >= 0; j--)
+        if (from[j] >= 0 && !times[from[j]]++) softassign__dense_swap(s, from[j], j);
     for (i = 0; i < n; i++) {
         double m1, m2;
         if (times[i] != 1) continue;
@@ -1855,11 +2025,11 @@ static int softassign__reduce_rows(softassign *s, int *rows, int count)
     int next = 0, left = 0, j, budget = 8 * count + 64;
     while (next < count) {
         int row = rows[next++], best, other = -1, out;
-        const float *cost = softassign__matrix_row(s, row);
+        softassign__row cost = softassign__matrix_row(s, row);
         double m1, m2;
         best = softassign__two_smallest(cost, s->price, s->slot_count, &m1, &m2);
         for (j = 0; m2 <= m1 && other < 0 && j < s->slot_count; j++) /* a tie: another slot of that value */
-            if (j != best && (double)cost[j] - s->price[j] <= m1) other = j;
+            if (j != best && softassign__row_cost(cost, j) - s->price[j] <= m1) other = j;
         if (best < 0) {
             rows[left++] = row;
             continue;
@@ -1910,13 +2080,12 @@ static int softassign__relax_slots(const softassign__dense_step *q, int begin, i
     __m128d c0 = _mm_set1_pd(q->own_cost), p0 = _mm_set1_pd(q->own_price), from = _mm_set1_pd(q->base);
     __m128i row = _mm_set1_epi32(q->row);
     for (; j + 4 <= end; j += 4) {
-        __m128 four = _mm_loadu_ps(q->cost + j);
-        __m128d x = _mm_sub_pd(_mm_cvtps_pd(four), c0), y = _mm_sub_pd(_mm_cvtps_pd(_mm_movehl_ps(four, four)), c0);
-        __m128d d = _mm_loadu_pd(q->distance + j), e = _mm_loadu_pd(q->distance + j + 2), lower, lower2;
+        __m128d x, y, d = _mm_loadu_pd(q->distance + j), e = _mm_loadu_pd(q->distance + j + 2), lower, lower2;
         __m128i less, old;
         int near_base, k;
-        x = _mm_add_pd(from, _mm_sub_pd(x, _mm_sub_pd(_mm_loadu_pd(q->price + j), p0)));
-        y = _mm_add_pd(from, _mm_sub_pd(y, _mm_sub_pd(_mm_loadu_pd(q->price + j + 2), p0)));
+        softassign__load4(q->cost, j, &x, &y);
+        x = _mm_add_pd(from, _mm_sub_pd(_mm_sub_pd(x, c0), _mm_sub_pd(_mm_loadu_pd(q->price + j), p0)));
+        y = _mm_add_pd(from, _mm_sub_pd(_mm_sub_pd(y, c0), _mm_sub_pd(_mm_loadu_pd(q->price + j + 2), p0)));
         lower = _mm_cmplt_pd(x, d);
         lower2 = _mm_cmplt_pd(y, e);
         if (!_mm_movemask_pd(_mm_or_pd(lower, lower2))) continue;
@@ -1934,7 +2103,7 @@ static int softassign__relax_slots(const softassign__dense_step *q, int begin, i
     }
 #endif
     for (; j < end; j++) {
-        double w = q->base + (((double)q->cost[j] - q->own_cost) - (q->price[j] - q->own_price));
+        double w = q->base + ((softassign__row_cost(q->cost, j) - q->own_cost) - (q->price[j] - q->own_price));
         if (!(w < q->distance[j])) continue;
         *changed = 1;
         q->distance[j] = w;
@@ -1992,7 +2161,7 @@ static int softassign__augment_dense(softassign *s, int root)
     memcpy(open_price, s->price, (size_t)s->slot_count * sizeof *open_price);
     q.row = root;
     q.base = 0;
-    q.own_cost = (double)q.cost[end];
+    q.own_cost = softassign__row_cost(q.cost, end);
     q.own_price = s->price[end];
     q.price = open_price;
     q.distance = d;
@@ -2011,7 +2180,7 @@ static int softassign__augment_dense(softassign *s, int root)
         s->closed_distance[closed++] = q.base;
         softassign__close_dense(&q, open_price, end, s->slot_count);
         q.cost = softassign__matrix_row(s, q.row);
-        q.own_cost = (double)q.cost[end];
+        q.own_cost = softassign__row_cost(q.cost, end);
         q.own_price = s->price[end];
     }
     for (k = 0; k < closed; k++) s->price[s->closed[k]] += s->closed_distance[k] - q.base;
@@ -2138,12 +2307,12 @@ static softassign__fixed softassign__fixed_value(const softassign *s, double cos
 /* The row's own slot is not its best one. */
 static int softassign__is_dissatisfied(const softassign *s, int row)
 {
-    softassign__fixed own = softassign__fixed_value(s, (double)s->cost_of_row[row], s->slot_of_row[row]), other;
+    softassign__fixed own = softassign__fixed_value(s, s->cost_of_row[row], s->slot_of_row[row]), other;
     int j;
     for (j = 0; j < s->slot_count; j++) {
-        float cost;
-        if (s->capacity[j] == 0 || !((cost = softassign__cost(s, row, j)) < SOFTASSIGN__INFINITY)) continue;
-        other = softassign__fixed_value(s, (double)cost, j);
+        double cost;
+        if (s->capacity[j] == 0 || !((cost = softassign__cost(s, row, j)) < (double)SOFTASSIGN__INFINITY)) continue;
+        other = softassign__fixed_value(s, cost, j);
         if (softassign__fixed_less(&other, &own)) return 1;
     }
     return 0;
@@ -2183,17 +2352,17 @@ static void softassign__relax_exact(softassign *s, int row, const softassign__fi
     int j, slot = s->slot_of_row[row];
     softassign__fixed shift = *base;
     if (slot >= 0) {
-        softassign__fixed own = softassign__fixed_value(s, (double)s->cost_of_row[row], slot);
+        softassign__fixed own = softassign__fixed_value(s, s->cost_of_row[row], slot);
         shift = softassign__fixed_difference(base, &own);
     }
     for (j = 0; j < s->slot_count; j++) {
         int known = s->stamp[j] - 4 * s->epoch;
         softassign__fixed w;
-        float cost;
+        double cost;
         if (s->capacity[j] == 0 || known == SOFTASSIGN__CLOSED ||
-            !((cost = softassign__cost(s, row, j)) < SOFTASSIGN__INFINITY))
+            !((cost = softassign__cost(s, row, j)) < (double)SOFTASSIGN__INFINITY))
             continue;
-        w = softassign__fixed_value(s, (double)cost, j);
+        w = softassign__fixed_value(s, cost, j);
         w = softassign__fixed_sum(&w, &shift);
         if (known == SOFTASSIGN__OPEN && !softassign__fixed_less(&w, &s->exact_distance[j])) continue;
         s->exact_distance[j] = w;
@@ -2293,13 +2462,12 @@ static double softassign__difference(double a, double b, double c, double d, dou
 /* How far the row's own slot is from its best, from all costs. */
 static double softassign__row_excess(const softassign *s, int row)
 {
-    double own_cost = (double)s->cost_of_row[row], own_price = s->price[s->slot_of_row[row]], least = 0;
+    double own_cost = s->cost_of_row[row], own_price = s->price[s->slot_of_row[row]], least = 0;
     int j;
     for (j = 0; j < s->slot_count; j++) {
-        float cost;
-        double w, error;
-        if (s->capacity[j] == 0 || !((cost = softassign__cost(s, row, j)) < SOFTASSIGN__INFINITY)) continue;
-        w = softassign__difference((double)cost, own_cost, s->price[j], own_price, &error);
+        double w, error, cost;
+        if (s->capacity[j] == 0 || !((cost = softassign__cost(s, row, j)) < (double)SOFTASSIGN__INFINITY)) continue;
+        w = softassign__difference(cost, own_cost, s->price[j], own_price, &error);
         if (j != s->slot_of_row[row] && w - error < least) least = w - error;
     }
     return -least;
@@ -2315,8 +2483,8 @@ static int softassign__prove(softassign *s)
     softassign__certify(s);
     s->proving = 0;
     for (i = 0; i < s->rows; i++) {
-        double own = (double)s->cost_of_row[i] - s->price[s->slot_of_row[i]], over = own - least[i];
-        used += fabs((double)s->cost_of_row[i]);
+        double own = s->cost_of_row[i] - s->price[s->slot_of_row[i]], over = own - least[i];
+        used += fabs(s->cost_of_row[i]);
         least[i] = (over > 0 ? over : 0) + 4.5e-16 * (fabs(own) + fabs(least[i]));
         quick += least[i];
     }
@@ -2543,11 +2711,12 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     size_t shared = seats * (sizeof(softassign__fixed) / sizeof(float));
     int workers = sat__worker_count(&s->options.threads), w;
     if (s->dense && !s->in_place && !sat__multiply_size(&cells, rows, (size_t)s->columns)) a->overflow = 1;
-    s->matrix = (float *)sat__carve(a, cells, sizeof(float));
+    s->wide_matrix = (double *)sat__carve(a, cells, s->wide ? sizeof(double) : sizeof(float));
+    s->matrix = (float *)(void *)s->wide_matrix;
     s->price = (double *)sat__carve(a, seats, sizeof(double));
     s->top = (double *)sat__carve(a, seats, sizeof(double));
     s->distance = (double *)sat__carve(a, seats > 2 * (size_t)workers ? seats : 2 * (size_t)workers, sizeof(double));
-    s->row_distance = (double *)sat__carve(a, rows, sizeof(double));
+    s->row_largest = s->row_distance = (double *)sat__carve(a, rows, sizeof(double));
     s->bid = (double *)sat__carve(a, rows, sizeof(double));
     s->dense_price = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
     s->closed_distance =
@@ -2557,13 +2726,13 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->price_f = (float *)sat__carve(a, padded, sizeof(float));
     s->coarse = (float *)sat__carve(a, padded * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
     s->row_coarse = (float *)sat__carve(a, rows * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
-    s->cost_of_row = (float *)sat__carve(a, rows, sizeof(float));
+    s->cost_of_row = (double *)sat__carve(a, rows, sizeof(double));
     s->exact_price = (softassign__fixed *)sat__carve(a, list > shared ? list : shared,
                                                      sizeof(float)); /* the repair needs no lists */
     s->exact_distance = (softassign__fixed *)sat__carve(a, list > shared ? list : shared, sizeof(float));
     s->list_cost = (float *)(void *)s->exact_price;
     s->pheromone = s->list_value = (float *)(void *)s->exact_distance;
-    s->parent_cost = (float *)sat__carve(a, seats, sizeof(float));
+    s->parent_cost = (double *)sat__carve(a, seats, sizeof(double));
     s->column_sum = (float *)sat__carve(a, seats, sizeof(float));
     s->soft_row = (float *)sat__carve(a, padded, sizeof(float));
     s->slot_column = (int *)sat__carve(a, seats, sizeof(int));
@@ -2612,14 +2781,14 @@ static int softassign__progress(softassign *s, const int *seats);
 #if !defined(SOFTASSIGN_NO_HEURISTICS) || !defined(SOFTASSIGN_NO_MATRIX)
 
 /* The nearest slot with room, through lists that see full slots as infinitely dear. */
-static int softassign__nearest_free(softassign *s, int row, float *cost)
+static int softassign__nearest_free(softassign *s, int row, double *cost)
 {
     size_t at = (size_t)row * (size_t)s->list;
     int again, q;
     for (again = 0; again < 2; again++) {
         for (q = 0; q < s->list_length[row]; q++)
             if (softassign__is_free(s, s->list_slot[at + (size_t)q])) {
-                *cost = s->list_cost[at + (size_t)q];
+                *cost = softassign__listed_cost(s, row, at + (size_t)q);
                 return s->list_slot[at + (size_t)q];
             }
         if (!again) softassign__relist(s, row);
@@ -2629,7 +2798,7 @@ static int softassign__nearest_free(softassign *s, int row, float *cost)
 
 #define SOFTASSIGN__FULL_PRICE (-1e37)
 
-static void softassign__greedy_take(softassign *s, int row, int slot, float cost)
+static void softassign__greedy_take(softassign *s, int row, int slot, double cost)
 {
     softassign__assign(s, row, slot, cost);
     if (!softassign__is_free(s, slot)) softassign__set_price(s, slot, SOFTASSIGN__FULL_PRICE);
@@ -2651,9 +2820,9 @@ static int softassign__greedy(softassign *s)
     }
     for (i = s->rows - 1; i >= 0; i--) /* the last ones in order keep it */
         if (best[i] >= 0 && s->used[best[i]] < s->capacity[best[i]] )
-            softassign__greedy_take(s, i, best[i], s->list_cost[(size_t)i * (size_t)s->list]);
+            softassign__greedy_take(s, i, best[i], softassign__listed_cost(s, i, (size_t)i * (size_t)s->list));
     for (i = 0; i < s->rows; i++) {
-        float cost = 0;
+        double cost = 0;
         if (s->slot_of_row[i] >= 0) continue;
         j = softassign__nearest_free(s, i, &cost);
         if (j >= 0) softassign__greedy_take(s, i, j, cost);
@@ -2666,15 +2835,14 @@ static int softassign__greedy(softassign *s)
 #endif /* SOFTASSIGN_NO_HEURISTICS */
 
 /* What changes when `row` goes to `slot`: into a place, or in exchange with the row that gains most by it. */
-static double softassign__move_gain(softassign *s, int row, int slot, float cost, int *partner, float *partner_cost)
+static double softassign__move_gain(softassign *s, int row, int slot, double cost, int *partner, double *partner_cost)
 {
-    double own = (double)cost - (double)s->cost_of_row[row], best = (double)SOFTASSIGN__INFINITY;
+    double own = cost - s->cost_of_row[row], best = (double)SOFTASSIGN__INFINITY;
     int k, from = s->slot_of_row[row];
     *partner = -1;
     if (softassign__is_free(s, slot)) return own;
     for (k = s->first_row[slot]; k >= 0; k = s->next_row[k]) {
-        float back = softassign__cost(s, k, from);
-        double change = own + ((double)back - (double)s->cost_of_row[k]);
+        double back = softassign__cost(s, k, from), change = own + (back - s->cost_of_row[k]);
         s->scratch[0].distances++;
         if (!(change < best)) continue;
         best = change;
@@ -2684,7 +2852,7 @@ static double softassign__move_gain(softassign *s, int row, int slot, float cost
     return best;
 }
 
-static void softassign__move(softassign *s, int row, int slot, float cost, int partner, float partner_cost)
+static void softassign__move(softassign *s, int row, int slot, double cost, int partner, double partner_cost)
 {
     int from = s->slot_of_row[row];
     if (partner >= 0) softassign__unassign(s, partner);
@@ -2717,15 +2885,13 @@ static int softassign__conflicts(const softassign *s, int row, int slot, int wit
 static int softassign__improve_row(softassign *s, int row)
 {
     softassign__scratch *w = &s->scratch[0];
-    double best = -1e-9 * fabs((double)s->cost_of_row[row]);
+    double best = -1e-9 * fabs(s->cost_of_row[row]), to_cost = 0, partner_cost = 0;
     int j, to = -1, partner = -1;
-    float to_cost = 0, partner_cost = 0;
     softassign__keys(s, row, w);
     for (j = 0; j < s->slot_count; j++) {
-        float cost, back = 0;
+        double cost, back = 0, gain;
         int other;
-        double gain;
-        if (!(w->keys[j] < s->cost_of_row[row]) || s->capacity[j] == 0 || j == s->slot_of_row[row]) continue;
+        if (!((double)w->keys[j] < s->cost_of_row[row]) || s->capacity[j] == 0 || j == s->slot_of_row[row]) continue;
         cost = softassign__cost(s, row, j);
         w->distances++;
         if (!(cost < s->cost_of_row[row])) continue;
@@ -2784,7 +2950,7 @@ static double softassign__cost_now(const softassign *s)
 {
     softassign__sum sum = {0, 0, 0};
     int i;
-    for (i = 0; i < s->rows; i++) softassign__add(&sum, (double)s->cost_of_row[i]);
+    for (i = 0; i < s->rows; i++) softassign__add(&sum, s->cost_of_row[i]);
     return softassign__total(&sum);
 }
 
@@ -2799,13 +2965,12 @@ static void softassign__anneal(softassign *s, int *best)
         for (n = 0; n < count; n++) {
             int row = (int)(softassign__uniform(&seed) * s->rows),
                 slot = (int)(softassign__uniform(&seed) * s->slot_count), other;
-            float here, back = 0;
-            double change;
+            double here, back = 0, change;
             s->stats.iterations++;
             if (slot == s->slot_of_row[row] || s->capacity[slot] == 0) continue;
             here = softassign__cost(s, row, slot);
             s->scratch[0].distances++;
-            if (!(here < SOFTASSIGN__INFINITY)) continue;
+            if (!(here < (double)SOFTASSIGN__INFINITY)) continue;
             change = softassign__move_gain(s, row, slot, here, &other, &back);
             if (!(change < (double)SOFTASSIGN__INFINITY)) continue;
             if (change > 0 && !(softassign__uniform(&seed) < exp(-change / temperature))) continue;
@@ -2829,7 +2994,7 @@ static void softassign__anneal(softassign *s, int *best)
    Pheromone lies on the lists; a row whose list is used up takes the best of some random free slots.
    ------------------------------------------------------------------------------------------------ */
 
-static int softassign__ant_choice(softassign *s, int row, uint64_t *seed, float *cost)
+static int softassign__ant_choice(softassign *s, int row, uint64_t *seed, double *cost)
 {
     size_t at = (size_t)row * (size_t)s->list;
     float *weight = s->soft_row, sum = 0, nearest = s->list_length[row] ? s->list_cost[at] : 0, near_scale;
@@ -2850,13 +3015,13 @@ static int softassign__ant_choice(softassign *s, int row, uint64_t *seed, float 
     for (q = 0; q <= last; q++) {
         draw -= (double)weight[q];
         if (weight[q] > 0 && (draw < 0 || q == last)) {
-            *cost = s->list_cost[at + (size_t)q];
+            *cost = softassign__listed_cost(s, row, at + (size_t)q);
             return s->list_slot[at + (size_t)q];
         }
     }
     for (tries = 0; tries < 64 || slot < 0; tries++) {
         int j = (int)(softassign__uniform(seed) * s->slot_count), n;
-        float c;
+        double c;
         for (n = 0; n < s->slot_count && !softassign__is_free(s, j); n++) j = j + 1 < s->slot_count ? j + 1 : 0;
         c = softassign__cost(s, row, j);
         s->scratch[0].distances++;
@@ -2874,7 +3039,7 @@ static double softassign__ant(softassign *s, uint64_t *seed, int *order)
     for (i = 0; i < s->rows; i++) softassign__unassign(s, i);
     for (i = s->rows - 1; i >= 0; i--) {
         int k = (int)(softassign__uniform(seed) * (i + 1)), row = order[k], slot;
-        float cost = 0;
+        double cost = 0;
         order[k] = order[i];
         order[i] = row;
         slot = softassign__ant_choice(s, row, seed, &cost);
@@ -2903,7 +3068,7 @@ static void softassign__add_noise(softassign *s, int *shown, int count, uint64_t
     for (n = 0; n < count; n++) {
         i = (int)(softassign__uniform(seed) * s->rows);
         j = (int)(softassign__uniform(seed) * s->slot_count);
-        if (s->holders[j] >= s->capacity[j] || !(softassign__cost(s, i, j) < SOFTASSIGN__INFINITY)) continue;
+        if (s->holders[j] >= s->capacity[j] || !(softassign__cost(s, i, j) < (double)SOFTASSIGN__INFINITY)) continue;
         s->holders[shown[i]]--;
         s->holders[j]++;
         shown[i] = j;
@@ -3273,7 +3438,7 @@ static int softassign__extract(softassign *s, const int *wanted)
         else if (j >= 0) s->stats.duplicate_rows++;
     }
     for (i = 0; i < s->rows; i++) {
-        float cost = 0;
+        double cost = 0;
         if (s->slot_of_row[i] >= 0) continue;
         j = softassign__nearest_free(s, i, &cost);
         if (j >= 0) softassign__greedy_take(s, i, j, cost);
@@ -3297,7 +3462,7 @@ static void softassign__report_slots(softassign *s, const int *seats)
     s->stats.switched = 0;
     for (i = 0; i < s->rows; i++) {
         int column = softassign__column(s, seats[i]);
-        softassign__add(&cost, (double)softassign__pair(&s->problem, i, column));
+        softassign__add(&cost, softassign__pair(&s->problem, i, column));
         s->stats.switched += s->problem.previous && s->problem.previous[i] >= 0 && s->problem.previous[i] != column;
     }
     s->stats.cost = softassign__total(&cost);
@@ -3318,7 +3483,7 @@ static void softassign__report_slots(softassign *s, const int *seats)
 static inline int softassign__shown_column(const softassign *s, int slot)
 {
     int column = softassign__column(s, slot);
-    return s->problem.unassigned_cost > 0 && column == s->columns - 1 ? -1 : column;
+    return column < s->problem.columns ? column : -1;
 }
 
 /* The stats for the caller: gains where the negative costs were minimised. */
@@ -3337,15 +3502,83 @@ static void softassign__tell_prices(const softassign *s)
 {
     const softassign_options *o = &s->options;
     double sign = s->problem.maximise ? -1 : 1;
-    int i, j, columns = s->columns - (s->problem.unassigned_cost > 0),
-              nobody = columns < s->columns && s->used[columns] == s->rows;
-    if (s->stats.complete && (o->row_price || o->column_price) && s->slot_count == s->columns) {
+    int i, j, columns = s->problem.columns, nobody = columns < s->columns && s->used[columns] == s->rows;
+    {
         for (j = 0; o->column_price && j < columns; j++) o->column_price[j] = nobody ? 0 : sign * s->price[j];
         for (i = 0; o->row_price && i < s->rows; i++) {
             int slot = s->slot_of_row[i];
-            o->row_price[i] = sign * ((double)s->cost_of_row[i] - (nobody ? 0 : s->price[slot]));
+            o->row_price[i] = sign * (s->cost_of_row[i] - (nobody ? 0 : s->price[slot]));
         }
     }
+}
+
+/* One free slot surfaced at `base`: a row may end there, and another in its stead leave any slot, which then rises to
+   its top price. */
+static void softassign__open_used(softassign *s, const softassign__search *q, double base)
+{
+    int j;
+    for (j = 0; j < s->slot_count; j++) {
+        int known = s->stamp[j] - 4 * s->epoch;
+        double w = base + (s->top[j] - s->price[j]);
+        if (s->used[j] == 0 || j == q->avoided || known == SOFTASSIGN__CLOSED || w >= q->nearest ||
+            (known == SOFTASSIGN__OPEN && w >= s->distance[j]))
+            continue;
+        softassign__open(s, j, w);
+    }
+}
+
+/* What the best assignment without a row's pair costs more: the shortest circle through the pair, over rows that change
+   their slots, and once over a free slot and one that becomes free. */
+static double softassign__margin(softassign *s, int root)
+{
+    softassign__search q;
+    int i, ended = 0;
+    q.root = root;
+    q.avoided = s->slot_of_row[root];
+    q.root_cost = s->cost_of_row[root];
+    q.root_price = s->price[q.avoided];
+    q.rise = s->top[q.avoided] - q.root_price;
+    q.nearest = (double)SOFTASSIGN__INFINITY;
+    softassign__new_epoch(s);
+    s->heap_size = 0;
+    softassign__relax_list(s, &q, root, 0);
+    while (s->heap_size > 0) {
+        int node = softassign__heap_pop(s);
+        double base = softassign__node_key(s, node);
+        if (base >= q.nearest) break;
+        if (node >= s->slot_count) {
+            softassign__open_list(s, &q, node - s->slot_count);
+            continue;
+        }
+        s->stamp[node] = 4 * s->epoch + SOFTASSIGN__CLOSED;
+        if (softassign__is_free(s, node) && !ended) {
+            ended = 1;
+            softassign__open_used(s, &q, base);
+        }
+        for (i = s->first_row[node]; i >= 0; i = s->next_row[i]) softassign__relax_list(s, &q, i, base);
+    }
+    return q.nearest;
+}
+
+static void softassign__tell_margins(softassign *s)
+{
+    int i, j, stale = s->dense_paths || s->stats.exact_repair;
+    size_t paths = s->stats.paths;
+    for (j = 0; j < s->slot_count; j++) stale |= s->raised[j];
+    for (i = 0; stale && i < s->rows; i++) { /* prices rose: lists are made anew as they are met */
+        s->list_length[i] = 0;
+        s->list_limit[i] = -(double)SOFTASSIGN__INFINITY;
+    }
+    for (i = 0; i < s->rows; i++) s->options.row_margin[i] = softassign__margin(s, i);
+    s->stats.paths = paths;
+}
+
+/* What options ask for beside the assignment, once it is the optimum. */
+static void softassign__tell(softassign *s)
+{
+    if (!s->stats.complete || s->slot_count != s->columns) return;
+    softassign__tell_prices(s);
+    if (s->options.row_margin) softassign__tell_margins(s);
 }
 
 /* 1 when the caller wants to stop. slots: NULL while there is no assignment to show. */
@@ -3376,7 +3609,7 @@ static int softassign__fill(softassign *s, int *seats)
         }
         while (next < s->slot_count && used[next] >= s->capacity[next]) next++;
         for (j = next; j < s->slot_count && seats[i] < 0; j++)
-            if (used[j] < s->capacity[j] && softassign__cost(s, i, j) < SOFTASSIGN__INFINITY) seats[i] = j;
+            if (used[j] < s->capacity[j] && softassign__cost(s, i, j) < (double)SOFTASSIGN__INFINITY) seats[i] = j;
         if (seats[i] < 0) return 0;
         used[seats[i]]++;
     }
@@ -3390,10 +3623,10 @@ static int softassign__fill(softassign *s, int *seats)
 
 /* What is wrong with a row of costs; also the copy into the matrix. Costs that are finite and small enough pass a
    comparison of exponents; only a row with others is looked at more closely. */
-static sat_result softassign__check_cost(float cost)
+static sat_result softassign__check_cost(double cost)
 {
-    if (sat__is_nan(cost) || cost < -3.4e38f) return SAT_ERR_NON_FINITE;
-    return sat__is_finite(cost) && fabsf(cost) > SOFTASSIGN__LARGEST_COST ? SAT_ERR_ARGUMENT : SAT_OK;
+    if (!sat__is_finite_double(cost)) return cost > 0 ? SAT_OK : SAT_ERR_NON_FINITE; /* NaN is not above 0 */
+    return fabs(cost) > (double)SOFTASSIGN__LARGEST_COST ? SAT_ERR_ARGUMENT : SAT_OK;
 }
 
 /* The largest |cost| as bits, in whose order infinities and NaN are above all numbers. */
@@ -3418,33 +3651,65 @@ static uint32_t softassign__largest_bits(const float *cost, int n)
     return largest;
 }
 
+/* Into the copy of the matrix, or nowhere. */
+static inline void softassign__store(softassign *s, int row, int column, double cost)
+{
+    size_t at = (size_t)row * (size_t)s->columns + (size_t)column;
+    if (!s->dense || s->in_place) return;
+    if (s->wide) s->wide_matrix[at] = cost;
+    else s->matrix[at] = (float)cost;
+}
+
+static inline void softassign__check_one(softassign *s, int row, double cost, sat_result *result)
+{
+    sat_result found = softassign__check_cost(cost);
+    if (found != SAT_OK && *result != SAT_ERR_NON_FINITE) *result = found;
+    if (fabs(cost) > s->row_largest[row] && fabs(cost) < (double)SOFTASSIGN__INFINITY) s->row_largest[row] = fabs(cost);
+}
+
+/* Checks what stands in a row, and copies it. */
+static sat_result softassign__check_row(softassign *s, int row)
+{
+    const softassign_problem *p = &s->problem;
+    sat_result result = SAT_OK;
+    int j, k, plain = p->cost && !p->row_start && !p->maximise;
+    const float *floats = plain ? p->cost + softassign__element(p, row, 0) : NULL;
+    if (plain && softassign__largest_bits(floats, p->columns) <= 0x7149f2cau) { /* 1e30 */
+        if (s->dense && !s->in_place)
+            memcpy(s->matrix + (size_t)row * (size_t)s->columns, floats, (size_t)p->columns * sizeof(float));
+    } else if (p->row_start) {
+        for (j = 0; s->dense && j < p->columns; j++) softassign__store(s, row, j, (double)SOFTASSIGN__INFINITY);
+        for (k = p->row_start[row]; k < p->row_start[row + 1]; k++) {
+            double cost = softassign__value(p, k);
+            softassign__check_one(s, row, cost, &result);
+            softassign__store(s, row, p->column_index[k], cost);
+        }
+    } else {
+        for (j = 0; j < p->columns; j++) {
+            double cost = softassign__pair(p, row, j);
+            softassign__check_one(s, row, cost, &result);
+            softassign__store(s, row, j, cost);
+        }
+    }
+    if (s->columns > p->columns) softassign__store(s, row, p->columns, softassign__pair(p, row, p->columns));
+    return result;
+}
+
 static void softassign__check_range(int begin, int end, int worker, void *context)
 {
     softassign *s = (softassign *)context;
-    const softassign_problem *p = &s->problem;
-    int i, j;
+    int i;
     (void)worker;
     for (i = begin; i < end; i++) {
-        float *copy = s->dense && !s->in_place ? s->matrix + (size_t)i * (size_t)s->columns : NULL;
-        uint32_t largest = 0;
-        int *wrong = &s->row_result[i], stay = p->previous ? p->previous[i] : -1;
-        *wrong = SAT_OK;
-        if (p->cost) {
-            const float *cost = softassign__cost_row(p, i);
-            largest = softassign__largest_bits(cost, s->columns);
-            if (copy) memcpy(copy, cost, (size_t)s->columns * sizeof(float));
-        }
-        for (j = 0; !p->cost && j < s->columns; j++) {
-            float cost = softassign__pair(p, i, j);
-            uint32_t size = sat__float_bits(cost) & 0x7fffffffu;
-            largest = size > largest ? size : largest;
-            if (copy) copy[j] = cost;
-        }
-        if (copy && stay >= 0) copy[stay] -= s->bonus;
-        for (j = 0; largest > 0x7149f2cau && j < s->columns && *wrong != SAT_ERR_NON_FINITE; j++) { /* 1e30 */
-            sat_result found = softassign__check_cost(softassign__pair(p, i, j));
-            if (found != SAT_OK) *wrong = (int)found;
-        }
+        int stay = s->problem.previous ? s->problem.previous[i] : -1;
+        size_t at = (size_t)i * (size_t)s->columns + (size_t)stay;
+        sat_result result;
+        s->row_largest[i] = 0;
+        result = softassign__check_row(s, i);
+        s->row_result[i] = (int)result;
+        if (stay < 0 || !s->dense || s->in_place) continue;
+        if (s->wide) s->wide_matrix[at] -= (double)s->bonus;
+        else s->matrix[at] -= s->bonus;
     }
 }
 
@@ -3458,13 +3723,13 @@ static sat_result softassign__check_costs(softassign *s)
     const softassign_problem *p = &s->problem;
     size_t k, n = (size_t)p->feature_count;
     sat_result result;
-    int i, from_features = !p->cost && !p->cost_fn;
+    int i, from_features = softassign__is_features(p);
     for (k = 0; from_features && k < n * (size_t)s->rows; k++)
         if ((result = softassign__check_feature(p->row_features[k])) != SAT_OK) {
             s->stats.row_error = (int)(k / n);
             return result;
         }
-    for (k = 0; from_features && k < n * (size_t)s->columns; k++)
+    for (k = 0; from_features && k < n * (size_t)p->columns; k++)
         if ((result = softassign__check_feature(p->column_features[k])) != SAT_OK) {
             s->stats.row_error = 0; /* every row meets it */
             s->stats.column_error = (int)(k / n);
@@ -3472,7 +3737,7 @@ static sat_result softassign__check_costs(softassign *s)
         }
     if (from_features && !s->dense) return SAT_OK;
     sat__parallel_for(&s->options.threads, s->rows, softassign__check_range, s);
-    if (!p->cost) s->stats.distances_computed += (size_t)s->rows * (size_t)s->columns;
+    if (!softassign__is_matrix(p)) s->stats.distances_computed += (size_t)s->rows * (size_t)s->columns;
     for (i = 0; i < s->rows; i++)
         if (s->row_result[i] != SAT_OK) {
             s->stats.row_error = i;
@@ -3486,6 +3751,30 @@ static sat_result softassign__check_costs(softassign *s)
    Starting a problem
    ------------------------------------------------------------------------------------------------ */
 
+/* What a solver has to hold. features, of the basis, and extra, mandatory slots, are 0 where not wanted. */
+typedef struct softassign__size {
+    int rows, columns, extra, features;
+    int dense, in_place, wide; /* as in the solver */
+} softassign__size;
+
+/* A given matrix is read where it stands. */
+static int softassign__stays(const softassign_problem *p, const softassign_options *o)
+{
+    return (p->cost || p->cost_double) && !p->row_start && !p->maximise && !(p->unassigned_cost > 0) &&
+           !(p->previous && o->switching > 0) && o->method == SOFTASSIGN_AUTO;
+}
+
+/* Costs are gone through without lists, in the matrix that is given or made. */
+static int softassign__is_dense(const softassign_problem *p, const softassign_options *o)
+{
+    int64_t cells = (int64_t)p->rows * p->columns;
+    if (o->method == SOFTASSIGN_ENTROPIC || o->method == SOFTASSIGN_PUBLISHED) return 1;
+    if (o->method != SOFTASSIGN_AUTO) return 0;
+    if (cells <= SOFTASSIGN__DENSE_CELLS) return 1;
+    if (!softassign__is_matrix(p) || cells > SOFTASSIGN__MATRIX_CELLS) return 0;
+    return !p->row_start || p->row_start[p->rows] > cells / SOFTASSIGN__SPARSE;
+}
+
 /* What a mandatory slot starts at: four times the widest difference of costs. A chain of moves may save more than that
    and leave the slot free; the exact repair knows no such limit. */
 static double softassign__mandatory_price(const softassign *s)
@@ -3493,8 +3782,8 @@ static double softassign__mandatory_price(const softassign *s)
     const softassign_problem *p = &s->problem;
     double low = 0, high = 0;
     int i, j;
-    if (!s->dense && !p->cost && !p->cost_fn) { /* no distance is above the sum of the norms */
-        for (i = 0; i < s->rows + s->columns; i++) {
+    if (s->projected) { /* no distance is above the sum of the norms */
+        for (i = 0; i < s->rows + p->columns; i++) {
             const float *f = i < s->rows ? p->row_features + (size_t)i * (size_t)p->feature_count
                                          : p->column_features + (size_t)(i - s->rows) * (size_t)p->feature_count;
             double norm = 0, *largest = i < s->rows ? &low : &high;
@@ -3502,11 +3791,11 @@ static double softassign__mandatory_price(const softassign *s)
                 norm += ((double)f[j] - (double)p->column_features[j]) * ((double)f[j] - (double)p->column_features[j]);
             if (norm > *largest) *largest = norm;
         }
-        return 4 * (sqrt(low) + sqrt(high)) + 1e-30;
+        return 4 * (sqrt(low) + sqrt(high) + (double)p->unassigned_cost) + 1e-30;
     }
     for (i = 0; i < s->rows; i++)
         for (j = 0; j < s->columns; j++) {
-            double cost = (double)softassign__cost(s, i, j);
+            double cost = softassign__cost(s, i, j);
             if (cost < low) low = cost;
             if (cost < (double)SOFTASSIGN__INFINITY && cost > high) high = cost;
         }
@@ -3521,8 +3810,8 @@ static sat_result softassign__make_slots(softassign *s)
     s->slot_count = s->columns;
     s->all_open = 1;
     for (j = 0; j < s->columns; j++) {
-        int capacity = p->capacity ? p->capacity[j] : s->options.capacity_default,
-            least = p->minimum_use ? p->minimum_use[j] : 0;
+        int none = j == p->columns, least = p->minimum_use && !none ? p->minimum_use[j] : 0,
+            capacity = none ? s->rows : p->capacity ? p->capacity[j] : s->options.capacity_default;
         if (least > capacity) {
             s->stats.column_error = j;
             return SAT_ERR_ARGUMENT;
@@ -3551,10 +3840,10 @@ static float softassign__switching_bonus(const softassign *s)
     int i, count = 0;
     if (!s->problem.previous || !(s->options.switching > 0)) return 0;
     for (i = 0; i < s->rows; i++) {
-        float cost = s->problem.previous[i] < 0 ? SOFTASSIGN__INFINITY
-                                                : softassign__pair(&s->problem, i, s->problem.previous[i]);
-        if (!(fabsf(cost) <= SOFTASSIGN__LARGEST_COST)) continue;
-        softassign__add(&sum, fabs((double)cost));
+        double cost = s->problem.previous[i] < 0 ? (double)SOFTASSIGN__INFINITY
+                                                 : softassign__pair(&s->problem, i, s->problem.previous[i]);
+        if (!(fabs(cost) <= (double)SOFTASSIGN__LARGEST_COST)) continue;
+        softassign__add(&sum, fabs(cost));
         count++;
     }
     return count ? (float)(s->options.switching * softassign__total(&sum) / count) : 0;
@@ -3564,8 +3853,12 @@ static float softassign__switching_bonus(const softassign *s)
 static sat_result softassign__start(softassign *s, const softassign_problem *problem)
 {
     sat_result result;
-    int j, from_features = !problem->cost && !problem->cost_fn, known = s->prices_known;
+    double before = s->scale;
+    int j, known = s->prices_known, optional = problem->unassigned_cost > 0;
     s->problem = *problem;
+    s->columns = problem->columns + optional;
+    s->wide = !problem->cost && softassign__is_matrix(problem);
+    s->projected = softassign__is_features(problem) && !problem->maximise && !s->dense;
     s->phase = SOFTASSIGN__START;
     memset(&s->stats, 0, sizeof s->stats);
     s->stats.row_error = s->stats.column_error = -1;
@@ -3574,12 +3867,16 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     result = softassign__make_slots(s);
     if (result != SAT_OK) return result;
     s->bonus = softassign__switching_bonus(s);
-    s->in_place = s->dense && problem->cost && s->options.method == SOFTASSIGN_AUTO && s->bonus <= 0;
+    s->in_place = s->dense && softassign__stays(problem, &s->options);
     result = softassign__check_costs(s);
     if (result != SAT_OK) return result;
+    for (s->scale = j = 0; s->wide && j < s->rows; j++)
+        if (s->row_largest[j] > s->scale) s->scale = s->row_largest[j];
+    if (s->wide && !(s->scale < before * 1024 && before < s->scale * 1024))
+        s->prices_known = known = 0; /* they would drown these costs */
     for (j = 0; j < s->max_slots; j++) s->top[j] = 0;
     s->dims = 0;
-    if (from_features && !s->dense) softassign__start_bound(s);
+    if (s->projected) softassign__start_bound(s);
     if (s->slot_count > s->columns) {
         double high = softassign__mandatory_price(s);
         for (j = s->columns; j < s->slot_count; j++) s->top[j] = high;
@@ -3588,7 +3885,7 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     softassign__reset_assignment(s);
     for (j = 0; j < s->rows; j++) {
         s->list_length[j] = 0;
-        s->list_limit[j] = from_features ? 0 : -(double)SOFTASSIGN__INFINITY;
+        s->list_limit[j] = s->projected ? 0 : -(double)SOFTASSIGN__INFINITY;
     }
     s->next = 0;
     s->dense_paths = s->dense && s->unit_capacities && s->options.method == SOFTASSIGN_AUTO;
@@ -3633,35 +3930,32 @@ SOFTASSIGN_DEF softassign_options softassign_method_defaults(softassign_method m
 
 SOFTASSIGN_DEF softassign_options softassign_defaults(void) { return softassign_method_defaults(SOFTASSIGN_AUTO); }
 
-/* What a solver of these sizes needs; `features` of the basis and `extra` mandatory slots are 0 where not wanted.
-   matrix: 1 costs are given as one, 2 and stay where they are. */
-static sat_result softassign__allocate(softassign **out, int rows, int columns, int extra, int features, int matrix,
+static sat_result softassign__allocate(softassign **out, const softassign__size *size,
                                        const softassign_options *options)
 {
     softassign *s, measure;
     sat__arena arena = {NULL, 0, 0};
     sat_allocator allocator;
-    int method = (int)options->method;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
     if (!sat__resolve_allocator(&allocator, &options->allocator)) return SAT_ERR_ARGUMENT;
-    if (columns > 2147483647 / 2 - 64 || rows > 2147483647 / 2 - 64 || extra > 2147483647 / 2 - 64 - columns)
+    if (size->columns > 2147483647 / 2 - 64 || size->rows > 2147483647 / 2 - 64 ||
+        size->extra > 2147483647 / 2 - 64 - size->columns)
         return SAT_ERR_SIZE;
     memset(&measure, 0, sizeof measure);
     measure.options = *options;
     measure.allocator = allocator;
-    measure.rows = rows;
-    measure.columns = columns;
-    measure.max_slots = columns + extra;
+    measure.rows = size->rows;
+    measure.columns = measure.most_columns = size->columns;
+    measure.max_slots = size->columns + size->extra;
     measure.padded = (measure.max_slots + SOFTASSIGN__BLOCK - 1) / SOFTASSIGN__BLOCK * SOFTASSIGN__BLOCK;
-    measure.dense = method == SOFTASSIGN_ENTROPIC || method == SOFTASSIGN_PUBLISHED ||
-                    (method == SOFTASSIGN_AUTO &&
-                     (int64_t)rows * columns <= (matrix ? SOFTASSIGN__MATRIX_CELLS : SOFTASSIGN__DENSE_CELLS));
-    measure.in_place = measure.dense && method == SOFTASSIGN_AUTO && matrix == 2;
+    measure.dense = size->dense;
+    measure.in_place = size->in_place;
+    measure.wide = size->wide;
     measure.has_lists = 1;
     measure.list = sat__min_int(options->neighbours, measure.max_slots);
     sat__carve(&arena, 1, sizeof *s);
-    softassign__carve_solver(&measure, &arena, features);
+    softassign__carve_solver(&measure, &arena, size->features);
     if (arena.overflow || arena.used > SIZE_MAX / 2) return SAT_ERR_SIZE;
     measure.bytes = arena.used + 63;
     measure.block = sat__alloc(&allocator, measure.bytes);
@@ -3670,9 +3964,9 @@ static sat_result softassign__allocate(softassign **out, int rows, int columns, 
     arena.used = 0;
     s = (softassign *)sat__carve(&arena, 1, sizeof *s);
     *s = measure;
-    softassign__carve_solver(s, &arena, features);
+    softassign__carve_solver(s, &arena, size->features);
     memset(s->stamp, 0, (size_t)s->max_slots * sizeof(int));
-    memset(s->row_stamp, 0, (size_t)rows * sizeof(int));
+    memset(s->row_stamp, 0, (size_t)size->rows * sizeof(int));
     s->phase = SOFTASSIGN__START;
     *out = s;
     return SAT_OK;
@@ -3681,15 +3975,18 @@ static sat_result softassign__allocate(softassign **out, int rows, int columns, 
 SOFTASSIGN_DEF sat_result softassign_create(softassign **out, int rows, int columns, const softassign_options *options)
 {
     softassign_options o;
-    int dense;
+    softassign__size size = {0, 0, 0, 0, 0, 0, 1};
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     o = options ? *options : softassign_defaults();
     if (!softassign__options_are_valid(&o) || rows < 1 || columns < 1 ||
         (unsigned)o.method > (unsigned)SOFTASSIGN_EXACT)
         return SAT_ERR_ARGUMENT;
-    dense = o.method == SOFTASSIGN_AUTO && (int64_t)rows * columns <= SOFTASSIGN__DENSE_CELLS;
-    return softassign__allocate(out, rows, columns, 0, dense ? 0 : SOFTASSIGN__BOUND_FEATURES, 0, &o);
+    size.rows = rows;
+    size.columns = columns < 2147483647 ? columns + 1 : columns; /* and none */
+    size.dense = o.method == SOFTASSIGN_AUTO && (int64_t)rows * columns <= SOFTASSIGN__DENSE_CELLS;
+    size.features = size.dense ? 0 : SOFTASSIGN__BOUND_FEATURES;
+    return softassign__allocate(out, &size, &o);
 }
 
 SOFTASSIGN_DEF void softassign_destroy(softassign *solver)
@@ -3733,6 +4030,14 @@ static sat_result softassign__step_slots(softassign *s, size_t budget, int *seat
     return SAT_OK;
 }
 
+/* What was begun may be gone on with: the same kind of costs. */
+static int softassign__goes_on(const softassign_problem *a, const softassign_problem *b)
+{
+    return !a->cost == !b->cost && !a->cost_double == !b->cost_double && !a->cost_int == !b->cost_int &&
+           !a->cost_fn == !b->cost_fn && !a->row_start == !b->row_start && a->maximise == b->maximise &&
+           (a->unassigned_cost > 0) == (b->unassigned_cost > 0);
+}
+
 SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row, const softassign_problem *problem,
                                           size_t work_budget, softassign_stats *stats)
 {
@@ -3740,19 +4045,20 @@ SOFTASSIGN_DEF sat_result softassign_step(softassign *solver, int *column_of_row
     sat_result result = SAT_OK;
     int i;
     if (!s || !column_of_row || !softassign__problem_is_valid(problem)) return SAT_ERR_ARGUMENT;
-    if (problem->rows != s->rows || problem->columns != s->columns) return SAT_ERR_MISMATCH;
-    if (problem->minimum_use || problem->maximise || problem->unassigned_cost > 0) return SAT_ERR_ARGUMENT;
+    if (problem->rows != s->rows || problem->columns != s->most_columns - 1) return SAT_ERR_MISMATCH;
+    if (problem->minimum_use) return SAT_ERR_ARGUMENT;
     if (s->phase == SOFTASSIGN__START) result = softassign__start(s, problem);
-    else s->problem = *problem;
+    else if (softassign__goes_on(&s->problem, problem)) s->problem = *problem;
+    else return SAT_ERR_MISMATCH;
     if (result == SAT_OK) result = softassign__step_slots(s, work_budget, s->shown);
-    if (stats) *stats = s->stats;
+    if (stats) *stats = softassign__outward(s);
     if (result != SAT_OK) {
         s->phase = SOFTASSIGN__START;
         s->prices_known = 0;
         return result;
     }
-    for (i = 0; i < s->rows; i++) column_of_row[i] = softassign__column(s, s->shown[i]);
-    softassign__tell_prices(s);
+    for (i = 0; i < s->rows; i++) column_of_row[i] = softassign__shown_column(s, s->shown[i]);
+    softassign__tell(s);
     return SAT_OK;
 }
 
@@ -3948,14 +4254,15 @@ static void softassign__separate(softassign *s)
     for (j = 0; j < s->slot_count; j++) softassign__set_price(s, j, 0);
     for (i = 0; i < s->rows; i++) {
         softassign__scratch *w = &s->scratch[0];
-        float best = SOFTASSIGN__INFINITY;
+        double best = (double)SOFTASSIGN__INFINITY;
         int to = -1;
         if (s->slot_of_row[i] >= s->columns || !softassign__conflicts(s, i, s->slot_of_row[i], -1))
             continue; /* mandatory ones stay */
         softassign__keys(s, i, w);
         for (j = 0; j < s->slot_count; j++) {
-            float cost;
-            if (!(w->keys[j] < best) || !softassign__is_free(s, j) || softassign__conflicts(s, i, j, -1)) continue;
+            double cost;
+            if (!((double)w->keys[j] < best) || !softassign__is_free(s, j) || softassign__conflicts(s, i, j, -1))
+                continue;
             cost = softassign__cost(s, i, j);
             if (!(cost < best)) continue;
             best = cost;
@@ -4069,14 +4376,6 @@ static int softassign__mandatory_count(const softassign_problem *p)
     return count;
 }
 
-/* The problem as stated behind one that is minimised and complete: costs negated, and a last column for no column. */
-static float softassign__wrapped_cost(int row, int column, void *user)
-{
-    const softassign_problem *p = (const softassign_problem *)user;
-    float cost = column == p->columns ? p->unassigned_cost : softassign__pair(p, row, column);
-    return p->maximise ? -cost : cost;
-}
-
 /* The first column whose minimum use is above its capacity, or -1. */
 static int softassign__over_used(const softassign_problem *p, const softassign_options *o)
 {
@@ -4086,16 +4385,24 @@ static int softassign__over_used(const softassign_problem *p, const softassign_o
     return -1;
 }
 
-static sat_result softassign__solve_plain(int *column_of_row, const softassign_problem *problem,
-                                          const softassign_options *options, int matrix, softassign_stats *stats)
+static sat_result softassign__solve_valid(int *column_of_row, const softassign_problem *problem,
+                                          const softassign_options *options, softassign_stats *stats)
 {
     softassign__matrix_work work;
+    softassign__size size;
     softassign *s;
     sat_result result;
-    int i, features =
-               problem->cost || problem->cost_fn ? 0 : sat__min_int(problem->feature_count, SOFTASSIGN__BOUND_FEATURES);
-    result = softassign__allocate(&s, problem->rows, problem->columns, softassign__mandatory_count(problem), features,
-                                  matrix, options);
+    int i;
+    if (problem->columns == 2147483647) return SAT_ERR_SIZE;
+    size.rows = problem->rows;
+    size.columns = problem->columns + (problem->unassigned_cost > 0);
+    size.extra = softassign__mandatory_count(problem);
+    size.features =
+        softassign__is_features(problem) ? sat__min_int(problem->feature_count, SOFTASSIGN__BOUND_FEATURES) : 0;
+    size.dense = softassign__is_dense(problem, options);
+    size.in_place = size.dense && softassign__stays(problem, options);
+    size.wide = !problem->cost && softassign__is_matrix(problem);
+    result = softassign__allocate(&s, &size, options);
     if (result != SAT_OK) return result;
     memset(&work, 0, sizeof work);
 #ifndef SOFTASSIGN_NO_MATRIX
@@ -4105,41 +4412,10 @@ static sat_result softassign__solve_plain(int *column_of_row, const softassign_p
     if (result == SAT_OK) result = softassign__run(s, &work);
     if (stats) *stats = softassign__outward(s);
     for (i = 0; result == SAT_OK && i < s->rows; i++) column_of_row[i] = softassign__shown_column(s, s->shown[i]);
-    if (result == SAT_OK) softassign__tell_prices(s);
+    if (result == SAT_OK) softassign__tell(s);
     s->bytes -= work.bytes;
     if (work.block) sat__release(&s->allocator, work.block, work.bytes);
     softassign_destroy(s);
-    return result;
-}
-
-static sat_result softassign__solve_wrapped(int *column_of_row, const softassign_problem *problem,
-                                            const softassign_options *options, softassign_stats *stats)
-{
-    softassign_problem stated = *problem, p = *problem;
-    sat_allocator allocator;
-    sat_result result;
-    int j, *capacity, optional = problem->unassigned_cost > 0;
-    size_t size;
-    if (problem->columns > 2147483647 / 2 - 65 ||
-        !sat__multiply_size(&size, (size_t)problem->columns + 1, 2 * sizeof(int)))
-        return SAT_ERR_SIZE;
-    if (!sat__resolve_allocator(&allocator, &options->allocator)) return SAT_ERR_ARGUMENT;
-    capacity = (int *)sat__alloc(&allocator, size);
-    if (!capacity) return SAT_ERR_MEMORY;
-    p.cost = NULL;
-    p.cost_fn = softassign__wrapped_cost;
-    p.cost_user = &stated;
-    p.columns += optional;
-    for (j = 0; j < p.columns; j++) {
-        capacity[j] = j == problem->columns ? problem->rows
-                      : problem->capacity   ? problem->capacity[j]
-                                            : options->capacity_default;
-        capacity[p.columns + j] = problem->minimum_use && j < problem->columns ? problem->minimum_use[j] : 0;
-    }
-    p.capacity = capacity;
-    if (p.minimum_use) p.minimum_use = capacity + p.columns;
-    result = softassign__solve_plain(column_of_row, &p, options, problem->cost != NULL, stats);
-    sat__release(&allocator, capacity, size);
     return result;
 }
 
@@ -4158,10 +4434,7 @@ SOFTASSIGN_DEF sat_result softassign_solve(int *column_of_row, const softassign_
         if (stats) stats->column_error = softassign__over_used(problem, &o);
         return SAT_ERR_ARGUMENT;
     }
-    if (problem->maximise || problem->unassigned_cost > 0)
-        return softassign__solve_wrapped(column_of_row, problem, &o, stats);
-    return softassign__solve_plain(column_of_row, problem, &o,
-                                   !problem->cost ? 0 : problem->previous && o.switching > 0 ? 1 : 2, stats);
+    return softassign__solve_valid(column_of_row, problem, &o, stats);
 }
 
 #ifndef SOFTASSIGN_NO_MOSAIC
@@ -4741,7 +5014,7 @@ static sat_result softassign__gl_upload_costs(softassign_gl *g, const softassign
 {
     int i, j;
     for (i = 0; i < p->rows; i++) {
-        for (j = 0; j < p->columns; j++) row[j] = softassign__pair(p, i, j);
+        for (j = 0; j < p->columns; j++) row[j] = (float)softassign__pair(p, i, j);
         g->gl.ActiveTexture(SAT__GL_TEXTURE0);
         g->gl.BindTexture(SAT__GL_TEXTURE_2D, g->texture[SOFTASSIGN__D]);
         g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, 0, i, p->columns, 1, SAT__GL_RED, SAT__GL_FLOAT, row);
@@ -4755,7 +5028,7 @@ static sat_result softassign__gl_check_costs(const softassign_problem *p)
     size_t k, n = (size_t)p->feature_count;
     sat_result result = SAT_OK;
     int i, j;
-    if (p->cost || p->cost_fn) {
+    if (!softassign__is_features(p)) {
         for (i = 0; i < p->rows && result == SAT_OK; i++)
             for (j = 0; j < p->columns && result == SAT_OK; j++)
                 result = softassign__check_cost(softassign__pair(p, i, j));
@@ -4790,6 +5063,9 @@ static int softassign__gl_explain(softassign_gl *g, const softassign_problem *p)
     else if (p->previous) name = "previous";
     else if (p->maximise) name = "maximise";
     else if (p->unassigned_cost > 0) name = "unassigned_cost";
+    else if (p->row_start) name = "row_start";
+    else if (!p->cost && p->cost_double) name = "cost_double";
+    else if (!p->cost && p->cost_int) name = "cost_int";
     if (!name) return 1;
     sat__text_add(&t, name);
     sat__text_add(&t, " is given; the passes do not know it");
@@ -4807,9 +5083,9 @@ SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softa
     sat__gl_begin(&gl->gl, &state, 3);
     if (gl->rows != problem->rows || gl->columns != problem->columns)
         result = softassign__gl_make_textures(gl, problem->rows, problem->columns);
-    if (result == SAT_OK && !problem->cost && !problem->cost_fn) result = softassign__gl_distances(gl, problem);
+    if (result == SAT_OK && softassign__is_features(problem)) result = softassign__gl_distances(gl, problem);
     else if (result == SAT_OK) result = softassign__gl_upload_costs(gl, problem, gl->scratch);
-    gl->rounding = problem->cost || problem->cost_fn ? 1e-6 : 1e-6 + 6e-8 * problem->feature_count;
+    gl->rounding = !softassign__is_features(problem) ? 1e-6 : 1e-6 + 6e-8 * problem->feature_count;
     if (result == SAT_OK) result = softassign__gl_find_largest(gl);
     if (result == SAT_OK) result = sat__gl_check(&gl->gl, "OpenGL refused the costs");
     sat__gl_end(&gl->gl, &state);

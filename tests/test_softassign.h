@@ -1340,11 +1340,18 @@ enum { BRUTE_ROWS = 5, BRUTE_COLUMNS = 6 };
 
 typedef struct brute {
     float cost[BRUTE_ROWS * BRUTE_COLUMNS];
+    double wide[BRUTE_ROWS * BRUTE_COLUMNS]; /* what is enumerated: cost, or costs that are no floats */
     int rows, columns, left[BRUTE_COLUMNS], used[BRUTE_COLUMNS], least[BRUTE_COLUMNS], found;
     long double best, magnitude;
 } brute;
 
-static int brute_is_forbidden(float c) { return c > 3e38f; }
+static int brute_is_forbidden(double c) { return c > 3e38; }
+
+static void brute_widen(brute *b)
+{
+    int i;
+    for (i = 0; i < BRUTE_ROWS * BRUTE_COLUMNS; i++) b->wide[i] = (double)b->cost[i];
+}
 
 static void brute_walk(brute *b, int row, long double sum, long double magnitude)
 {
@@ -1359,10 +1366,10 @@ static void brute_walk(brute *b, int row, long double sum, long double magnitude
         return;
     }
     for (j = 0; j < b->columns; j++) {
-        float c = b->cost[row * BRUTE_COLUMNS + j];
+        double c = b->wide[row * BRUTE_COLUMNS + j];
         if (b->used[j] >= b->left[j] || brute_is_forbidden(c)) continue;
         b->used[j]++;
-        brute_walk(b, row + 1, sum + (long double)c, magnitude + (long double)fabsf(c));
+        brute_walk(b, row + 1, sum + (long double)c, magnitude + (long double)fabs(c));
         b->used[j]--;
     }
 }
@@ -1394,7 +1401,7 @@ static void brute_check(brute *b, const softassign_problem *p, sat_result result
     }
     for (i = 0; i < p->rows; i++) {
         ok &= x[i] >= 0 && x[i] < p->columns && ++used[x[i]] <= b->left[x[i]];
-        if (ok) sum += (long double)b->cost[i * BRUTE_COLUMNS + x[i]];
+        if (ok) sum += (long double)b->wide[i * BRUTE_COLUMNS + x[i]];
     }
     for (i = 0; i < p->columns; i++) ok &= used[i] >= b->least[i];
     allowed = 1e-12L * b->magnitude;
@@ -1421,7 +1428,7 @@ static void brute_gap(const brute *b, const softassign_problem *p, sat_result re
         ok &= x[i] >= 0 && x[i] < p->columns;
         if (!ok) break;
         used[x[i]]++;
-        sum += (long double)b->cost[i * BRUTE_COLUMNS + x[i]];
+        sum += (long double)b->wide[i * BRUTE_COLUMNS + x[i]];
     }
     for (i = 0; i < p->columns; i++) ok &= used[i] >= b->least[i] && used[i] <= (p->capacity ? p->capacity[i] : 1);
     ok &= r->complete == 1 && (long double)r->lower_bound <= b->best + 1e-17L * b->magnitude &&
@@ -1457,6 +1464,7 @@ TEST(softassign_all_kinds_by_brute_force)
         p.stride = BRUTE_COLUMNS;
         if (capacities) p.capacity = b.left;
         if (least) p.minimum_use = b.least;
+        brute_widen(&b);
         brute_walk(&b, 0, 0, 0);
         for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_FAST; m++) {
             static const char *const names[3] = {"auto", "exact", "fast"};
@@ -1728,6 +1736,8 @@ TEST(softassign_every_refused_problem_is_named)
 {
     const float cost[6] = {1, 2, 3, 4, 5, 6};
     int bad[3] = {1, -1, 1}, less[3] = {0, 2, 0}, stay[2] = {0, 3}, none[3] = {0, 0, 0}, x[2];
+    const int starts[3] = {0, 2, 4}, falling[3] = {0, 2, 1}, places[4] = {0, 1, 1, 2}, twice[4] = {1, 1, 0, 2},
+              beyond[4] = {0, 1, 1, 3};
     softassign_problem p;
     softassign_options o;
     softassign *s = NULL;
@@ -1756,6 +1766,16 @@ TEST(softassign_every_refused_problem_is_named)
             "minimum_use is given; only AUTO, EXACT and FAST take it");
     REFUSED((p.minimum_use = none, o.row_price = price), "minimum_use is given; row_price and column_price do not go with it");
     REFUSED((o.method = SOFTASSIGN_FAST, o.column_price = price), "row_price or column_price is given; only AUTO and EXACT have them");
+    REFUSED((o.method = SOFTASSIGN_FAST, o.row_margin = price), "row_margin is given; only AUTO and EXACT have it");
+    REFUSED((o.row_margin = price, o.grid_width = 2, o.min_distance = 2), "row_margin is given; min_distance does not go with it");
+    REFUSED((p.minimum_use = none, o.row_margin = price), "minimum_use is given; row_margin does not go with it");
+    REFUSED((p.cost = NULL, p.cost_int = none, p.rows = 1, o.method = SOFTASSIGN_PUBLISHED), "cost_double or cost_int is given; ENTROPIC and PUBLISHED read floats");
+    REFUSED((p.cost = NULL, p.row_start = starts), "row_start is given; cost, cost_double and cost_int are NULL");
+    REFUSED(p.row_start = starts, "row_start is given; column_index is NULL");
+    REFUSED((p.row_start = starts + 1, p.column_index = places), "row_start[0] is 2; 0..0");
+    REFUSED((p.row_start = falling, p.column_index = places), "row_start[2] is 1; 2..2147483647");
+    REFUSED((p.row_start = starts, p.column_index = twice), "column_index[1] is 1; 2..2");
+    REFUSED((p.row_start = starts, p.column_index = beyond), "column_index[3] is 3; 2..2");
     REFUSED(o.min_distance = 1, "grid_width is 0; min_distance above 0 needs the grid");
 #undef REFUSED
     EXPECT(strcmp(softassign_explain_problem(text, sizeof text, NULL, NULL), "problem is NULL") == 0);
@@ -1766,11 +1786,14 @@ TEST(softassign_every_refused_problem_is_named)
     p.rows = 2;
     p.stride = p.columns = 3;
     p.cost = cost;
-    p.maximise = 1; /* of softassign_solve only */
+    p.minimum_use = none; /* of softassign_solve only */
     EXPECT_EQ(softassign_step(s, x, &p, 100, NULL), SAT_ERR_ARGUMENT);
-    p.maximise = 0;
-    p.unassigned_cost = 1;
-    EXPECT_EQ(softassign_step(s, x, &p, 100, NULL), SAT_ERR_ARGUMENT);
+    p.minimum_use = NULL;
+    EXPECT_EQ(softassign_step(s, x, &p, 1, NULL), SAT_OK);
+    p.maximise = 1; /* of the next frame only */
+    EXPECT_EQ(softassign_step(s, x, &p, 100, NULL), SAT_ERR_MISMATCH);
+    softassign_next_frame(s);
+    EXPECT_EQ(softassign_step(s, x, &p, 100, NULL), SAT_OK);
     softassign_destroy(s);
 }
 
@@ -1784,14 +1807,15 @@ static inline int prices_are_dual(const brute *b, int columns, const int *x, con
     double scale = price, sum = 0;
     int i, j, ok = 1, used[BRUTE_COLUMNS] = {0};
     for (i = 0; i < b->rows * BRUTE_COLUMNS; i++)
-        if (!brute_is_forbidden(b->cost[i]) && fabs((double)b->cost[i]) > scale) scale = fabs((double)b->cost[i]);
+        if (!brute_is_forbidden((double)b->cost[i]) && fabs((double)b->cost[i]) > scale)
+            scale = fabs((double)b->cost[i]);
     for (i = 0; i < b->rows; i++) {
         if (x[i] >= 0) used[x[i]]++;
         sum += u[i];
         ok &= price == 0 || u[i] <= price + 1e-12 * scale;
         ok &= x[i] >= 0 || fabs(u[i] - price) <= 1e-12 * scale;
         for (j = 0; j < columns; j++) {
-            double off = brute_is_forbidden(b->cost[i * BRUTE_COLUMNS + j]) || b->left[j] == 0
+            double off = brute_is_forbidden((double)b->cost[i * BRUTE_COLUMNS + j]) || b->left[j] == 0
                              ? 0
                              : (double)b->cost[i * BRUTE_COLUMNS + j] - u[i] - v[j];
             ok &= off >= -1e-12 * scale && (x[i] != j || off <= 1e-12 * scale);
@@ -1824,8 +1848,8 @@ TEST(softassign_rows_left_out_and_the_largest_total_by_brute_force)
         b.columns = p.columns + optional;
         for (i = 0; i < BRUTE_ROWS * BRUTE_COLUMNS; i++) {
             float c = brute_cost(kind, &seed);
-            given[i] = maximise && brute_is_forbidden(c) ? -c : c;
-            b.cost[i] = maximise && !brute_is_forbidden(c) ? -c : c;
+            given[i] = maximise && brute_is_forbidden((double)c) ? -c : c;
+            b.cost[i] = maximise && !brute_is_forbidden((double)c) ? -c : c;
             if (optional && i % BRUTE_COLUMNS == p.columns) b.cost[i] = maximise ? -price : price;
         }
         for (j = 0; j < p.columns; j++) b.left[j] = capacities ? (int)support_below(&seed, 4) : 1;
@@ -1835,6 +1859,7 @@ TEST(softassign_rows_left_out_and_the_largest_total_by_brute_force)
         p.maximise = maximise;
         p.unassigned_cost = price;
         if (capacities) p.capacity = b.left;
+        brute_widen(&b);
         brute_walk(&b, 0, 0, 0);
         for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_FAST; m++) {
             softassign_options o = softassign_method_defaults((softassign_method)m);
@@ -1871,6 +1896,155 @@ TEST(softassign_rows_left_out_and_the_largest_total_by_brute_force)
             } else EXPECT(prices_are_dual(&b, p.columns, x, u, v, (double)price, p.rows == p.columns, b.best));
         }
     }
+}
+
+/* ---- costs as floats, doubles and integers, dense and sparse; margins; frames: against enumeration ---- */
+
+typedef struct kinds_of_cost {
+    float f[BRUTE_ROWS * 8];
+    double d[BRUTE_ROWS * 8];
+    int i[BRUTE_ROWS * 8], start[BRUTE_ROWS + 1], index[BRUTE_ROWS * BRUTE_COLUMNS];
+} kinds_of_cost;
+
+static double kind_of_number(int kind, uint64_t *seed)
+{
+    double u = support_uniform(seed);
+    switch (kind) { /* what floats do not tell apart */
+    case 0: return floor(u * 2147483646);
+    case 1: return 1073741824 + support_below(seed, 20);
+    case 2: return floor((u - 0.5) * 4294967290.0);
+    case 3: return support_below(seed, 3);
+    case 4: return 1e9 + ldexp(floor(u * 64), -20);
+    case 5: return 1 + ldexp(floor(u * 64), -50);
+    case 6: return ldexp(floor(u * 64) - 32, -40) + 7;
+    default: return u < 0.3 ? 1e30 : support_uniform(seed);
+    }
+}
+
+/* Writes one number into all arrays of its form; sparse: those that are forbidden are left out. */
+static void state_costs(softassign_problem *p, kinds_of_cost *c, const brute *b, int form, int sparse)
+{
+    int i, j, n = 0;
+    double sign = p->maximise ? -1 : 1;
+    for (i = 0; i < p->rows; i++) {
+        c->start[i] = n;
+        for (j = 0; j < p->columns; j++) {
+            double v = b->wide[i * BRUTE_COLUMNS + j];
+            int at = sparse ? n : i * 8 + j, forbidden = brute_is_forbidden(v);
+            if (sparse && forbidden) continue;
+            c->f[at] = (float)(sign * v);
+            c->d[at] = sign * v;
+            c->i[at] = forbidden ? (sign > 0 ? 2147483647 : -2147483647 - 1) : form == 2 ? (int)(sign * v) : 0;
+            c->index[n++] = j;
+        }
+    }
+    c->start[p->rows] = n;
+    p->stride = 8;
+    if (form == 0) p->cost = c->f;
+    if (form == 1) p->cost_double = c->d;
+    if (form == 2) p->cost_int = c->i;
+    if (!sparse) return;
+    p->row_start = c->start;
+    p->column_index = c->index;
+}
+
+static void check_margins(brute *b, const int *x, const double *margin)
+{
+    long double best = b->best, magnitude = b->magnitude;
+    int i;
+    for (i = 0; i < b->rows; i++) {
+        double *cell = &b->wide[i * BRUTE_COLUMNS + x[i]], kept = *cell;
+        *cell = (double)SOFTASSIGN__INFINITY;
+        b->found = 0;
+        brute_walk(b, 0, 0, 0);
+        *cell = kept;
+        if (!b->found) EXPECT(margin[i] > 1e300);
+        else if (!EXPECT(fabsl((long double)margin[i] - (b->best - best)) <= 1e-14L * (magnitude + b->magnitude)))
+            printf("row %d: margin %.17g, by enumeration %.17Lg\n", i, margin[i], b->best - best);
+    }
+    b->found = 1;
+    b->best = best;
+    b->magnitude = magnitude;
+}
+
+/* The sum as doubles hold it, to the last bit but those of adding up. */
+static void check_exactly(brute *b, const softassign_problem *p, sat_result result, const int *x, softassign_stats *r,
+                          const char *what)
+{
+    softassign_problem all = *p;
+    int i, y[BRUTE_ROWS];
+    long double sum = 0;
+    for (i = 0; i < p->rows && result == SAT_OK; i++) {
+        y[i] = x[i] < 0 ? p->columns : x[i];
+        sum += (long double)b->wide[i * BRUTE_COLUMNS + y[i]];
+    }
+    all.columns = b->columns;
+    if (p->maximise) {
+        r->cost = -r->cost;
+        r->lower_bound = -r->lower_bound;
+    }
+    brute_check(b, &all, result, y, r, what);
+    if (result == SAT_OK && !EXPECT(sum - b->best <= 1e-18L * b->magnitude))
+        printf("%s: %.20Lg instead of %.20Lg\n", what, sum, b->best);
+}
+
+TEST(softassign_every_kind_of_costs_by_brute_force)
+{
+    const char *asked = getenv("SOFTASSIGN_BRUTE");
+    long runs = asked ? atol(asked) / 2 : 10000, n;
+    uint64_t seed = 8;
+    softassign *warm[BRUTE_ROWS][BRUTE_COLUMNS][2];
+    memset(warm, 0, sizeof warm);
+    for (n = 0; n < runs && expect_state.failures < 10; n++) {
+        kinds_of_cost c;
+        brute b;
+        softassign_problem p;
+        int kind = (int)support_below(&seed, 8), i, j, m, x[BRUTE_ROWS], capacities = support_below(&seed, 3) == 0;
+        int optional = support_below(&seed, 2) == 0, sparse = support_below(&seed, 2) == 0;
+        int form = kind == 3 ? (int)support_below(&seed, 3) : kind < 3 ? 1 + (int)support_below(&seed, 2) : 1;
+        double price;
+        memset(&b, 0, sizeof b);
+        memset(&p, 0, sizeof p);
+        p.rows = b.rows = 1 + (int)support_below(&seed, BRUTE_ROWS);
+        p.columns = 1 + (int)support_below(&seed, BRUTE_COLUMNS - 1);
+        p.maximise = kind != 2 && support_below(&seed, 4) == 0;
+        b.columns = p.columns + optional;
+        price = (double)(float)kind_of_number(kind, &seed);
+        if (!(price > 0)) price = 1;
+        if (optional) p.unassigned_cost = (float)price;
+        for (i = 0; i < BRUTE_ROWS * BRUTE_COLUMNS; i++) {
+            double number = kind_of_number(kind, &seed);
+            b.wide[i] = support_below(&seed, sparse ? 3 : 20) ? number : (double)SOFTASSIGN__INFINITY;
+            if (p.maximise && !brute_is_forbidden(b.wide[i])) b.wide[i] = -b.wide[i];
+            if (optional && i % BRUTE_COLUMNS == p.columns) b.wide[i] = p.maximise ? -price : price;
+        }
+        for (j = 0; j < p.columns; j++) b.left[j] = capacities ? (int)support_below(&seed, 4) : 1;
+        if (optional) b.left[p.columns] = p.rows;
+        state_costs(&p, &c, &b, form, sparse);
+        if (capacities) p.capacity = b.left;
+        brute_walk(&b, 0, 0, 0);
+        for (m = SOFTASSIGN_AUTO; m <= SOFTASSIGN_FAST; m++) {
+            softassign_options o = softassign_method_defaults((softassign_method)m);
+            softassign **s = m == SOFTASSIGN_FAST ? NULL : &warm[p.rows - 1][p.columns - 1][m];
+            static double margin[BRUTE_ROWS];
+            softassign_stats r;
+            sat_result result;
+            o.gap = 1e-17;
+            if (m != SOFTASSIGN_FAST) o.row_margin = margin;
+            result = softassign_solve(x, &p, &o, &r);
+            check_exactly(&b, &p, result, x, &r, "solve");
+            if (m == SOFTASSIGN_FAST) continue;
+            for (i = 0; i < p.rows && result == SAT_OK; i++) x[i] = x[i] < 0 ? p.columns : x[i];
+            if (result == SAT_OK) check_margins(&b, x, margin);
+            if (!*s) EXPECT_EQ(softassign_create(s, p.rows, p.columns, &o), SAT_OK);
+            softassign_next_frame(*s);
+            result = softassign_step(*s, x, &p, 1000000, &r);
+            check_exactly(&b, &p, result, x, &r, "warm");
+            for (i = 0; i < p.rows && result == SAT_OK; i++) x[i] = x[i] < 0 ? p.columns : x[i];
+            if (result == SAT_OK) check_margins(&b, x, margin);
+        }
+    }
+    for (n = 0; n < BRUTE_ROWS * BRUTE_COLUMNS * 2; n++) softassign_destroy((&warm[0][0][0])[n]);
 }
 
 /* The lines of the header. */
