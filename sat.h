@@ -18,11 +18,12 @@
 
    WHAT IT DOES
 
-   - Tables that keep their precision where plain float tables lose it: over 14 smooth decades, 3 x 3 boxes come out
-     right to 5e-6 at the 99th percentile and 5e-5 at worst. The default, SAT_KIND_TILED, sums integers in every 64 x 64
-     tile, with a quantum of the tile's own, and a box of up to 129 pixels a side reads only the tiles that it touches:
-     bright pixels, infinities and skies elsewhere change nothing. Where light changes by four decades and more within
-     64 pixels, tile = 32 keeps this (1.4e-6, 4e-5; the same bytes), 64 does not (2e-4, 1; bench_sat's "14 decades").
+   - Tables that keep their precision where plain float tables lose it: over 14 decades, 3 x 3 boxes come out right to
+     2e-6 at the 99th percentile and 1e-4 at worst, where light changes by a decade in 100 pixels or by four in 64
+     (2e-7, 6e-7 where it is smooth). The default, SAT_KIND_TILED, sums integers in every 32 x 32 tile, with a quantum
+     of the tile's own, and a box of up to 65 pixels a side reads only the tiles that it touches: bright pixels,
+     infinities and skies elsewhere change nothing. tile = 64 filters faster and errs more (2e-6, 6e-6 where it is
+     smooth; 2e-4, 1 where it is not: bench_sat's "Side of a tile").
    - Exact tables in integers modulo 2^32 or 2^64: the same bits on CPU and GPU, for any order of additions.
    - Means over boxes with real corners, beyond the border (clip, zero, clamp, mirror, wrap), with a radius for each
      pixel; box filters of whole images, also of images that arrive a row at a time; dirty rectangles.
@@ -309,7 +310,8 @@ typedef enum sat_non_finite {
 
 typedef struct sat_options {
     sat_kind kind;             /* SAT_KIND_TILED */
-    int tile;                  /* 64; 8..128; a power of two: tile side of SAT_KIND_TILED; 32 errs a quarter */
+    int tile;                  /* 32; 8..128; a power of two: tile side of SAT_KIND_TILED; 64 errs four times as much
+                                  and filters in half the time */
     int subtract_mean;         /* 0; 0..1; 1 (FLOAT, DOUBLE): Hensley 2005. Good at low contrast; makes dark boxes of
                                   HDR images about 100 times worse */
     double quantum;            /* 0; 0..1e300; 0: the finest power of two that max_value and max_box_area allow; FIXED
@@ -2898,7 +2900,7 @@ static unsigned char *sat__row(const sat_table *t, int channel, int y)
 
 static const sat__field sat__table_fields[] = {
     SAT__FIELD(sat_options, 'i', kind, 0, 0, SAT_KIND_FIXED64, ' '),
-    SAT__FIELD(sat_options, 'i', tile, 64, 8, 128, '2'),
+    SAT__FIELD(sat_options, 'i', tile, 32, 8, 128, '2'),
     SAT__FIELD(sat_options, 'i', subtract_mean, 0, 0, 1, ' '),
     SAT__FIELD(sat_options, 'd', quantum, 0, 0, 1e300, ' '),
     SAT__FIELD(sat_options, 'd', max_value, 0, 0, 1e300, ' '),
@@ -3117,7 +3119,7 @@ static sat_result sat__table_create(sat_table **out, int width, int height, int 
 
 SAT_DEF sat_result sat_create(sat_table **out, int width, int height, int channels, const sat_options *options)
 {
-    int tile = options ? options->tile : 64, tiled;
+    int tile = options ? options->tile : 32, tiled;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (tile < 1 || height < 1) return SAT_ERR_ARGUMENT;
@@ -6200,11 +6202,11 @@ static const char sat__glsl_mean[] =
 
    The table of SAT_KIND_TILED in passes that stay inside a tile: a row of a tile is gauged (the four lanes of the CPU,
    row by row, so that the sums round alike), a tile settles its quantum and its spikes, integers are summed along the
-   rows and down the columns by eights (64 = 8 x 8), and whole tiles make the strips. All targets are unsigned
+   rows and down the columns by eights (32 = 8 x 4), and whole tiles make the strips. All targets are unsigned
    integers, which ES 3.0 can draw to without an extension; floats travel as their bits. A plane is a channel, or with
    moments x - m or its square.
 
-   Lookups: the sum of the parts in at most 3 x 3 tiles, or four corners in each super tile of 16 x 16 tiles. `strips`
+   Lookups: the sum of the parts in at most 3 x 3 tiles, or four corners in each super tile of 32 x 32 tiles. `strips`
    is a row-major array in a texture: left, above and whole of the CPU table, one after the other. */
 
 static const char sat__glsl_tile_lookups[] =
@@ -6216,12 +6218,12 @@ static const char sat__glsl_tile_lookups[] =
     SAT__GLSL(
         vec2 sat_tile_part(usampler2D cells, usampler2DArray tiles, int plane, ivec2 tile, ivec2 a,
           ivec2 b, float one) {
-         ivec2 first = tile * 64;
+         ivec2 first = tile * 32;
          uint d = texelFetch(cells, b - 1, 0)[plane];
          if (a.x > first.x) d -= texelFetch(cells, ivec2(a.x, b.y) - 1, 0)[plane];
          if (a.y > first.y) d -= texelFetch(cells, ivec2(b.x, a.y) - 1, 0)[plane];
          if (a.x > first.x && a.y > first.y) d += texelFetch(cells, a - 1, 0)[plane];
-         ivec2 at = ivec2(tile.x + plane * ((textureSize(cells, 0).x + 63) / 64), tile.y);
+         ivec2 at = ivec2(tile.x + plane * ((textureSize(cells, 0).x + 31) / 32), tile.y);
          uvec4 record = texelFetch(tiles, ivec3(at, 0), 0);
          float quantum = uintBitsToFloat(record.x);
          int n = int(d), low = n & 4095;
@@ -6244,8 +6246,8 @@ static const char sat__glsl_tile_lookups[] =
         vec2 sat_super_corner(usampler2D cells, usampler2DArray tiles, usampler2D strips, int plane, ivec2 first,
           ivec2 p,
              float one) {
-         ivec2 size = textureSize(cells, 0), t = p >> 6, inside = p & 63;
-         int across = (size.x + 63) / 64, planes = textureSize(tiles, 0).x / across;
+         ivec2 size = textureSize(cells, 0), t = p >> 5, inside = p & 31;
+         int across = (size.x + 31) / 32, planes = textureSize(tiles, 0).x / across;
          int above = across * planes * size.y, whole = above + size.x * planes * textureSize(tiles, 0).y;
          bool x = t.x > first.x, y = t.y > first.y;
          vec2 sum = vec2(0.0);
@@ -6255,7 +6257,7 @@ static const char sat__glsl_tile_lookups[] =
          if (x && inside.y > 0)
           sum = sat_add(sum, sat_strip(strips, size.x, ((p.y - 1) * planes + plane) * across + t.x - 1), one);
          if (inside.x > 0 && inside.y > 0)
-          sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 64, p, one), one);
+          sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 32, p, one), one);
          return sum;
         })
     SAT__GLSL(
@@ -6263,13 +6265,13 @@ static const char sat__glsl_tile_lookups[] =
          ivec2 size = textureSize(cells, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size), p, q;
          float one = size.x > 0 ? 1.0 : 0.0;
          if (any(lessThanEqual(b, a))) return 0.0;
-         ivec2 s = a >> 6, e = (b - 1) >> 6;
+         ivec2 s = a >> 5, e = (b - 1) >> 5;
          vec2 sum = vec2(0.0);
          if (all(lessThan(e - s, ivec2(3)))) {
           for (int y = s.y; y <= e.y; y++)
            for (int x = s.x; x <= e.x; x++)
-            sum = sat_add(sum, sat_tile_part(cells, tiles, channel, ivec2(x, y), max(a, ivec2(x, y) * 64),
-                min(b, ivec2(x + 1, y + 1) * 64), one),
+            sum = sat_add(sum, sat_tile_part(cells, tiles, channel, ivec2(x, y), max(a, ivec2(x, y) * 32),
+                min(b, ivec2(x + 1, y + 1) * 32), one),
             one);
           return sum.x + sum.y;
          }
@@ -6277,7 +6279,7 @@ static const char sat__glsl_tile_lookups[] =
           q.y = min(b.y, (p.y | 1023) + 1);
           for (p.x = a.x; p.x < b.x; p.x = q.x) {
            q.x = min(b.x, (p.x | 1023) + 1);
-           ivec2 f = (p >> 10) << 4;
+           ivec2 f = (p >> 10) << 5;
            vec2 v = sat_super_corner(cells, tiles, strips, channel, f, q, one);
            v = sat_add(v, -sat_super_corner(cells, tiles, strips, channel, f, ivec2(p.x, q.y), one), one);
            vec2 u = sat_super_corner(cells, tiles, strips, channel, f, ivec2(q.x, p.y), one);
@@ -6300,7 +6302,7 @@ static const char sat__glsl_tile_values[] =
         uniform usampler2DArray tiles;
         uniform ivec2 size;
         uniform float limit;
-        int across() { return (size.x + 63) / 64; })
+        int across() { return (size.x + 31) / 32; })
     SAT__GLSL(
         float pixel(ivec2 p, int plane, out int kind) {
             float v = texelFetch(source, p, 0)[CHANNEL + plane % CHANNELS];
@@ -6313,7 +6315,7 @@ static const char sat__glsl_tile_values[] =
     SAT__GLSL(
         float value(ivec2 p, int plane, out int kind) {
             float v = pixel(p, plane, kind);
-            v -= uintBitsToFloat(texelFetch(means, ivec2(p.x / 64 + across() * (plane % CHANNELS), p.y / 64), 0).x);
+            v -= uintBitsToFloat(texelFetch(means, ivec2(p.x / 32 + across() * (plane % CHANNELS), p.y / 32), 0).x);
             if (kind == 1 || kind == 2 || abs(v) > 1e18) v = 0.0;
             return plane < CHANNELS ? v : v * v;
         })
@@ -6325,7 +6327,7 @@ static const char sat__glsl_tile_means[] =
     SAT__GLSL(
         layout(location = 0) out uvec4 result;
         void main() {
-            ivec2 at = ivec2(gl_FragCoord.xy), first = ivec2(at.x % across(), at.y) * 64, last = min(first + 64, size);
+            ivec2 at = ivec2(gl_FragCoord.xy), first = ivec2(at.x % across(), at.y) * 32, last = min(first + 32, size);
             int kind;
             float sum = 0.0, count = 0.0;
             for (int y = first.y; y < last.y; y++) {
@@ -6348,11 +6350,11 @@ static const char sat__glsl_gauge[] =
         layout(location = 1) out uvec4 fact;
         void main() {
             ivec2 at = ivec2(gl_FragCoord.xy);
-            int plane = at.x / across(), first = at.x % across() * 64, kind, giants = 0;
+            int plane = at.x / across(), first = at.x % across() * 32, kind, giants = 0;
             ivec3 counts = ivec3(0);
             float largest = 0.0;
             vec4 lanes = vec4(0.0);
-            for (int i = 0; i < 64; i += 4)
+            for (int i = 0; i < 32; i += 4)
                 for (int j = 0; j < 4; j++) {
                     if (first + i + j >= size.x) continue;
                     float v = abs(value(ivec2(first + i + j, at.y), plane, kind));
@@ -6406,7 +6408,7 @@ static const char sat__glsl_settle[] =
                     continue;
                 }
                 vec4 row = vec4(0.0);
-                for (int i = 0; i < 64; i += 4)
+                for (int i = 0; i < 32; i += 4)
                     for (int j = 0; j < 4; j++) {
                         float v = abs(rest(first + ivec2(i + j, y)));
                         row[j] += v;
@@ -6420,8 +6422,8 @@ static const char sat__glsl_settle[] =
         void main() {
             at = ivec2(gl_FragCoord.xy);
             plane = at.x / across();
-            first = ivec2(at.x % across(), at.y) * 64;
-            rows = min(64, size.y - first.y);
+            first = ivec2(at.x % across(), at.y) * 32;
+            rows = min(32, size.y - first.y);
             count = 0;
             full = 0.0;
             int giants = 0;
@@ -6439,7 +6441,7 @@ static const char sat__glsl_settle[] =
                 ivec2 p;
                 for (p.y = first.y; p.y < first.y + rows && found <= room; p.y++) {
                     if (!(uintBitsToFloat(texelFetch(facts, ivec2(at.x, p.y), 0).x) > e.x * 0.0625)) continue;
-                    for (p.x = first.x; p.x < min(first.x + 64, size.x) && found <= room; p.x++) {
+                    for (p.x = first.x; p.x < min(first.x + 32, size.x) && found <= room; p.x++) {
                         float v = rest(p);
                         if (!(abs(v) > e.x * 0.0625)) continue;
                         if (found < room) {
@@ -6480,7 +6482,7 @@ static const char sat__glsl_tile_scan[] =
     "#if INPUT\n"
     SAT__GLSL(
         uint integer(ivec2 p, int plane) {
-            ivec3 at = ivec3(p.x / 64 + plane * across(), p.y / 64, 0);
+            ivec3 at = ivec3(p.x / 32 + plane * across(), p.y / 32, 0);
             uvec4 record = texelFetch(tiles, at, 0);
             int kind, count = int(record.z & 15u);
             float v = value(p, plane, kind), full = uintBitsToFloat(record.y);
@@ -6488,7 +6490,7 @@ static const char sat__glsl_tile_scan[] =
             if (abs(v) > 1e20) v = sign(v) * full;
             for (int i = 0; i < count; i++) {
                 uint word = texelFetch(tiles, at + ivec3(0, 0, 1), 0)[i / 2] >> (14 * (i & 1));
-                if (ivec2(int(word & 127u), int(word >> 7 & 127u)) == p % 64) return 0u;
+                if (ivec2(int(word & 127u), int(word >> 7 & 127u)) == p % 32) return 0u;
             }
             return uint(int(roundEven(v * uintBitsToFloat((254u << 23) - record.x))));
         })
@@ -6504,7 +6506,7 @@ static const char sat__glsl_tile_scan[] =
     SAT__GLSL(
         void main() {
             ivec2 p = ivec2(gl_FragCoord.xy);
-            int step = axis.x + axis.y, from = ((axis.x > 0 ? p.x : p.y) & 63);
+            int step = axis.x + axis.y, from = ((axis.x > 0 ? p.x : p.y) & 31);
             uvec4 sum = uvec4(0u);
             for (int d = 0; d < 8 * step && d <= from; d += step)
                 sum += load(p - (axis.x > 0 ? ivec2(d, 0) : ivec2(0, d)));
@@ -6516,31 +6518,31 @@ static const char sat__glsl_strips[] =
         layout(location = 0) out uvec4 result;
         void main() {
             int i = int(gl_FragCoord.y) * size.x + int(gl_FragCoord.x), n = across(),
-                down = (size.y + 63) / 64, x, y, plane;
+                down = (size.y + 31) / 32, x, y, plane;
             int left = n * PLANES * size.y, above = size.x * PLANES * down, row, side;
             float one = size.x > 0 ? 1.0 : 0.0;
             ivec2 low, high;
             if (i < left) {
                 side = n, row = i / n;
                 plane = row % PLANES, y = row / PLANES, x = i % n;
-                low = ivec2(x & ~15, y / 64), high = ivec2(min(size.x, (x + 1) * 64), y + 1);
+                low = ivec2(x & ~31, y / 32), high = ivec2(min(size.x, (x + 1) * 32), y + 1);
             } else if (i < left + above) {
                 i -= left;
                 row = i / size.x;
                 plane = row % PLANES, y = row / PLANES, x = i % size.x;
-                low = ivec2(x / 64, y & ~15), high = ivec2(x + 1, min(size.y, (y + 1) * 64));
+                low = ivec2(x / 32, y & ~31), high = ivec2(x + 1, min(size.y, (y + 1) * 32));
             } else {
                 i -= left + above;
                 row = i / n;
                 plane = row % PLANES, y = row / PLANES, x = i % n;
-                low = ivec2(x, y) & ~15, high = min(size, (ivec2(x, y) + 1) * 64);
+                low = ivec2(x, y) & ~31, high = min(size, (ivec2(x, y) + 1) * 32);
             }
             vec2 sum = vec2(0.0);
-            if (y < (size.y + 63) / 64 || i < left)
-                for (ivec2 t = low; t.y * 64 < high.y; t.y++)
-                    for (t.x = low.x; t.x * 64 < high.x; t.x++)
-                        sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 64,
-                                            min(high, (t + 1) * 64), one), one);
+            if (y < (size.y + 31) / 32 || i < left)
+                for (ivec2 t = low; t.y * 32 < high.y; t.y++)
+                    for (t.x = low.x; t.x * 32 < high.x; t.x++)
+                        sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 32,
+                                            min(high, (t + 1) * 32), one), one);
             result = uvec4(floatBitsToUint(sum), 0u, 0u);
         });
 
@@ -6563,10 +6565,10 @@ static const char sat__glsl_tile_variance[] =
         uniform int radius;
         vec2 moments(int c, ivec2 a, ivec2 b, float one) {
             float n = 0.0, mean = 0.0, squares = 0.0;
-            ivec2 s = a >> 6, e = (b - 1) >> 6, t;
+            ivec2 s = a >> 5, e = (b - 1) >> 5, t;
             for (t.y = s.y; t.y <= e.y; t.y++)
                 for (t.x = s.x; t.x <= e.x; t.x++) {
-                    ivec2 low = max(a, t * 64), high = min(b, (t + 1) * 64);
+                    ivec2 low = max(a, t * 32), high = min(b, (t + 1) * 32);
                     float m = uintBitsToFloat(texelFetch(means, ivec2(t.x + across() * c, t.y), 0).x);
                     vec2 d = sat_tile_part(cells, tiles, c, t, low, high, one),
                          q = sat_tile_part(cells, tiles, CHANNELS + c, t, low, high, one);
@@ -6590,7 +6592,7 @@ SAT_DEF const char *sat_gl_glsl_tiles(void) { return sat__glsl_tile_lookups; }
 
 /* ---- >> passes: the object */
 
-enum { SAT__GL_LEVELS = 32 };
+enum { SAT__GL_LEVELS = 32, SAT__GL_TILE = 32 }; /* the tile stands in the shaders, too */
 
 /* A program, and where its uniforms are (-1 where it has none). */
 typedef struct sat__gl_kernel {
@@ -6843,8 +6845,8 @@ static sat_result sat__gl_fit_tiles(sat_gl *g, int width, int height)
 {
     sat__gl_tiled *t = &g->tiled;
     sat__gl *gl = &g->gl;
-    int planes = g->options.channels << g->options.moments, tiles_x = (width - 1) / 64 + 1,
-        tiles_y = (height - 1) / 64 + 1;
+    int planes = g->options.channels << g->options.moments, tiles_x = (width - 1) / SAT__GL_TILE + 1,
+        tiles_y = (height - 1) / SAT__GL_TILE + 1;
     unsigned internal = planes == 1 ? SAT__GL_R32UI : planes == 2 ? SAT__GL_RG32UI : SAT__GL_RGBA32UI;
     double strips = (double)tiles_x * planes * ((double)height + tiles_y) + (double)width * planes * tiles_y;
     sat_result result;
@@ -6919,7 +6921,7 @@ static sat_result sat__gl_build_tiles(sat_gl *g, unsigned texture, int width, in
     sat__gl *gl = &g->gl;
     sat__gl_state state;
     sat_result result;
-    int tiles_x = (width - 1) / 64 + 1, tiles_y = (height - 1) / 64 + 1;
+    int tiles_x = (width - 1) / SAT__GL_TILE + 1, tiles_y = (height - 1) / SAT__GL_TILE + 1;
     sat__gl_begin(gl, &state, 6);
     result = sat__gl_fit_tiles(g, width, height);
     if (result == SAT_OK) {
@@ -6960,15 +6962,16 @@ SAT_DEF sat_result sat_gl_get_stats(sat_gl *gl, sat_stats *stats)
     uint32_t *records;
     size_t count, i;
     if (!stats || !gl || !gl->tiled.width) return SAT_ERR_ARGUMENT;
-    count = ((size_t)gl->tiled.width + 63) / 64 * (size_t)gl->options.channels;
-    count *= ((size_t)gl->tiled.height + 63) / 64;
+    count = ((size_t)gl->tiled.width + SAT__GL_TILE - 1) / SAT__GL_TILE * (size_t)gl->options.channels;
+    count *= ((size_t)gl->tiled.height + SAT__GL_TILE - 1) / SAT__GL_TILE;
     records = (uint32_t *)sat__alloc(&gl->options.allocator, count * 16);
     if (!records) return SAT_ERR_MEMORY;
     memset(stats, 0, sizeof *stats);
     sat__gl_begin(&gl->gl, &state, 1);
     gl->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, gl->tiled.tiles_framebuffer);
     gl->gl.ReadBuffer(SAT__GL_COLOR_ATTACHMENT0);
-    gl->gl.ReadPixels(0, 0, (gl->tiled.width + 63) / 64 * gl->options.channels, (gl->tiled.height + 63) / 64,
+    gl->gl.ReadPixels(0, 0, (gl->tiled.width - 1) / SAT__GL_TILE * gl->options.channels + gl->options.channels,
+                     (gl->tiled.height - 1) / SAT__GL_TILE + 1,
                       SAT__GL_RGBA_INTEGER, SAT__GL_UNSIGNED_INT, records);
     sat__gl_end(&gl->gl, &state);
     for (i = 0; i < count; i++) {

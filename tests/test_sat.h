@@ -896,6 +896,39 @@ TEST(fourteen_smooth_decades)
     free(errors);
 }
 
+/* Light that changes by four decades within 64 pixels, in patches of 128: tiles of 64 are up to 1 off here. */
+TEST(fourteen_rough_decades)
+{
+    enum { N = 1024, BOXES = 20000, G = N / 128 + 2 };
+    float *p = (float *)malloc(sizeof(float) * N * N), grid[G * G];
+    double *errors = (double *)malloc(sizeof(double) * BOXES);
+    sat_image view = sat_image_f32(p, N, N, 1);
+    uint64_t state = 88172645463325252u;
+    sat_table *t;
+    int x, y, i;
+    for (i = 0; i < G * G; i++) grid[i] = (float)(1 + 2.4 * support_gaussian(&state));
+    for (y = 0; y < N; y++)
+        for (x = 0; x < N; x++) {
+            const float *g = grid + y / 128 * G + x / 128;
+            double fx = x % 128 / 128.0, fy = y % 128 / 128.0;
+            double level = (1 - fy) * ((1 - fx) * (double)g[0] + fx * (double)g[1]) +
+                           fy * ((1 - fx) * (double)g[G] + fx * (double)g[G + 1]);
+            p[y * N + x] = (float)fmin(fmax(pow(10, level * 1.3 + 0.15 * support_gaussian(&state)), 1e-6), 1e8);
+        }
+    t = build(&view, NULL);
+    for (i = 0; i < BOXES; i++) {
+        int x0 = support_below(&state, N - 3), y0 = support_below(&state, N - 3);
+        double exact = exact_sum(&view, 0, x0, y0, x0 + 3, y0 + 3);
+        errors[i] = fabs(sat_sum(t, 0, x0, y0, x0 + 3, y0 + 3) - exact) / exact;
+    }
+    qsort(errors, BOXES, sizeof *errors, support_compare_doubles);
+    EXPECT(errors[BOXES * 99 / 100] <= 5e-6);
+    EXPECT(errors[BOXES - 1] < 1e-4);
+    sat_destroy(t);
+    free(p);
+    free(errors);
+}
+
 TEST(large_boxes_across_super_tiles)
 {
     enum { W = 2300, H = 1200 };

@@ -714,7 +714,7 @@ static void test_tiles_equal(const sat_gl *g, const sat_table *t, int channels)
     for (c = 0; c < channels; c++) {
         for (y = 0; y < height; y++)
             for (x = 0; x < width; x++)
-                wrong += sat__cells(t, c, y / 64, y % 64)[x] != cells[(y * width + x) * n + c];
+                wrong += sat__cells(t, c, y / 32, y % 32)[x] != cells[(y * width + x) * n + c];
         for (y = 0; y < t->tiles_y; y++)
             for (x = 0; x < t->tiles_x; x++) {
                 size_t at = (size_t)(y * t->tiles_x * channels + c * t->tiles_x + x) * 4;

@@ -10,7 +10,7 @@
 
 static const char *const kind_names[] = {"tiled", "float", "double", "fixed32", "fixed64"};
 
-/* ---- pictures: constant, uniform, 14 decades in smooth patches, uniform with one pixel of 1e8 */
+/* ---- pictures: constant, uniform, 14 decades in patches of 128 pixels, uniform with one pixel of 1e8 */
 
 enum { CONSTANT, UNIFORM, HDR14, SPIKE, PICTURES };
 static const char *const picture_names[] = {"constant", "uniform", "14 decades", "spike 1e8"};
@@ -197,7 +197,7 @@ static void precision_rows(const float *p, int n, const char *picture, const rep
         qsort(relative, (size_t)count, sizeof *relative, support_compare_doubles);
         bench_row("%s\t%s\t%d\t%d\t%.2g\t%.2g\t%.2g\t%.2g\t%.2g\t%.3f\t%.2f\t%d", picture, r->name, n, side, rms / mean,
                   worst / mean, relative[count / 2] + 1e-17, relative[count * 99 / 100] + 1e-17, relative[count - 1],
-                  (double)negative / count, time, r->kind == SAT_KIND_TILED && r->tile == 64);
+                  (double)negative / count, time, r->kind == SAT_KIND_TILED && r->tile == sat_defaults().tile);
     }
     sat_destroy(t);
 }
@@ -250,7 +250,7 @@ static void bench_luminance_range(void)
             }
             qsort(relative, MOST, sizeof *relative, support_compare_doubles);
             bench_row("%d\t%s\t%.2g\t%.2g\t%d", decades, representations[r].name, relative[MOST / 2] + 1e-17, relative[MOST * 99 / 100] + 1e-17,
-                      representations[r].kind == SAT_KIND_TILED && representations[r].tile == 64);
+                      representations[r].kind == SAT_KIND_TILED && representations[r].tile == sat_defaults().tile);
             sat_destroy(t);
         }
     }
@@ -427,6 +427,114 @@ static void bench_blur(void)
     bench_missing("OpenCV", "libopencv-dev");
 }
 #endif
+
+/* ---- the side of a tile */
+
+/* 14 decades as smooth as a sky: about one for 100 pixels. */
+static void make_smooth_picture(float *p, int n)
+{
+    uint64_t state = 3;
+    for (int y = 0; y < n; y++)
+        for (int x = 0; x < n; x++) {
+            double e = 7 * sin(x * 0.0031 + 1.3 * sin(y * 0.0017)) * cos(y * 0.0023 + 0.7) + 1 +
+                       0.6 * (support_uniform(&state) - 0.5);
+            p[(size_t)y * (size_t)n + (size_t)x] = (float)fmin(fmax(pow(10, e), 1e-6), 1e8);
+        }
+}
+
+/* p99 and maximum of the relative errors of 3 x 3 boxes. */
+static void tile_errors(const float *p, int n, int tile, double *p99, double *most)
+{
+    static double relative[MOST];
+    sat_image image = sat_image_f32(p, n, n, 1);
+    sat_options o = sat_defaults();
+    sat_table *t;
+    uint64_t state = 7;
+    *p99 = *most = 0;
+    o.tile = tile;
+    if (sat_create(&t, n, n, 1, &o) != SAT_OK) return;
+    sat_build(t, &image);
+    for (int i = 0; i < MOST; i++) {
+        int x = support_below(&state, n - 3), y = support_below(&state, n - 3);
+        double exact = exact_sum(p, n, x, y, x + 3, y + 3);
+        relative[i] = fabs(sat_sum(t, 0, x, y, x + 3, y + 3) - exact) / exact;
+    }
+    sat_destroy(t);
+    qsort(relative, MOST, sizeof *relative, support_compare_doubles);
+    *p99 = relative[MOST * 99 / 100];
+    *most = relative[MOST - 1];
+}
+
+static void bench_tiles(void)
+{
+    static const int radii[] = {1, 5, 20, 100};
+    int n = bench_smoke() ? 256 : 2048;
+    size_t pixels = (size_t)n * (size_t)n;
+    float *p = (float *)malloc(pixels * 4), *rough = (float *)malloc(pixels * 4), *smooth = (float *)malloc(pixels * 4),
+          *out = (float *)malloc(pixels * 4);
+    char *to = (char *)malloc(pixels * 4), *from = (char *)malloc(pixels * 4);
+    int *x = (int *)malloc(LOOKUPS * sizeof(int)), *y = (int *)malloc(LOOKUPS * sizeof(int));
+    int *boxes = (int *)malloc(4 * 4096 * sizeof(int));
+    double *sums = (double *)malloc(4096 * sizeof(double));
+    sat_options o = sat_defaults();
+    sat_table *flat;
+    memset(to, 1, pixels * 4);
+    memset(from, 1, pixels * 4);
+    make_picture(p, n, UNIFORM);
+    make_picture(rough, n, HDR14);
+    make_smooth_picture(smooth, n);
+    sat_image image = sat_image_f32(p, n, n, 1);
+    o.kind = SAT_KIND_FLOAT;
+    if (sat_create(&flat, n, n, 1, &o) != SAT_OK) return;
+    sat_build(flat, &image);
+    bench_table("Side of a tile: what the default weighs",
+                "tile\tbytes_a_pixel\tsmooth_p99\tsmooth_max\trough_p99\trough_max\tbuild_memcpy_ratio\t"
+                "lookup_1\tlookup_5\tlookup_20\tlookup_100\tfilter_5\tfilter_100\tdefault");
+    bench_note("relative errors of 3 x 3 boxes in 14 decades, smooth (one decade in 100 pixels) and rough (patches of 128)");
+    bench_note("lookup_r: sat_sums over a bare float lookup; filter_r: over sat_box_filter of SAT_KIND_FLOAT");
+    for (int tile = 8; tile <= 128; tile *= 2) {
+        double e[4], look[4], box[2];
+        build_work w;
+        copy_work c = {to, from, (size_t)((double)pixels * 4.25)};
+        c.bytes = c.bytes < pixels * 4 ? c.bytes : pixels * 4;
+        o = sat_defaults();
+        o.tile = tile;
+        w.image = image;
+        if (sat_create(&w.table, n, n, 1, &o) != SAT_OK) return;
+        tile_errors(smooth, n, tile, &e[0], &e[1]);
+        tile_errors(rough, n, tile, &e[2], &e[3]);
+        double time = bench_ratio(build, &w, copy, &c, bench_rounds(15)).ratio;
+        for (int r = 0; r < 4; r++) {
+            uint64_t state = 9;
+            for (int i = 0; i < LOOKUPS; i++) {
+                x[i] = radii[r] + support_below(&state, n - 2 * radii[r]);
+                y[i] = radii[r] + support_below(&state, n - 2 * radii[r]);
+            }
+            lookup_work work = {w.table, x, y, radii[r], 0, boxes, sums}, peer = {flat, x, y, radii[r], 0, NULL, NULL};
+            look[r] = bench_ratio(look_up_many, &work, look_up_bare, &peer, bench_rounds(9)).ratio;
+        }
+        for (int r = 0; r < 2; r++) {
+            filter_work f = {w.table, out, r ? 100 : 5, n, w.table, image};
+            filter_work g = {flat, out, r ? 100 : 5, n, flat, image};
+            box[r] = bench_ratio(filter, &f, filter, &g, bench_rounds(5)).ratio;
+        }
+        bench_row("%d\t%.3f\t%.2g\t%.2g\t%.2g\t%.2g\t%.2f\t%.2f\t%.2f\t%.2f\t%.2f\t%.2f\t%.2f\t%d", tile,
+                  (double)sat_get_stats(w.table).bytes / (double)pixels, e[0], e[1], e[2], e[3], time, look[0], look[1],
+                  look[2], look[3], box[0], box[1], tile == sat_defaults().tile);
+        sat_destroy(w.table);
+    }
+    sat_destroy(flat);
+    free(p);
+    free(rough);
+    free(smooth);
+    free(out);
+    free(to);
+    free(from);
+    free(x);
+    free(y);
+    free(boxes);
+    free(sums);
+}
 
 static void update(void *user)
 {
@@ -630,6 +738,7 @@ int main(void)
     bench_build();
 #ifndef BENCH_BUILD_ONLY
     bench_lookups();
+    bench_tiles();
     bench_whole_images();
     bench_blur();
     bench_siblings();
