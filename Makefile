@@ -235,8 +235,8 @@ $(B)/bench/bench_%: tests/bench/bench_%.cpp
 	$(COMPILE_CXX) -Itests/bench $(PICTURES) $(PEERS) $< -o $@ $(PICTURE_LIBS) $(OPENCV_LIB) $(EMBREE_LIB) $(LDLIBS)
 
 # a table comes whole or not at all: what fails is named, and no table of another day stands in for it
-RUN_BENCH = mkdir -p $(@D) && rm -f $@ && echo '  bench $(@F:.tsv=)' >&2 && \
-    { QUICK='$(QUICK)' SMOKE='$(SMOKE)' NO_PACKAGES='$(NO_PACKAGES)' $< $(ARGS) >$@.part && mv $@.part $@ || \
+RUN_BENCH = mkdir -p $(@D)/pictures && rm -f $@ && echo '  bench $(@F:.tsv=)' >&2 && \
+    { QUICK='$(QUICK)' SMOKE='$(SMOKE)' NO_PACKAGES='$(NO_PACKAGES)' BENCH_PICTURES='$(@D)/pictures' $< $(ARGS) >$@.part && mv $@.part $@ || \
       { echo 'failed: bench $(@F:.tsv=)' >&2; false; }; }
 bench: $(BENCHES:%=$(OUT)/%.tsv)
 	@cat $^

@@ -42,6 +42,16 @@ case $lib in
             if grep -q "<h3><a href=\"#$bench\">" "$html" && ! grep -A1 "<h3><a href=\"#$bench\">" "$html" | grep -q 'Not measured'; then pass
             else fail "the page has no answer for $bench: its table has no default row, or another title"; fi
         done
+        for bench in sat tonemap ssao_sat fiv raindrop softassign; do   # and a line of each in the summary
+            if grep -q "^<tr><td><a href=\"#answer-$bench\">" "$html"; then pass; else fail "the summary has no line of $bench"; fi
+        done
+        for bench in sat tonemap ssao_sat raindrop; do   # pictures of where they err, inside the page; those of fiv need data
+            if [ -s "$out/pictures/${bench}_truth.png" ] && [ -s "$out/pictures/${bench}_default.png" ] &&
+               grep -A1 "^<h3>$bench.h: " "$html" | grep -q 'src="data:image/png;base64,iVBOR'; then pass
+            else fail "the page has no pictures of $bench"; fi
+        done
+        empty "what the page asks of a network" "$(grep -oE '(src|href)="(https?:)?//[^"]*' "$html")"
+        if grep -q '<title>[^<]*time[^<]* [0-9]' "$html" || ! command -v gnuplot >/dev/null; then pass; else fail "no point of a plot tells its values"; fi
         if [ -s "$html" ] && grep -q '</html>' "$html"; then pass; else fail "the page is not whole"; fi
         if [ $lib = none ]; then
             for peer in OpenCV Embree; do

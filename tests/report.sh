@@ -1,6 +1,7 @@
 #!/bin/bash
 # One self-contained HTML page from benchmark tables; tests/bench/bench.h states their form. Plots by gnuplot, inside.
-# First the answers, one row a technique; then error against run time, extreme cases, what is left out; all tables at the end.
+# First the answers, a line and then a table and a plot for each technique; then where the errors are, error against run time, extreme
+# cases, what is left out; all tables at the end.
 # usage: [PLOTS=docs] tests/report.sh TABLE.tsv... >index.html; PLOTS: plots that have a name (picture=name) go there too
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
@@ -15,6 +16,7 @@ split() {
     awk -v dir="$dir" '
         function name(kind) { return dir "/" n "." kind }
         /^# table:/ { ++n; open = 1; print substr($0, 10) > name("title"); next }
+        /^# picture:/ && n { print substr($0, 12) > (dir "/pictures"); next }
         /^# plot:/ && n { print substr($0, 9) > name("plots"); next }
         /^# note:/ && n { print substr($0, 9) > name("notes"); next }
         /^# missing:/ && n { print substr($0, 12) > name("notes"); next }
@@ -29,23 +31,24 @@ value() { tr ';' '\n' <<<"$2" | sed -n "s/^ *$1=//p" | head -1 | sed 's/ *$//'; 
 
 # words COLUMN: the name of a column as a reader says it, with its unit
 words() {
-    sed -E 's/^(time_ratio)$/time (times the reference)/; s/^rms_codes$/error (8-bit codes, root mean square)/; s/^(n?rmse)$/error (root mean square)/
+    sed -E 's/^time_ratio$/time ('"${reference:-times the reference}"')/; s/^rms_codes$/error (8-bit codes, root mean square)/; s/^(n?rmse)$/error (root mean square)/
         s/^rmse_other_scene$/error on a scene held out (root mean square)/; s/^time_memcpy_ratio$/time (times that of a copy)/; s/^point_us$/time of a point (µs)/
         s/^(median|p99)_relative$/relative error of a box (\1)/; s/^excess$/cost above the optimum (share)/; s/^certified_gap$/proven gap (share)/
         s/_ms$/ (ms)/; s/_us$/ (µs)/; s/_mb$/ (MB)/; s/_s$/ (s)/; s/_percent$/ (percent)/; s/_ratio$/ (ratio)/; s/_codes$/ (8-bit codes)/; s/_/ /g' <<<"$1"
 }
-# good COLUMN COLUMN: which way is better
+# good COLUMN COLUMN: which way is better, in a plot with these axes
 good() {
     local x='(time|_ms|_us|memcpy)' y='(err|rms|relative|excess|gap|_ms|accesses|mismatch|codes)'
-    if [[ $1 =~ $x && $2 =~ $y ]]; then echo '(better: down and left)'; elif [[ $2 =~ fps ]]; then echo '(better: up)'; elif [[ $2 =~ $y || $2 =~ $x ]]; then echo '(better: down)'; fi
+    if [[ $1 =~ $x && $2 =~ $y ]]; then echo 'down and left is better'; elif [[ $2 =~ fps ]]; then echo 'up is better'; elif [[ $2 =~ $y || $2 =~ $x ]]; then echo 'down is better'; fi
 }
 
 # plot ROWS LINE: an SVG on stdout; nothing when a column is missing or no row has numbers. One colour and mark for each value of
-# the column `by`, a red ring around the default.
+# the column `by`, or of its first words where there are many; a red ring around the default. titled=1: the title stands inside.
 plot() {
-    local rows=$1 x y log style title
+    local rows=$1 x y log style title families
     title=${2%%;*} x=$(value x "$2") y=$(value y "$2") log=$(value log "$2") style=$(value style "$2")
-    awk -F '\t' -v x="$x" -v y="$y" -v by="$(value by "$2")" -v where="$(value where "$2")" -v style="${style:-points}" -v log_axes="$log" '
+    [ "$(awk -F '\t' -v by="$(value by "$2")" 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == by) c = i } NR > 1 && c && !seen[$c]++ { ++n } END { print n + 0 }' "$1")" -le 14 ] || families=1
+    awk -F '\t' -v x="$x" -v y="$y" -v xw="$(words "$x")" -v yw="$(words "$y")" -v by="$(value by "$2")" -v where="$(value where "$2")" -v style="${style:-points}" -v log_axes="$log" -v id="$plot_id" -v families="$families" '
         function number(v) { return v ~ /^ *[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)? *$/ }
         # room around the points; on a logarithmic axis of less than two decades more than the powers of ten get marks
         function range(axis, low, high,    room, power, i, k, mark, marks) {
@@ -75,13 +78,19 @@ plot() {
             u = $column[x] + 0; v = $column[y] + 0
             if (n == 0) { left = right = u; bottom = top = v }
             if (u < left) left = u; if (u > right) right = u; if (v < bottom) bottom = v; if (v > top) top = v
-            key = by in column ? $column[by] : ""
+            full = key = by in column ? $column[by] : ""
+            if (families) sub(/[ ,].*/, "", key)
             if (!(key in points)) names[n++] = key
-            points[key] = points[key] $column[x] " " $column[y] " \"" (key == "" ? "" : key ": ") x " " $column[x] ", " y " " $column[y] "\"\n"
+            points[key] = points[key] $column[x] " " $column[y] " \"" (full == "" ? "" : full ": ") xw " " $column[x] ", " yw " " $column[y] "\"\n"
             if ("default" in column && $column["default"] == 1) ring = ring $column[x] " " $column[y] "\n"
         }
         END {
             if (n == 0) exit
+            # names below, in as many columns as they leave room for
+            for (i = 0; i < n; ++i) if (length(names[i]) > longest) longest = length(names[i])
+            columns = longest < 14 ? 3 : longest < 27 ? 2 : 1; lines = int((n + (ring != "") + columns - 1) / columns)
+            printf "set terminal svg size 520,%d dynamic font \"sans-serif,14\" background rgb \"white\" name \"%s\"\n", 335 + 18 * lines, id
+            printf "set key outside center bottom horizontal maxcols %d noenhanced reverse Left samplen 1 spacing 1 font \",13\"\n", columns
             range("x", left, right); range("y", bottom, top)
             for (i = 0; i < n; ++i) printf "$series%d << end\n%send\n", i, points[names[i]]
             if (ring != "") printf "$default << end\n%send\n", ring
@@ -97,16 +106,34 @@ plot() {
         }' "$rows" >"$work/plot"
     [ -s "$work/plot" ] || return
     {
-        echo "set terminal svg size 500,360 dynamic font 'sans-serif,12' background rgb 'white' name '$plot_id'"
-        echo "set title \"${title//[\"\\]/}\\n$(good \"$x\" \"$y\")\" noenhanced font ',11'; set xlabel '$(words "$x")' noenhanced; set ylabel '$(words "$y")' noenhanced"
-        echo "set key outside right top maxcols 1 noenhanced reverse Left samplen 1.2 spacing 0.9 font ',10'; set grid linecolor rgb '#dddddd'"
-        echo "set format '%g'"
+        [ -z "$titled" ] || echo "set title \"${title//[\"\\]/}\\n$(good "$x" "$y")\" noenhanced font ',13'"
+        echo "set xlabel \"$(words "$x")\n\" offset 0,0.5 noenhanced; set ylabel '$(words "$y")' noenhanced; set grid linecolor rgb '#dddddd'; set format '%g'"
         [ -z "$log" ] || echo "set logscale $log"
         cat "$work/plot"
     } | gnuplot 2>"$work/errors" | sed -e '/<?xml/d' -e '/<!DOCTYPE/,/>/d' \
         -e "s|<g onmousemove=\"gnuplot_svg.showHypertext(evt,'\(.*\)')\"[^>]*><title> </title>|<g><title>\1</title>|" \
         -e 's|<title>[^<]*_plot_[0-9]*</title>||' -e 's|<title>\$[^<]*</title>||'
     ! [ -s "$work/errors" ] || { echo "$plot_id:"; cat "$work/errors"; } >&2
+}
+
+# figure ROWS LINE: the plot with its title and which way is better as a caption, which wraps
+figure() {
+    plot "$1" "$2" >"$work/svg"
+    [ -s "$work/svg" ] || return
+    printf '<figure><figcaption>%s <span>%s</span></figcaption>\n' "$(escape <<<"${2%%;*}")" "$(good "$(value x "$2")" "$(value y "$2")")"
+    cat "$work/svg"
+    echo '</figure>'
+}
+
+# pictures ID FOLDER: the pictures of a header in a row, inside the page
+pictures() {
+    local file caption scale low high
+    while IFS=';' read -r file caption scale low high; do
+        file=$2/pictures/${file// /}
+        [ -s "$file" ] || continue
+        printf '<figure><img alt="%s" src="data:image/png;base64,%s">' "$(escape <<<"${caption# }")" "$(base64 <"$file" | tr -d '\n')"
+        printf '<figcaption>%s<br>%s <i class=%s></i> %s</figcaption></figure>\n' "$(escape <<<"${caption# }")" "${low# }" "${scale# }" "${high# }"
+    done <"$work/$1/pictures"
 }
 
 # the rows as an HTML table; the default's in bold; a column of nothing but "-" belongs to a peer that is not here
@@ -154,35 +181,41 @@ compare() {
     awk -v a="$1" -v b="$2" -v word="$3" 'BEGIN {
         if (a == "" || b == "" || b + 0 <= 0) exit
         r = a / b
-        if (r < 1e-4) printf "%s %.0e times smaller", word, 1 / (r > 1e-30 ? r : 1e-30)
+        if (r < 1e-6) printf "%s %.2g million times smaller", word, 1e-6 / (r > 1e-30 ? r : 1e-30)
+        else if (r < 1e-3) printf "%s %.0f thousand times smaller", word, 1e-3 / r
         else if (r < 0.5) printf "%s %.3g times smaller", word, 1 / r
         else if (r < 0.97) printf "%.0f %% of the %s", 100 * r, word
         else if (r < 1.03) printf "the same %s", word
         else printf "%.3g times the %s", r, word }'
 }
 
-# One row of the answers: header, what it does, table, rows to look at, column of error, of time, row of the published method,
-# rows of peers (their best is taken), anchor.
+# One of the answers: header, what it does, table, rows to look at, column of error, of time, row of the published method, rows of
+# peers (their best is taken), a sentence more, what takes the time 1, the error that stands for none. A line goes into the summary.
 answer() {
-    local id=$1 what=$2 file where=$4 e=$5 t=$6 published=$7 peers=$8 de dt pe pt qe qt qname by text= line
+    local id=$1 what=$2 file where=$4 e=$5 t=$6 published=$7 peers=$8 de dt pe pt qe qt qname by text= line reference=${10:+1: ${10}} none=${11} p= q=
     file=$(rows "$id" "$3")
     by=${published%%:*}
-    printf '<section class=answer><div><h3><a href="#%s">%s.h</a></h3><p>%s</p>' "$id" "$id" "$what"
+    printf '<section class=answer id="answer-%s"><div><h3><a href="#%s">%s.h</a></h3><p>%s</p>' "$id" "$id" "$id" "$what"
     de=$(pick "$file" "$where;default:1" "$e") dt=$(pick "$file" "$where;default:1" "$t")
     if [ -z "$de" ]; then echo "<p class=note>Not measured in this run.</p></div></section>"; return; fi
+    said() { if [ -n "$none" ] && awk -v v="$1" -v none="$none" 'BEGIN { exit v + 0 > none + 0 }'; then echo none; else echo "$1"; fi; }
+    against() { if [ "$(said "$2")" = none ]; then echo "no error, either"; elif [ "$(said "$1")" = none ]; then echo "no error against $2"; else compare "$1" "$2" error; fi; }
     [ -z "$published" ] || { pe=$(pick "$file" "$where;$published" "$e") pt=$(pick "$file" "$where;$published" "$t"); }
     [ -z "$peers" ] || qe=$(pick "$file" "$where;$peers" "$e" least)
     [ -z "$qe" ] || { qt=$(pick "$file" "$where;$peers;$e:$qe" "$t"); qname=$(pick "$file" "$where;$peers;$e:$qe" "$by"); }
-    echo "<table><tr><th><th>$(words "$e")<th>$(words "$t")</tr><tr class=default><td>default<td>$de<td>$dt</tr>"
-    [ -z "$pe" ] || echo "<tr><td>published method<td>$pe<td>$pt</tr>"
-    [ -z "$qe" ] || echo "<tr><td>best peer: $(escape <<<"$qname")<td>$qe<td>$qt</tr>"
+    echo "<table><tr><th><th>$(words "$e")<th>$(words "$t")</tr><tr class=default><td>default<td>$(said "$de")<td>$dt</tr>"
+    [ -z "$pe" ] || echo "<tr><td>published method<td>$(said "$pe")<td>$pt</tr>"
+    [ -z "$qe" ] || echo "<tr><td>best peer: $(escape <<<"$qname")<td>$(said "$qe")<td>$qt</tr>"
     echo "</table>"
-    [ -z "$pe" ] || text="Against the published method: $(compare "$de" "$pe" error), $(compare "$dt" "$pt" time)."
-    [ -z "$qe" ] || text="$text Against the best peer: $(compare "$de" "$qe" error), $(compare "$dt" "$qt" time)."
+    [ -z "$pe" ] || p="$(against "$de" "$pe"), $(compare "$dt" "$pt" time)" text="Against the published method: $p."
+    [ -z "$qe" ] || q="$(against "$de" "$qe"), $(compare "$dt" "$qt" time)" text="$text Against the best peer: $q."
+    printf '<tr><td><a href="#answer-%s">%s</a><td>%s<td>%s<td class=text>%s<td class=text>%s</tr>\n' "$id" "$id.h" \
+        "$(said "$de") $(words "$e" | sed 's/^[^(]*//')" "$dt $(words "$t" | sed 's/^[^(]*//')" "${p:-&ndash;}" \
+        "${q:-${9:-&ndash;}}${q:+ ($(escape <<<"$qname"))}" >>"$work/summary"
     printf '<p class=said>%s %s</p></div><div class=plots>' "$text" "$9"
     line=$(grep -h 'picture=' "${file%.rows}.plots" 2>/dev/null | head -1)
     plot_id=answer_$id
-    [ -z "$line" ] || [ -z "$plotting" ] || plot "$file" "$line"
+    [ -z "$line" ] || [ -z "$plotting" ] || figure "$file" "$line"
     echo "</div></section>"
 }
 
@@ -201,6 +234,10 @@ for file; do [ ! -s "$file" ] || split "$file" >/dev/null; done
 first=
 for file; do [ ! -s "$file" ] || { first=$file; break; }; done
 missing=$(cat "$@" 2>/dev/null | sed -n 's/^# missing: \(.*\) is not installed (\([^)]*\)).*/\1 (\2)/p' | sort -u | paste -sd';')
+present=
+for peer in OpenCV:sat Embree:fiv pfstools:tonemap scipy:softassign; do
+    [ ! -d "$work/${peer#*:}" ] || [[ $missing == *"${peer%:*}"* ]] || present="$present${present:+, }${peer%:*}"
+done
 
 cat <<'HTML'
 <!DOCTYPE html>
@@ -216,35 +253,68 @@ th:first-child, td:first-child, th.text, td.text { text-align: left } td.text { 
 tr.default td { font-weight: 700; color: #c03030 } td.pass { color: #087030 } td.fail { color: #fff; background: #c02020; font-weight: 700 }
 .answer { display: grid; grid-template-columns: minmax(0, 1fr) minmax(0, 480px); gap: 0 20px; border-top: 1px solid #ccc; padding: 1em 0 }
 .answer p { margin: .3em 0 } .said { font-weight: 600 }
-.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 480px), 1fr)); gap: 12px } .plots svg { width: 100%; height: auto; border: 1px solid #eee }
+.plots { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 480px), 1fr)); gap: 12px } .plots svg { width: 100%; height: auto; border: 1px solid #eee }
+figure { margin: 0 } figcaption { font-size: 13px } .plots figcaption span { color: #087030; display: block }
+.pictures { display: flex; flex-wrap: wrap; gap: 12px; margin: .4em 0 1.4em } .pictures figure { width: min(calc(50% - 6px), 240px) }
+.pictures img { width: 100%; image-rendering: pixelated; border: 1px solid #ddd; display: block }
+figcaption i { display: inline-block; width: 70px; height: 9px; border: 1px solid #bbb; print-color-adjust: exact; -webkit-print-color-adjust: exact }
+.grey { background: linear-gradient(90deg, #000, #fff) } .heat { background: linear-gradient(90deg, #fff, #ffe678, #f0781e, #b4141e, #1e0014) }
+.signed { background: linear-gradient(90deg, #142896, #6ea0e6, #fff, #f08c64, #960a1e) }
 .note, .machine { color: #666 } details { margin: .4em 0 }
-@media (max-width: 800px) { .answer { grid-template-columns: minmax(0, 1fr) } }
-@media print { nav { display: none } details:not([open]) { display: none } .answer, .plots svg { break-inside: avoid } body { max-width: none } }
+@media (max-width: 800px) {
+    .answer { grid-template-columns: minmax(0, 1fr) }
+    .summary :is(th, td):is(:nth-child(2), :nth-child(3)) { display: none } .summary td { min-width: 0 !important }
+}
+@media print { nav { display: none } details:not([open]) { display: none } .answer, figure, tr { break-inside: avoid } h2, h3 { break-after: avoid } body { max-width: none } }
 </style></head><body>
 <h1>lightscan: error against run time</h1>
-<nav><a href="#answers">Answers</a> <a href="#time">Error against run time</a> <a href="#cases">Stiff and extreme cases</a> <a href="#left">What is left out</a> <a href="#tables">All tables</a></nav>
+<nav><a href="#answers">Answers</a> <a href="#where">Where the errors are</a> <a href="#time">Error against run time</a> <a href="#cases">Stiff and extreme cases</a> <a href="#left">What is left out</a> <a href="#tables">All tables</a></nav>
 HTML
 printf '<p class=machine>%s. Compiled with %s. %s, commit %s. %s</p>\n' "$(sed -n 's/^# machine: *//p' "$first" /dev/null | head -1 | escape)" \
     "$(escape <<<"${REPORT_FLAGS:-unknown options}")" "$(date -u '+%Y-%m-%d %H:%M UTC')" "$(git rev-parse --short HEAD 2>/dev/null || echo unknown)" \
-    "${missing:+Not installed, their rows and columns are left out: $(escape <<<"$missing").}"
+    "${present:+Peers in this run: $(escape <<<"$present"). }${missing:+Not installed, their rows and columns are left out: $(escape <<<"$missing").}"
 [ -z "$REPORT_SHORT" ] || echo "<p class=fail>A short run ($REPORT_SHORT): fewer and smaller inputs, fewer repetitions. Run make report for figures to quote.</p>"
 
-echo '<h2 id=answers>What each default costs and errs</h2><p>Measured in this run, one thread. Red is the default; a ring marks it in the plots; a value shows where the pointer rests. Down and left is better.</p>'
+# the answers come into a file, for the lines of the summary stand before them
+{
 answer sat "Sums over any box of a picture in four reads; tiles keep them exact where a plain table drowns. Boxes of 3 x 3 in a picture of 14 decades; error: half of the boxes err by less, relative to their own mean." \
     "Precision" "picture:14 decades;box:3;side:$(pick "$(rows sat Precision)" "" side last)" median_relative time_memcpy_ratio "representation:float" "" \
     "$(v=$(pick "$(rows sat Build)" default:1 opencv_speedup); [ -z "$v" ] || echo "OpenCV's integral takes $v times the time of our build.")"
-answer tonemap "HDR photographs to 8 bit, Reinhard's local operator by box sums. Error: against the exact Gaussian operator." \
-    "Local operators" "picture:$(pick "$(rows tonemap "Local operators")" "" picture)" rms_codes time_ratio "operator:exact boxes" "operator:~^pfstmo" ""
+answer tonemap "HDR photographs to 8 bit, a local operator in constant time a pixel. Error: against Reinhard's local operator with exact Gaussians." \
+    "Local operators" "picture:$(pick "$(rows tonemap "Local operators")" "" picture)" rms_codes time_ratio "operator:exact boxes" "operator:~^pfstmo" \
+    "The default is meant to differ: beside an edge of 100:1 its halo is $(pick "$(rows tonemap Halos)" "contrast:100;default:1" dark_side_codes) codes, that of the published operator $(pick "$(rows tonemap Halos)" "contrast:100;operator:exact Gaussian" dark_side_codes)." \
+    "local, soft scales"
 answer ssao_sat "Ambient occlusion from a depth buffer. Error: against rays, three scenes, three radii." \
-    "Error against time: 3" "" rmse time_ratio "method:refined, as printed" "method:~^(SSAO|HBAO|GTAO)" ""
+    "Error against time: 3" "" rmse time_ratio "method:refined, as printed" "method:~^(SSAO|HBAO|GTAO|XeGTAO|bitmask)" "" "minimalist"
 answer fiv "Soft shadows of rigid things under a whole sky. Error: against rays to every texel of the light." \
     "A plane below" "environment:forest" nrmse point_us "accuracy:published" "" \
-    "$(v=$(pick "$(rows fiv "A plane below")" "environment:forest;default:1" brute_ratio); [ -z "$v" ] || echo "Rays take $v times the time.")"
+    "$(v=$(pick "$(rows fiv "A plane below")" "environment:forest;default:1" brute_ratio); [ -z "$v" ] || echo "Rays take $v times the time."
+       f=$(rows fiv Suns) v=$(pick "$f" "environment:forest;gap_R:0.002" nrmse)
+       [ -z "$v" ] || echo "On the floor it errs by $v, 128 rays a point by $(pick "$f" "environment:forest;gap_R:0.002" nrmse_128_rays), in $(pick "$f" "environment:forest;gap_R:0.002" time_over_rays | awk '{ printf "%.2g", $1 }') times their time.")"
 answer raindrop "Rain of refracting drops. Error: against rays through every drop, 100000 drops." \
     "Rain: 100000" "" rmse time_ratio "method:map, unsorted (as published)" "" \
-    "$(v=$(pick "$(rows raindrop "Rain: 100000")" default:1 reference_over_this_ratio); [ -z "$v" ] || echo "Rays take $v times the time.")"
+    "$(v=$(pick "$(rows raindrop "Rain: 100000")" default:1 reference_over_this_ratio); [ -z "$v" ] || echo "Rays take $v times the time.")" "sprites, sorted"
 answer softassign "Photographs as mosaics of tiles: who goes where, at proven cost. Error: cost above the optimum, 100 cells of 100 tiles." \
-    "Error against time, fig" "size:100x100" excess time_ms "method:published" "method:~^(LAPJV|annealing|ants)" ""
+    "Error against time, fig" "size:100x100" excess time_ms "method:published" "method:~^(LAPJV|annealing|ants)" "" "" 1e-7
+} >"$work/answers"
+echo '<h2 id=answers>What each default costs and errs</h2><p>Measured in this run, one thread. Red is the default; a ring marks it in the plots; a value shows where the pointer rests. Smaller is better, in the plots down and left.</p>'
+if [ -s "$work/summary" ]; then
+    echo '<div class=wide><table class=summary><tr><th>header<th>error<th>time<th class=text>the default against the published method<th class=text>against the best peer measured</tr>'
+    cat "$work/summary"
+    echo '</table></div>'
+fi
+cat "$work/answers"
+
+if [ -n "$(find "$work" -name pictures -type f)" ]; then
+    echo '<h2 id=where>Where the errors are</h2><p>White: none. Blue: too dark, red: too bright. The first of each row is the reference.</p>'
+    where() { [ ! -s "$work/$1/pictures" ] || { echo "<h3>$1.h: $2</h3><div class=pictures>"; pictures "$1" "$folder"; echo '</div>'; }; }
+    folder=$(dirname "$first")
+    where sat 'relative error of boxes of 3 x 3 in a picture of 14 decades, powers of ten'
+    where tonemap 'local operators against the exact Gaussian one, 8-bit codes'
+    where ssao_sat 'ambient occlusion of a room, radius 0.25, against rays'
+    where fiv 'the floor below a rabbit, seen from above, in a forest; share of the brightest'
+    where raindrop '100000 drops of 2 mm, tone-mapped luminance from 0 to 1'
+fi
 
 echo '<h2 id=time>Error against run time</h2><div class=plots>'
 if [ -n "$plotting" ]; then
@@ -256,7 +326,7 @@ if [ -n "$plotting" ]; then
                 n=$((n + 1))
                 [[ $(good "$(value x "$line")" "$(value y "$line")") == *left* ]] && [[ $line != *picture=* ]] || continue
                 plot_id=time_${id}_$(basename "$f" .plots)_$n
-                plot "${f%.plots}.rows" "$id.h: $line"
+                figure "${f%.plots}.rows" "$id.h: $line"
             done <"$f"
         done
     done
@@ -273,7 +343,7 @@ case_row sat "Sums of 3 x 3 boxes below zero, where all pixels are positive (sha
 f=$(rows tonemap "Ashikhmin's operator")
 case_row tonemap "One firefly of a million times the largest luminance: root mean square change elsewhere, codes" "" "$(pick "$f" "" firefly_rms last)" 0.5
 f=$(rows ssao_sat "The same against the range of depth")
-case_row ssao_sat "A far background: error of a box mean of 1/z in depth steps (one tenth shows), farthest five decades behind the nearest or nearest to that" \
+case_row ssao_sat "A far background: error of a box mean of 1/z in depth steps (one tenth shows), the farthest three decades behind the nearest" \
     "$(pick "$f" "table:float;decades:3" largest_error)" "$(pick "$f" "table:~^uint32;decades:3" largest_error)" 0.1
 f=$(rows fiv "Occluders cut")
 case_row fiv "An occluder cut by the horizon: error of the light it takes, centre on the horizon" \
@@ -330,9 +400,9 @@ for file; do
             p=0
             while IFS= read -r line; do
                 plot_id=${id}_${t}_$((++p))
-                plot "$work/$id/$t.rows" "$line" | tee "$work/svg"
+                figure "$work/$id/$t.rows" "$line"
                 name=$(value picture "$line")
-                [ -z "$PLOTS" ] || [ -z "$name" ] || ! [ -s "$work/svg" ] || cp "$work/svg" "$PLOTS/$name.svg"
+                [ -z "$PLOTS" ] || [ -z "$name" ] || ! [ -s "$work/svg" ] || titled=1 plot "$work/$id/$t.rows" "$line" >"$PLOTS/$name.svg"
             done <"$work/$id/$t.plots"
             echo "</div>"
         fi

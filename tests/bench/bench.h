@@ -25,6 +25,9 @@
    and the second time counts. SMOKE=1 asks for the shortest that shows every table once: bench_smoke(), and
    bench_quick() too; every call is made once, and the figures say nothing.
 
+   A picture of a table, the reference or where a method errs, is bench_picture after bench_table: report.sh puts it
+   into the page. The form: "# picture: FILE; caption; scale; low; high", FILE beside the tables in pictures/.
+
    A peer that is not installed loses only its own cells: bench_missing("OpenCV", "libopencv-dev") after bench_table says
    so, bench_cell(value, have_it) makes "-" of them, and the report leaves out a column that has nothing else. */
 
@@ -33,6 +36,7 @@
 
 #include <stdarg.h>
 #include "support.h"
+#include "png.h"
 
 static inline int bench_set(const char *name)
 {
@@ -115,6 +119,49 @@ static inline void bench_row(const char *format, ...)
     va_end(arguments);
     putchar('\n');
     fflush(stdout);
+}
+
+/* The colour of v in 0..1. BENCH_GREY: black to white; BENCH_HEAT: white, yellow, red, black; BENCH_SIGNED: blue, white
+   at one half, red. */
+typedef enum bench_scale { BENCH_GREY, BENCH_HEAT, BENCH_SIGNED } bench_scale;
+
+static inline void bench_colour(unsigned char *rgb, double v, bench_scale scale)
+{
+    static const double stops[3][5][3] = {
+        {{0, 0, 0}, {64, 64, 64}, {128, 128, 128}, {191, 191, 191}, {255, 255, 255}},
+        {{255, 255, 255}, {255, 230, 120}, {240, 120, 30}, {180, 20, 30}, {30, 0, 20}},
+        {{20, 40, 150}, {110, 160, 230}, {255, 255, 255}, {240, 140, 100}, {150, 10, 30}}};
+    const double(*s)[3] = stops[scale];
+    double at = v > 0 ? (v < 1 ? 4 * v : 4) : 0;
+    int i = at < 3 ? (int)at : 3, k;
+    for (k = 0; k < 3; ++k)
+        rgb[k] = (unsigned char)(s[i][k] + (at - i) * (s[i + 1][k] - s[i][k]) + 0.5);
+}
+
+/* A picture of one value a pixel, low to high along the scale, for the report: into BENCH_PICTURES, nothing without it.
+   Large ones are reduced to means of k x k pixels; the caption says so. */
+static inline void bench_picture(const char *name, const char *caption, const float *values, int width, int height,
+                                 bench_scale scale, double low, double high)
+{
+    enum { MOST = 240 };
+    static const char *const scales[3] = {"grey", "heat", "signed"};
+    const char *folder = getenv("BENCH_PICTURES");
+    int k = ((width > height ? width : height) + MOST - 1) / MOST, w = width / k, h = height / k, x, y, i, j;
+    unsigned char *rgb = folder && *folder ? (unsigned char *)malloc((size_t)w * (size_t)h * 3) : NULL;
+    char path[1024], means[48] = "";
+    if (!rgb) return;
+    for (y = 0; y < h; ++y)
+        for (x = 0; x < w; ++x) {
+            double sum = 0;
+            for (i = 0; i < k; ++i)
+                for (j = 0; j < k; ++j) sum += (double)values[(y * k + i) * width + x * k + j];
+            bench_colour(rgb + 3 * ((size_t)y * (size_t)w + (size_t)x), (sum / (k * k) - low) / (high - low), scale);
+        }
+    snprintf(path, sizeof path, "%s/%s.png", folder, name);
+    if (k > 1) snprintf(means, sizeof means, " (means of %d x %d pixels)", k, k);
+    if (png_save(path, rgb, w, h, 3))
+        printf("# picture: %s.png; %s%s; %s; %g; %g\n", name, caption, means, scales[scale], low, high);
+    free(rgb);
 }
 
 /* Seconds that this thread has computed: other programs on the machine count less than by the wall clock. Work that

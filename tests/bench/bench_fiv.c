@@ -815,8 +815,21 @@ static void sample_rays(void *user)
     }
 }
 
+/* Where the errors are: the green of the floor, brightest 1; what is left of the reference's when it is taken away. */
+static void error_picture(const bench *b, const char *name, const char *caption, int take_away)
+{
+    size_t n = (size_t)(b->side * b->side), i;
+    float *v = (float *)need(malloc(n * sizeof(float))), white = 1e-30f;
+    for (i = 0; i < n; i++) white = fmaxf(white, b->truth[3 * i + 1]);
+    for (i = 0; i < n; i++) v[i] = (take_away ? b->rgb[3 * i + 1] - b->truth[3 * i + 1] : b->truth[3 * i + 1]) / white;
+    if (take_away) bench_picture(name, caption, v, b->side, b->side, BENCH_SIGNED, -0.1, 0.1);
+    else bench_picture(name, caption, v, b->side, b->side, BENCH_GREY, 0, 1);
+    free(v);
+}
+
 static void suns_row(bench *b, const fiv_occluder *o, const char *light, double gap)
 {
+    const int shown = strcmp(light, "forest") == 0 && gap < 0.1;
     sampled s;
     run r;
     fiv_instance instance = instance_of(b, o);
@@ -833,14 +846,17 @@ static void suns_row(bench *b, const fiv_occluder *o, const char *light, double 
     s.count = 0;
     sample_rays(&s);
     memcpy(b->truth, b->rgb, (size_t)points * 3 * sizeof(float));
+    if (shown) error_picture(b, "fiv_truth", "reference: rays to all of the light", 0);
     s.count = 128;
     seconds[0] = median_time(sample_rays, &s, bench_rounds(3));
+    if (shown) error_picture(b, "fiv_peer", "128 rays a point", 1);
     error[0] = reference_nrmse(b->truth, b->rgb, (size_t)points);
     r.b = b, r.instances = &instance, r.count = 1;
     r.options = fiv_irradiance_defaults();
     r.options.own_masks = r.options.rays = r.options.contact = 0;
     seconds[1] = median_time(run_once, &r, bench_rounds(5));
     error[1] = reference_nrmse(b->truth, b->rgb, (size_t)points);
+    if (shown) error_picture(b, "fiv_vectors", "interpolated vectors alone", 1);
     r.options = fiv_irradiance_defaults();
     seconds[2] = median_time(run_once, &r, bench_rounds(3));
     light_points(&r, &stats);
@@ -848,6 +864,7 @@ static void suns_row(bench *b, const fiv_occluder *o, const char *light, double 
     r.options.penumbra = 0;
     light_points(&r, &stats);
     error[3] = reference_nrmse(b->truth, b->rgb, (size_t)points);
+    if (shown) error_picture(b, "fiv_default", "the default, penumbra 0 as the reference has it", 1);
     r.options.own_masks = 0;
     seconds[3] = median_time(run_once, &r, bench_rounds(5));
     error[4] = reference_nrmse(b->truth, b->rgb, (size_t)points);

@@ -193,6 +193,19 @@ static double error_of(const unsigned char *mask)
     return reference_rmse(the.picture, the.truth, mask, SIZE * SIZE, the.key);
 }
 
+/* Where the errors are: tone-mapped luminance, the reference's or what differs from it. */
+static void error_picture(const char *name, const char *caption, int take_away)
+{
+    static float v[SIZE * SIZE];
+    int i;
+    for (i = 0; i < SIZE * SIZE; i++) {
+        double truth = reference_tone(the.truth + 3 * i, the.key);
+        v[i] = (float)(take_away ? reference_tone(the.picture + 3 * i, the.key) - truth : truth);
+    }
+    if (take_away) bench_picture(name, caption, v, SIZE, SIZE, BENCH_SIGNED, -0.1, 0.1);
+    else bench_picture(name, caption, v, SIZE, SIZE, BENCH_GREY, 0, 1);
+}
+
 static raindrop_rain *own_rain(const raindrop_drop *drops, int count)
 {
     raindrop_rain_options o = raindrop_rain_defaults();
@@ -315,6 +328,7 @@ static void bench_box(int count)
     reference_render(the.truth, NULL, SIZE, SIZE, rays(), &camera, raindrop_rain_drops(NULL, f.rain), count,
                      the.environment, 3);
     start = bench_clock() - start;
+    if (count == 100000) error_picture("raindrop_truth", "reference: rays through every drop", 0);
     memcpy(the.picture, the.background, sizeof(float) * 3 * SIZE * SIZE);
     bench_row("no rain\t0\t0\t\t%.4f\t%.3f\t0\t0", error_of(NULL), reference_ssim(the.picture, the.truth, NULL, SIZE, SIZE, the.key));
     for (i = 0; i < 9; i++) {
@@ -326,6 +340,8 @@ static void bench_box(int count)
         draw(&f);
         bench_row("%s\t%.1f\t%.2f\t%.0f\t%.4f\t%.3f\t%zu\t%d", rows[i].name, t.work * 1e3, t.ratio, start / t.work, error_of(NULL),
                   reference_ssim(the.picture, the.truth, NULL, SIZE, SIZE, the.key), f.stats.fragments, i == 4);
+        if (count == 100000 && (i == 1 || i == 4))
+            error_picture(i == 1 ? "raindrop_published" : "raindrop_default", i == 1 ? "sprites from maps, as published" : "the default", 1);
     }
     raindrop_rain_destroy(f.rain);
 }

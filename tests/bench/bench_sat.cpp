@@ -202,6 +202,38 @@ static void precision_rows(const float *p, int n, const char *picture, const rep
     sat_destroy(t);
 }
 
+/* Where the errors are: boxes of 3 x 3 in the middle of the picture, as powers of ten. */
+static void error_pictures(const float *p, int n)
+{
+    enum { SIDE = 192, BOX = 3 };
+    static const struct { const char *name, *caption; int representation; } shown[] = {
+        {"sat_float", "a table of floats", 0},
+        {"sat_default", "tiles of integers, the default", 5},
+        {"sat_double", "a table of doubles", 7}};
+    static float values[SIDE * SIDE];
+    int first = n / 2 - SIDE / 2;
+    for (int i = 0; i < SIDE * SIDE; i++)
+        values[i] = log10f(p[(size_t)(first + i / SIDE) * (size_t)n + (size_t)(first + i % SIDE)]);
+    bench_picture("sat_truth", "the picture, powers of ten", values, SIDE, SIDE, BENCH_GREY, -3, 5);
+    for (int s = 0; s < 3; s++) {
+        const representation *r = &representations[shown[s].representation];
+        sat_image image = sat_image_f32(p, n, n, 1);
+        sat_options o = sat_defaults();
+        sat_table *t;
+        o.kind = r->kind;
+        o.tile = r->tile;
+        if (sat_create(&t, n, n, 1, &o) != SAT_OK) continue;
+        sat_build(t, &image);
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            int x = first + i % SIDE, y = first + i / SIDE;
+            double exact = exact_sum(p, n, x, y, x + BOX, y + BOX);
+            values[i] = (float)log10(fabs(sat_sum(t, 0, x, y, x + BOX, y + BOX) - exact) / exact + 1e-9);
+        }
+        bench_picture(shown[s].name, shown[s].caption, values, SIDE, SIDE, BENCH_HEAT, -8, 0);
+        sat_destroy(t);
+    }
+}
+
 static void bench_precision(void)
 {
     bench_table("Precision: box means against exact sums",
@@ -216,6 +248,7 @@ static void bench_precision(void)
             make_picture(p, n, which);
             for (size_t r = 0; r < sizeof representations / sizeof *representations; r++)
                 precision_rows(p, n, picture_names[which], &representations[r]);
+            if (which == HDR14 && n == (bench_smoke() ? 512 : 2048)) error_pictures(p, n);
         }
         free(p);
     }

@@ -535,6 +535,26 @@ static void tone(const method *m)
     if (m->theirs >= 0) ref_tone(out, pixels, m->fit.gain, m->fit.power);
 }
 
+/* Where the errors are: the room at the middle radius. The sky is left as it is. */
+static void error_pictures(void)
+{
+    static const struct { int method; const char *name, *caption;
+    } shown[3] = {{8, "ssao_sat_default", "slabs, the default"},
+                  {2, "ssao_sat_published", "refined, as published"},
+                  {XEGTAO_HALF, "ssao_sat_peer", "XeGTAO high, half resolution"}};
+    const ref_picture *p = &pictures[1];
+    const float *truth = p->ao[1];
+    int m;
+    size_t i;
+    bench_picture("ssao_sat_truth", "reference: rays. Black: blocked, white: open", truth, side, side, BENCH_GREY, 0, 1);
+    for (m = 0; m < 3; m++) {
+        apply(&methods[shown[m].method], p, (double)p->radius[1]);
+        tone(&methods[shown[m].method]);
+        for (i = 0; i < pixels; i++) out[i] = p->z[i] < 1e18f ? out[i] - truth[i] : 0;
+        bench_picture(shown[m].name, shown[m].caption, out, side, side, BENCH_SIGNED, -0.3, 0.3);
+    }
+}
+
 static void motion_of_scene(int scene, double *change)
 {
     enum { FRAMES = 5 };
@@ -695,6 +715,7 @@ int main(void)
     if (fit && *fit) fit_comparators();
     if (fit && strcmp(fit, "only") == 0) return 0;
     error_against_time();
+    error_pictures();
     radius_table();
     leave_out_table();
 #ifndef SSAO_SAT_NO_BENT

@@ -432,6 +432,18 @@ static void accuracy(scene *scenes, int count)
         codes[4] = bench_quick() && i ? NULL : pfs_codes(s);
         times[4] = (support_clock() - start) / base_time;
         free_work(&base);
+        if (i == 0) {
+            float *error = (float *)malloc(s->n * sizeof(float));
+            const char *files[6] = {"tonemap_default", "tonemap_local", "tonemap_global", NULL, "tonemap_peer", NULL};
+            for (size_t p = 0; p < s->n; ++p) error[p] = (float)reference[p];
+            bench_picture("tonemap_truth", "reference: Gaussians, 8-bit codes", error, s->picture.width, s->picture.height, BENCH_GREY, 0, 255);
+            for (int k = 0; k < 6; ++k) {
+                if (!codes[k] || !files[k]) continue;
+                for (size_t p = 0; p < s->n; ++p) error[p] = (float)(codes[k][p] - reference[p]);
+                bench_picture(files[k], names[k], error, s->picture.width, s->picture.height, BENCH_SIGNED, -4, 4);
+            }
+            free(error);
+        }
         for (int k = 0; k < 6; ++k) {
             if (!codes[k]) continue;
             metrics_codes m = metrics_compare_codes(codes[k], reference, s->n);
