@@ -449,7 +449,7 @@ FIV_DEF void fiv_gl_destroy(fiv_gl *gl); /* NULL is fine */
 /* For a shader of one's own: `vec3 fiv_irradiance(vec3 point, vec3 normal)` and `vec3 fiv_self_irradiance(int self,
    vec3 point, vec3 normal)` on the surface of instance `self` (-1: none), as a list of strings that ends with NULL.
    Define FIV_INSTANCES as max_instances in front of it. fiv_gl_bind uses the program and sets its uniforms; it takes
-   five texture units and leaves them bound. */
+   seven texture units and leaves them bound. */
 FIV_DEF const char *const *fiv_gl_glsl(void);
 FIV_DEF sat_result fiv_gl_bind(fiv_gl *gl, unsigned program, int first_unit);
 
@@ -2249,7 +2249,7 @@ struct fiv_occluder {
     fiv_occluder_stats stats;
     const fiv_environment *environment; /* that lit it; NULL: none yet */
     unsigned stamp, lit;   /* times that it was lit */
-    uint64_t signature;    /* differs where what OpenGL holds of it differs */
+    uint64_t signature, view_signature; /* differ where what OpenGL holds of it, of its views, differs */
     int light_count;
     float rotation[9], table_scale;     /* stored vector = table_scale rho^2 vector */
     fiv__mesh mesh;
@@ -2509,6 +2509,23 @@ static void fiv__draw_mesh(const fiv__canvas *canvas, const fiv__mesh *mesh, flo
     }
 }
 
+/* FNV-1a over 64-bit words and the bytes that remain. */
+static uint64_t fiv__hash(uint64_t h, const void *from, size_t size)
+{
+    const unsigned char *p = (const unsigned char *)from;
+    uint64_t word;
+    size_t i;
+    for (i = 0; i + 8 <= size; i += 8) {
+        memcpy(&word, p + i, 8);
+        h = (h ^ word) * UINT64_C(0x100000001b3);
+        h ^= h >> 29;
+    }
+    for (; i < size; i++) h = (h ^ p[i]) * UINT64_C(0x100000001b3);
+    return h;
+}
+
+#define FIV__HASH UINT64_C(0xcbf29ce484222325)
+
 /* ---- views: depth maps along the middle of each of FIV__VIEWS^2 squares of a cube's face, in the occluder's frame, so
    that neither light nor rotation enters. Rays are parallel to the direction, but the picture to the face: where a
    point is seen then depends on the view's column alone, or its row alone, and its depth on the face alone. */
@@ -2542,7 +2559,9 @@ static void fiv__draw_views(int begin, int end, int worker, void *context)
 
 static void fiv__draw_contact(fiv_occluder *o)
 {
-    if (o->contact_side) sat__parallel_for(&o->threads, FIV__ALL_VIEWS, fiv__draw_views, o);
+    if (!o->contact_side) return;
+    sat__parallel_for(&o->threads, FIV__ALL_VIEWS, fiv__draw_views, o);
+    o->view_signature = fiv__hash(FIV__HASH, o->contact, fiv__contact_bytes(o));
 }
 
 /* ---- precompute */
@@ -2933,23 +2952,6 @@ static float fiv__half_scale(const fiv_environment *e)
     }
     return bound > 1e-20 ? (float)(16000 / bound) : 1;
 }
-
-/* FNV-1a over 64-bit words and the bytes that remain. */
-static uint64_t fiv__hash(uint64_t h, const void *from, size_t size)
-{
-    const unsigned char *p = (const unsigned char *)from;
-    uint64_t word;
-    size_t i;
-    for (i = 0; i + 8 <= size; i += 8) {
-        memcpy(&word, p + i, 8);
-        h = (h ^ word) * UINT64_C(0x100000001b3);
-        h ^= h >> 29;
-    }
-    for (; i < size; i++) h = (h ^ p[i]) * UINT64_C(0x100000001b3);
-    return h;
-}
-
-#define FIV__HASH UINT64_C(0xcbf29ce484222325)
 
 /* Another occluder may stand at the same address: every 64th sample is looked at, too. */
 static void fiv__sign(fiv_occluder *o)
@@ -4502,13 +4504,16 @@ extern "C" {
    above each other: vector 0..3; 4..7; 8, solid angle, 1 where valid, 1 where inside. Columns are azimuths, the first
    once more at the end. fiv_support: the support function, a field an occluder. fiv_maps: depth maps of the lights,
    four occluders side by side. fiv_scene: a row an instance, see fiv__gl_row and fiv__gl_light; two texels a light in
-   the row behind them. fiv_diffuse: I_tot at the corners of the cube. */
+   the row behind them. fiv_diffuse: I_tot at the corners of the cube. fiv_views: the depth maps of the views, a layer
+   an occluder; fiv_view_light: the light around each, three rows an occluder, the solid angle in the first's alpha. */
 static const char fiv__glsl_cube[] =
     "#ifndef FIV_GLSL\n"
     "#define FIV_GLSL\n"
     SAT__GLSL(
         uniform highp sampler2DArray fiv_shells;
         uniform highp sampler2D fiv_support, fiv_scene, fiv_diffuse;
+        uniform highp usampler2DArray fiv_views;
+        uniform highp sampler2D fiv_view_light;
         uniform highp usampler2D fiv_maps;
         uniform ivec4 fiv_counts; /* instances, lights, columns of a depth map's field, face */
         uniform vec3 fiv_x, fiv_y, fiv_z; /* columns of the environment's rotation */
@@ -4588,6 +4593,51 @@ static const char fiv__glsl_cell[] =
             return fiv_sum(unit * mat3(a.xyz, vec3(a.w, b.xy), vec3(b.zw, g.x)), g.y, h.x, h.y);
         });
 
+/* What the views say, as fiv__look_around has it: p the receiver, n its normal, in the occluder's frame; the part of
+   `open` that is taken, and the solid angle. */
+static const char fiv__glsl_views[] =
+    SAT__GLSL(
+        bool fiv_hit(ivec3 p, float beyond) { return float(texelFetch(fiv_views, p, 0).r) > beyond; }
+        float fiv_view(vec2 at, float side, ivec3 corner, float beyond) {
+            at = clamp(at, 0.0, side - 1.0);
+            ivec2 i = min(ivec2(at), int(side) - 2);
+            vec2 f = at - vec2(i);
+            ivec3 p = corner + ivec3(i, 0);
+            vec2 low = vec2(fiv_hit(p, beyond), fiv_hit(p + ivec3(1, 0, 0), beyond));
+            vec2 high = vec2(fiv_hit(p + ivec3(0, 1, 0), beyond), fiv_hit(p + ivec3(1, 1, 0), beyond));
+            low = mix(low, high, f.y);
+            return mix(low.x, low.y, f.x);
+        })
+    SAT__GLSL(
+        vec4 fiv_around(int instance, vec3 p, vec3 n, vec3 open) {
+            int slot = int(fiv_row(instance, 3).w);
+            float side = fiv_row(instance, 8).w, angle = 0.0;
+            vec3 all = vec3(0.0), taken = vec3(0.0);
+            for (int face = 0; face < 6; face++) {
+                bool back = (face & 1) != 0;
+                vec3 q = face < 2 ? p.yzx : face < 4 ? p.zxy : p, m = face < 2 ? n.yzx : face < 4 ? n.zxy : n;
+                if (back) q = vec3(q.yx, -q.z);
+                if (back) m = vec3(m.yx, -m.z);
+                float beyond = max(1.0 + (q.z + 0.5 / (side - 2.0) + 1.0) * 127.0, 0.0);
+                for (int y = 0; y < 8; y++) for (int x = 0; x < 8; x++) {
+                    vec2 t = (2.0 * vec2(x, y) + 1.0) / 8.0 - 1.0;
+                    if (!(m.z + dot(m.xy, t) > 0.0)) continue;
+                    ivec2 view = ivec2(x, face * 8 + y), light = ivec2(view.y * 8 + x, 3 * slot);
+                    vec2 at = (q.xy - q.z * t) * (0.5 * (side - 2.0)) / sqrt(1.0 + t * t) + 0.5 * (side - 1.0);
+                    float covered = fiv_view(at, side, ivec3(view * int(side), slot), beyond);
+                    vec4 red = texelFetch(fiv_view_light, light, 0);
+                    vec3 green = texelFetch(fiv_view_light, light + ivec2(0, 1), 0).rgb;
+                    vec3 blue = texelFetch(fiv_view_light, light + ivec2(0, 2), 0).rgb;
+                    vec3 e = max(vec3(dot(red.rgb, n), dot(green, n), dot(blue, n)), 0.0);
+                    all += e;
+                    taken += e * covered;
+                    angle += red.a * covered;
+                }
+            }
+            for (int k = 0; k < 3; k++) taken[k] = all[k] > 0.0 ? open[k] * (taken[k] / all[k]) : 0.0;
+            return vec4(taken, angle);
+        });
+
 /* What one occluder takes, and its solid angle in w; what is left of the light on its own surface (eq 13). */
 static const char fiv__glsl_occluder[] =
     SAT__GLSL(
@@ -4609,18 +4659,25 @@ static const char fiv__glsl_occluder[] =
             return max(along, 0.0);
         })
     SAT__GLSL(
-        vec4 fiv_occluder(int instance, vec3 d, vec3 n, float cut) {
+        vec4 fiv_occluder(int instance, vec3 d, vec3 n, float cut, vec3 open) {
             fiv_cell c = fiv_locate(instance, d);
             fiv_sum s = fiv_gather(instance, c, vec2(1.0));
-            if (!(s.total > 1e-3)) return s.inside > 0.5 ? vec4(1e30, 1e30, 1e30, 0.0) : vec4(0.0);
-            float scale = 1.0 / (s.total * c.r * c.r);
-            return vec4(fiv_shade(s.v * scale, s.angle * scale, n, cut), s.angle * scale);
+            vec4 taken = s.inside > 0.5 ? vec4(open, 0.0) : vec4(0.0);
+            float part = s.inside > 0.5 ? 1.0 : 0.0;
+            if (s.total > 1e-3) {
+                float scale = 1.0 / (s.total * c.r * c.r);
+                taken = vec4(fiv_shade(s.v * scale, s.angle * scale, n, cut), s.angle * scale);
+                part = clamp(max(2.0 * taken.w - 3.0, 8.0 * s.inside), 0.0, 1.0);
+            }
+            if (part > 0.0 && fiv_row(instance, 8).w > 0.0) taken = mix(taken, fiv_around(instance, -d, n, open), part);
+            return vec4(min(taken.rgb, open), taken.w);
         })
 #ifndef FIV_NO_SELF
     SAT__GLSL(
-        vec3 fiv_self(int self, vec3 d, vec3 n) {
+        vec3 fiv_self(int self, vec3 d, vec3 n, vec3 all) {
             fiv_cell c;
-            float out_by = 0.0;
+            float out_by = 0.0, side = fiv_row(self, 8).w;
+            if (side > 0.0) return max(all - fiv_around(self, 2.0 / (side - 2.0) * n - d, n, all).rgb, 0.0);
             for (int k = 0; k < 6; k++) {
                 c = fiv_locate(self, d - out_by * n);
                 if (mix(fiv_shell(c, 2.0, 0.0).z, fiv_shell(c, 2.0, 1.0).z, c.part) > 0.25) break;
@@ -4726,8 +4783,8 @@ static const char fiv__glsl_receiver[] =
                     if (height <= -above) continue;
                     if (height < below - 1e-4) cut = (below - height) / (below + above);
                 }
-                vec4 taken = fiv_occluder(i, fiv_own(i, world), n, cut);
-                vec3 own = min(taken.rgb, open);
+                vec4 taken = fiv_occluder(i, fiv_own(i, world), n, cut, open);
+                vec3 own = taken.rgb;
                 discs[count] = vec4(world / max(length(world), 1e-30), sqrt(taken.w * 0.318309886));
                 takes[count] = own;
                 sum += own;
@@ -4743,7 +4800,8 @@ static const char fiv__glsl_receiver[] =
 #ifndef FIV_NO_SELF
     SAT__GLSL(
             if (self >= 0 && self < fiv_counts.x && fiv_place(self, point, world))
-                result *= min(fiv_self(self, fiv_own(self, world), fiv_own(self, normal)) / max(open, 1e-30), 1.0);)
+                result *= min(fiv_self(self, fiv_own(self, world), fiv_own(self, normal), open) / max(open, 1e-30),
+                    1.0);)
 #endif
 #ifndef FIV_NO_DELTA
     SAT__GLSL(
@@ -4768,7 +4826,7 @@ static const char fiv__glsl_receiver[] =
 #endif
     "#endif\n";
 
-static const char *const fiv__glsl[] = {fiv__glsl_cube, fiv__glsl_cell, fiv__glsl_occluder,
+static const char *const fiv__glsl[] = {fiv__glsl_cube, fiv__glsl_cell, fiv__glsl_views, fiv__glsl_occluder,
 #ifndef FIV_NO_DELTA
                                         fiv__glsl_lights,
 #endif
@@ -4801,7 +4859,7 @@ static const char fiv__glsl_main[] =
 /* >> opengl   ---- objects, scenes, passes */
 
 enum {
-    FIV__GL_UNITS = 7,
+    FIV__GL_UNITS = 9,
     FIV__GL_INSTANCES = 64,
     FIV__GL_STAGED = 16384, /* texels on their way at a time: wider than any row of samples */
     FIV__SCENE_WIDTH = 16 + 3 * FIV_MAX_LIGHTS
@@ -4811,6 +4869,7 @@ enum {
 typedef struct fiv__gl_room {
     int columns, rows, layers; /* of fiv_shells */
     int map_side, face;
+    int view_side, kinds; /* of fiv_views */
 } fiv__gl_room;
 
 struct fiv_gl {
@@ -4823,10 +4882,11 @@ struct fiv_gl {
     const fiv_occluder *occluders[FIV__GL_INSTANCES];         /* of each kind */
     int layer[FIV__GL_INSTANCES];                             /* where its shells begin */
     uint64_t signature[FIV__GL_INSTANCES], light_signature;   /* of what the textures hold; 0: nothing */
-    size_t uploads;                                           /* occluders sent so far */
+    size_t uploads, view_uploads;                             /* occluders and their views sent so far */
     fiv__gl_room room;
     float rotation[9];
-    unsigned program, target, out, shells, support, maps, scene, diffuse;
+    uint64_t view_signature[FIV__GL_INSTANCES];               /* of its views, which no light enters */
+    unsigned program, target, out, shells, support, maps, scene, diffuse, views, view_light;
     float rows[FIV__GL_INSTANCES + 1][FIV__SCENE_WIDTH][4];   /* fiv_scene */
     float staged[FIV__GL_STAGED][4];
 };
@@ -4866,16 +4926,18 @@ FIV_DEF void fiv_gl_destroy(fiv_gl *g)
     sat_allocator allocator;
     if (!g) return;
     if (g->out || g->program) {
-        unsigned textures[6];
+        unsigned textures[8];
         textures[0] = g->out;
         textures[1] = g->shells;
         textures[2] = g->support;
         textures[3] = g->maps;
         textures[4] = g->scene;
         textures[5] = g->diffuse;
+        textures[6] = g->views;
+        textures[7] = g->view_light;
         if (g->target) g->gl.DeleteFramebuffers(1, &g->target);
         if (g->program) g->gl.DeleteProgram(g->program);
-        g->gl.DeleteTextures(6, textures);
+        g->gl.DeleteTextures(8, textures);
     }
     sat__gl_close(&g->gl);
     allocator = g->allocator;
@@ -4921,6 +4983,7 @@ static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
     if (!r) r = sat__gl_texture(gl, &g->scene, SAT__GL_RGBA32F, FIV__SCENE_WIDTH, g->max_instances + 1, NULL);
     if (!r) r = sat__gl_texture(gl, &g->support, SAT__GL_R16F, FIV__SUPPORT, FIV__SUPPORT * g->max_instances, NULL);
     if (!r) fiv__gl_filter(gl, SAT__GL_TEXTURE_2D);
+    if (!r) r = sat__gl_texture(gl, &g->view_light, SAT__GL_RGBA32F, FIV__ALL_VIEWS, 3 * g->max_instances, NULL);
     sat__gl_end(gl, &state);
     return r;
 }
@@ -5002,6 +5065,32 @@ static void fiv__gl_send_shells(fiv_gl *g, const fiv_occluder *o, int layer)
         }
 }
 
+/* The depth maps of the views, once; the light around them. */
+static void fiv__gl_send_views(fiv_gl *g, const fiv_occluder *o, int kind)
+{
+    int width = FIV__VIEWS * o->contact_side, c, view;
+    if (!o->contact_side) return;
+    if (g->view_signature[kind] != o->view_signature) {
+        g->gl.BindTexture(SAT__GL_TEXTURE_2D_ARRAY, g->views);
+        g->gl.TexSubImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, 0, 0, kind, width, 6 * width, 1, SAT__GL_RED_INTEGER,
+                            SAT__GL_UNSIGNED_BYTE, o->contact);
+        g->view_uploads++;
+    }
+    g->view_signature[kind] = o->view_signature;
+    g->gl.BindTexture(SAT__GL_TEXTURE_2D, g->view_light);
+    for (c = 0; c < 3; c++) {
+        for (view = 0; view < FIV__ALL_VIEWS; view++) {
+            const float *v = o->contact_light + view;
+            g->staged[view][0] = v[3 * c * FIV__ALL_VIEWS];
+            g->staged[view][1] = v[(3 * c + 1) * FIV__ALL_VIEWS];
+            g->staged[view][2] = v[(3 * c + 2) * FIV__ALL_VIEWS];
+            g->staged[view][3] = v[9 * FIV__ALL_VIEWS];
+        }
+        g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, 0, 3 * kind + c, FIV__ALL_VIEWS, 1, SAT__GL_RGBA, SAT__GL_FLOAT,
+                            g->staged);
+    }
+}
+
 static void fiv__gl_send(fiv_gl *g, const fiv_occluder *o, int kind, int layer)
 {
     fiv__gl_send_shells(g, o, layer);
@@ -5016,6 +5105,7 @@ static void fiv__gl_send(fiv_gl *g, const fiv_occluder *o, int kind, int layer)
                             SAT__GL_RED_INTEGER, SAT__GL_UNSIGNED_SHORT, o->map);
     }
 #endif
+    fiv__gl_send_views(g, o, kind);
     g->uploads++;
 }
 
@@ -5033,7 +5123,7 @@ static void fiv__gl_send_diffuse(fiv_gl *g, const fiv_environment *e)
     }
 }
 
-/* Texels 0 to 7 of an instance: where it is, and its tables. */
+/* Texels 0 to 8 of an instance: where it is, and its tables. */
 static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *instance, int layer, int kind)
 {
     const fiv_occluder *o = instance->occluder;
@@ -5053,6 +5143,7 @@ static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *inst
     row[5][0] = o->grid.first;
     row[5][1] = o->grid.per_log;
     row[5][2] = fiv__gl_unit(o);
+    row[8][3] = (float)o->contact_side;
 #ifndef FIV_NO_DELTA
     row[5][3] = fiv__map_scale(o);
     row[6][3] = (float)o->cell_side;
@@ -5103,47 +5194,66 @@ FIV_DEF sat_result fiv_gl_move(fiv_gl *g, const fiv_instance *instances, size_t 
     return SAT_OK;
 }
 
-/* Textures of this room in place of smaller ones. All are made before one is given up. */
-static sat_result fiv__gl_grow(fiv_gl *g, const fiv__gl_room *room)
+static sat_result fiv__gl_make_array(fiv_gl *g, unsigned *made, int bytes, int width, int height, int layers)
 {
     sat__gl *gl = &g->gl;
-    unsigned made[3] = {0, 0, 0}, old[3];
-    int shells = !g->shells || room->columns > g->room.columns || room->rows > g->room.rows ||
-                 room->layers > g->room.layers;
-    int maps = !g->maps || room->map_side > g->room.map_side, diffuse = !g->diffuse || room->face != g->room.face;
-    int columns = sat__max_int(room->columns, g->room.columns), rows = sat__max_int(room->rows, g->room.rows);
-    int layers = sat__max_int(room->layers, g->room.layers), side = sat__max_int(room->map_side, g->room.map_side);
-    sat_result r = SAT_OK;
-    if (shells) {
-        gl->GenTextures(1, &made[0]);
-        gl->ActiveTexture(SAT__GL_TEXTURE0);
-        gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, made[0]);
-        gl->TexImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, SAT__GL_RGBA16F, columns, rows, layers, 0, SAT__GL_RGBA,
-                       SAT__GL_FLOAT, NULL);
-        fiv__gl_filter(gl, SAT__GL_TEXTURE_2D_ARRAY);
-        r = sat__gl_check(gl, "fiv: OpenGL refused the texture of the samples");
+    gl->GenTextures(1, made);
+    gl->ActiveTexture(SAT__GL_TEXTURE0);
+    gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, *made);
+    gl->TexImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, bytes ? SAT__GL_R8UI : SAT__GL_RGBA16F, width, height, layers, 0,
+                   bytes ? SAT__GL_RED_INTEGER : SAT__GL_RGBA, bytes ? SAT__GL_UNSIGNED_BYTE : SAT__GL_FLOAT, NULL);
+    fiv__gl_filter(gl, SAT__GL_TEXTURE_2D_ARRAY);
+    if (bytes) {
+        gl->TexParameteri(SAT__GL_TEXTURE_2D_ARRAY, SAT__GL_TEXTURE_MIN_FILTER, SAT__GL_NEAREST);
+        gl->TexParameteri(SAT__GL_TEXTURE_2D_ARRAY, SAT__GL_TEXTURE_MAG_FILTER, SAT__GL_NEAREST);
     }
-    if (!r && maps)
-        r = sat__gl_texture(gl, &made[1], SAT__GL_R16UI, 4 * side, (g->max_instances + 3) / 4 * side, NULL);
-    if (!r && diffuse) r = sat__gl_texture(gl, &made[2], SAT__GL_RGBA32F, room->face + 1, 6 * (room->face + 1), NULL);
+    return sat__gl_check(gl, bytes ? "fiv: OpenGL refused the texture of the views (contact_map)"
+                                   : "fiv: OpenGL refused the texture of the samples");
+}
+
+/* Textures of this room in place of smaller ones. All are made before one is given up. */
+static sat_result fiv__gl_grow(fiv_gl *g, const fiv__gl_room *asked)
+{
+    sat__gl *gl = &g->gl;
+    fiv__gl_room room = *asked;
+    unsigned made[4] = {0, 0, 0, 0}, *at[4], old[4];
+    int grows[4], i;
+    sat_result r = SAT_OK;
+    room.columns = sat__max_int(room.columns, g->room.columns);
+    room.rows = sat__max_int(room.rows, g->room.rows);
+    room.layers = sat__max_int(room.layers, g->room.layers);
+    room.map_side = sat__max_int(room.map_side, g->room.map_side);
+    room.view_side = sat__max_int(room.view_side, g->room.view_side);
+    room.kinds = sat__max_int(room.kinds, g->room.kinds);
+    at[0] = &g->shells;
+    at[1] = &g->maps;
+    at[2] = &g->diffuse;
+    at[3] = &g->views;
+    grows[0] = room.columns > g->room.columns || room.rows > g->room.rows || room.layers > g->room.layers;
+    grows[1] = room.map_side > g->room.map_side;
+    grows[2] = room.face != g->room.face;
+    grows[3] = room.view_side > g->room.view_side || (room.view_side > 1 && room.kinds > g->room.kinds);
+    if (grows[0]) r = fiv__gl_make_array(g, &made[0], 0, room.columns, room.rows, room.layers);
+    if (!r && grows[1])
+        r = sat__gl_texture(gl, &made[1], SAT__GL_R16UI, 4 * room.map_side, (g->max_instances + 3) / 4 * room.map_side,
+                            NULL);
+    if (!r && grows[2]) r = sat__gl_texture(gl, &made[2], SAT__GL_RGBA32F, room.face + 1, 6 * (room.face + 1), NULL);
+    if (!r && grows[3])
+        r = fiv__gl_make_array(g, &made[3], 1, FIV__VIEWS * room.view_side, 6 * FIV__VIEWS * room.view_side,
+                               room.kinds);
     if (r) {
-        gl->DeleteTextures(3, made);
+        gl->DeleteTextures(4, made);
         return r;
     }
-    old[0] = shells ? g->shells : 0;
-    old[1] = maps ? g->maps : 0;
-    old[2] = diffuse ? g->diffuse : 0;
-    gl->DeleteTextures(3, old);
-    if (shells) g->shells = made[0];
-    if (maps) g->maps = made[1];
-    if (diffuse) g->diffuse = made[2];
-    if (shells || maps) memset(g->signature, 0, sizeof g->signature);
-    if (diffuse) g->light_signature = 0;
-    g->room.columns = columns;
-    g->room.rows = rows;
-    g->room.layers = layers;
-    g->room.map_side = side;
-    g->room.face = room->face;
+    for (i = 0; i < 4; i++) {
+        old[i] = grows[i] ? *at[i] : 0;
+        if (grows[i]) *at[i] = made[i];
+    }
+    gl->DeleteTextures(4, old);
+    if (grows[0] || grows[1] || grows[3]) memset(g->signature, 0, sizeof g->signature);
+    if (grows[2]) g->light_signature = 0;
+    if (grows[3]) memset(g->view_signature, 0, sizeof g->view_signature);
+    g->room = room;
     return r;
 }
 
@@ -5153,7 +5263,7 @@ static int fiv__gl_kinds(const fiv_occluder *occluders[FIV__GL_INSTANCES], int k
 {
     size_t i;
     int j, kinds = 0;
-    room->columns = room->rows = room->layers = room->map_side = 1;
+    room->columns = room->rows = room->layers = room->map_side = room->view_side = room->kinds = 1;
     for (i = 0; i < count; i++) {
         const fiv_occluder *o = instances[i].occluder;
         for (j = 0; j < kinds && occluders[j] != o; j++) {}
@@ -5165,6 +5275,8 @@ static int fiv__gl_kinds(const fiv_occluder *occluders[FIV__GL_INSTANCES], int k
         room->rows = sat__max_int(room->rows, 3 * o->grid.phi);
         room->layers = layer[j] + o->grid.rho;
         if (o->light_count) room->map_side = sat__max_int(room->map_side, o->map_side);
+        room->view_side = sat__max_int(room->view_side, o->contact_side);
+        room->kinds = kinds;
     }
     return kinds;
 }
@@ -5227,6 +5339,11 @@ static void fiv__gl_uniforms(fiv_gl *g, unsigned program, int unit)
     gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)(unit + 4));
     gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, g->shells);
     gl->BindSampler((unsigned)(unit + 4), 0);
+    sat__gl_set_texture(gl, program, "fiv_view_light", unit + 5, g->view_light);
+    sat__gl_set_int(gl, program, "fiv_views", unit + 6);
+    gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)(unit + 6));
+    gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, g->views);
+    gl->BindSampler((unsigned)(unit + 6), 0);
     for (k = 0; k < 3; k++) {
         column[0] = g->rotation[k];
         column[1] = g->rotation[3 + k];
@@ -5271,8 +5388,8 @@ FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *g, const sat_gl_target *to, unsigne
         fiv__gl_uniforms(g, g->program, 0);
         fiv__gl_set_view(g, view);
         sat__gl_set_from(&g->gl, g->program, to);
-        sat__gl_set_texture(&g->gl, g->program, "fiv_points", 5, points);
-        sat__gl_set_texture(&g->gl, g->program, "fiv_normals", 6, normals);
+        sat__gl_set_texture(&g->gl, g->program, "fiv_points", 7, points);
+        sat__gl_set_texture(&g->gl, g->program, "fiv_normals", 8, normals);
         sat__gl_draw(&g->gl);
     }
     sat__gl_release_target(&g->gl, to);

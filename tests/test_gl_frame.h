@@ -132,7 +132,7 @@ static void ft_shadows(void)
     const raindrop_camera *c = &ft_frame.scene.things.camera;
     const float *p = ft_frame.scene.projection;
     int i, k;
-    o.contact = o.own_masks = o.rays = 0; /* what the shader does */
+    o.own_masks = o.rays = 0; /* what the shader does */
     for (k = 0; k < SCENE_OBJECTS; k++) {
         casters[k].occluder = ft_frame.occluder[k];
         casters[k].scale = ft_frame.scene.things.objects[k].scale;
