@@ -695,7 +695,7 @@ static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindr
 {
     return _mm256_blendv_ps(no, yes, _mm256_cmp_ps(a, b, _CMP_LT_OQ));
 }
-#elif defined(SAT__VECTOR)
+#else
 enum { RAINDROP__LANES = 4 };
 typedef sat__f32x4 raindrop__v;
 static inline raindrop__v raindrop__load(const float *p) { return sat__f32x4_load(p); }
@@ -712,24 +712,6 @@ static inline raindrop__v raindrop__abs(raindrop__v a) { return sat__f32x4_abs(a
 static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindrop__v yes, raindrop__v no)
 {
     return sat__f32x4_select(sat__f32x4_less(a, b), yes, no);
-}
-#else
-enum { RAINDROP__LANES = 1 };
-typedef float raindrop__v;
-static inline raindrop__v raindrop__load(const float *p) { return *p; }
-static inline void raindrop__store(float *p, raindrop__v v) { *p = v; }
-static inline raindrop__v raindrop__splat(float v) { return v; }
-static inline raindrop__v raindrop__add(raindrop__v a, raindrop__v b) { return a + b; }
-static inline raindrop__v raindrop__sub(raindrop__v a, raindrop__v b) { return a - b; }
-static inline raindrop__v raindrop__mul(raindrop__v a, raindrop__v b) { return a * b; }
-static inline raindrop__v raindrop__div(raindrop__v a, raindrop__v b) { return a / b; }
-static inline raindrop__v raindrop__min(raindrop__v a, raindrop__v b) { return a < b ? a : b; } /* NaN: b, as SSE2 */
-static inline raindrop__v raindrop__max(raindrop__v a, raindrop__v b) { return a > b ? a : b; }
-static inline raindrop__v raindrop__sqrt(raindrop__v a) { return sqrtf(a); }
-static inline raindrop__v raindrop__abs(raindrop__v a) { return fabsf(a); }
-static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindrop__v yes, raindrop__v no)
-{
-    return a < b ? yes : no;
 }
 #endif
 
@@ -1683,18 +1665,10 @@ static inline void raindrop__bilinear(float out[4], const raindrop__sphere *sphe
     p = sphere->texels + sphere->offset[level] + 4 * ((size_t)y * (size_t)(r + 2) + (size_t)x);
     q = p + 4 * (size_t)(r + 2);
     {
-#if defined(SAT__VECTOR)
         sat__f32x4 va = sat__f32x4_set1(a), vb = sat__f32x4_set1(b), p0 = sat__f32x4_load(p), q0 = sat__f32x4_load(q);
         p0 = sat__f32x4_add(p0, sat__f32x4_mul(va, sat__f32x4_sub(sat__f32x4_load(p + 4), p0)));
         q0 = sat__f32x4_add(q0, sat__f32x4_mul(va, sat__f32x4_sub(sat__f32x4_load(q + 4), q0)));
         sat__f32x4_store(out, sat__f32x4_add(p0, sat__f32x4_mul(vb, sat__f32x4_sub(q0, p0))));
-#else
-        int c;
-        for (c = 0; c < 4; c++) {
-            float p0 = p[c] + a * (p[c + 4] - p[c]), q0 = q[c] + a * (q[c + 4] - q[c]);
-            out[c] = p0 + b * (q0 - p0);
-        }
-#endif
     }
 }
 
@@ -2854,6 +2828,17 @@ RAINDROP_DEF sat_result raindrop_rain_set_drops(raindrop_rain *rain, const raind
    glint inversely bright: exp(-x sin(phase)) over its mean, Bessel's I0(x), keeps its light.
    ------------------------------------------------------------------------------------------------ */
 
+/* Index of the drops, and order 1's least angle. */
+typedef struct raindrop__water { float n, bow; } raindrop__water;
+
+static inline raindrop__water raindrop__water_of(float n)
+{
+    raindrop__water water;
+    water.n = n;
+    water.bow = n > 1.1f && n < 1.9f ? (float)raindrop_bow_angle(1, (double)n) : 4; /* none, or not of this kind */
+    return water;
+}
+
 enum { RAINDROP__GLINTS = 4 }; /* mirrored, order 0, order 1 by its inner and its outer ray */
 #define RAINDROP__LEAST_LAMP 0.004 /* radians; lamps that look smaller are as wide as this, as the sun is */
 
@@ -2918,9 +2903,10 @@ static inline void raindrop__flicker_at(float x[2], const raindrop__swing *s, co
 }
 
 /* b^2 of the rays of a path that turn by `angle`, at its ends where there are none; path: as RAINDROP__GLINTS. */
-static inline float raindrop__turned_b2(float angle, int path, float n)
+static inline float raindrop__turned_b2(float angle, int path, const raindrop__water *water)
 {
-    float half_sine = sinf(0.5f * angle), half_cosine = cosf(0.5f * angle), b2, bow2, b, e, bend;
+    const float n = water->n;
+    float half_sine = sinf(0.5f * angle), half_cosine = cosf(0.5f * angle), bow2, b, e, bend;
     int i;
     if (path == 0) return half_cosine * half_cosine;
     if (path == 1) { /* tan r = sin/(n - cos); beyond the last ray: 1 */
@@ -2929,7 +2915,7 @@ static inline float raindrop__turned_b2(float angle, int path, float n)
     }
     bow2 = raindrop__clamp((4 - n * n) / 3, 0, 1);
     b = sqrtf(bow2);
-    e = angle - (float)RAINDROP__PI - 2 * asinf(b) + 4 * asinf(b < n ? b / n : 1);
+    e = angle - water->bow;
     if (!(e > 0)) return bow2;
     /* around the bow the angle is a parabola */
     bend = 2 * b / ((1 - bow2) * sqrtf(1 - bow2) + 1e-6f) -
@@ -2941,8 +2927,7 @@ static inline float raindrop__turned_b2(float angle, int path, float n)
         b -= ((float)RAINDROP__PI + 2 * asinf(b) - 4 * asinf(b / n) - angle) / slope;
         b = path == 2 ? raindrop__clamp(b, 0, sqrtf(bow2)) : raindrop__clamp(b, sqrtf(bow2), 1);
     }
-    b2 = b * b;
-    return b2;
+    return b * b;
 }
 
 /* Share of a path at b^2: with `orders` 0 order 0 has the later ones'. */
@@ -2957,32 +2942,31 @@ static inline float raindrop__path_share(float b2, int path, float n, int orders
 }
 
 /* b^2 of the ray to the lamp that is `angle` off the axis from the eye to the drop, per_distance = 1/D. */
-static inline float raindrop__glint_b2(float angle, int path, float n, float per_distance)
+static inline float raindrop__glint_b2(float angle, int path, const raindrop__water *water, float per_distance)
 {
-    float b2 = raindrop__turned_b2(angle, path, n);
+    float b2 = raindrop__turned_b2(angle, path, water);
     int i;
     for (i = 0; per_distance > 0 && i < 8; i++) {
         float off = asinf(sqrtf(b2) * per_distance), next;
         next = raindrop__clamp(path ? angle + off : angle - off, 0, (float)RAINDROP__PI);
-        b2 = 0.5f * (b2 + raindrop__turned_b2(next, path, n));
+        b2 = 0.5f * (b2 + raindrop__turned_b2(next, path, water));
     }
     return b2;
 }
 
-/* A glint: the unit vector that shows it; what it sends, E G; its radius in radii of the drop; the normal where its
-   light enters. */
-typedef struct raindrop__glint { float seen[3], light[3], radius, normal[3]; } raindrop__glint;
+/* A lamp as a drop sees it that is seen along a unit vector: a unit vector to it, its irradiance, half its width in
+   radians; the angle between the two, less and plus that, and 2 (cos low - cos high). */
+typedef struct raindrop__lit { float to[3], irradiance[3], width, cosine, angle, low, high, ring; } raindrop__lit;
 
-/* A lamp as a drop sees it: a unit vector to it, its irradiance, half its width in radians. 0: it is dark there. */
-typedef struct raindrop__lit { float to[3], irradiance[3], width; } raindrop__lit;
-
-static inline int raindrop__light(raindrop__lit *lit, const raindrop_lamp *lamp, const float centre[3], float radius)
+/* 0: it is dark there. */
+static inline int raindrop__light(raindrop__lit *lit, const raindrop_lamp *lamp, const raindrop_drop *drop,
+                                  const float d[3])
 {
     float distance, axis, share = 1;
     int c;
-    raindrop__combine(lit->to, 1, lamp->position, -1, centre);
+    raindrop__combine(lit->to, 1, lamp->position, -1, drop->position);
     distance = sqrtf(raindrop__dot(lit->to, lit->to));
-    if (!(distance > radius) || !sat__is_finite(distance)) return 0;
+    if (!(distance > drop->radius) || !sat__is_finite(distance)) return 0;
     raindrop__combine(lit->to, 1 / distance, lit->to, 0, lit->to);
     if (lamp->inner < 3.14f) {
         axis = acosf(raindrop__clamp(-raindrop__dot(lit->to, lamp->direction), -1, 1));
@@ -2994,52 +2978,74 @@ static inline int raindrop__light(raindrop__lit *lit, const raindrop_lamp *lamp,
     lit->width = lamp->radius / (distance > lamp->radius ? distance : lamp->radius);
     if (!(lit->width > (float)RAINDROP__LEAST_LAMP)) lit->width = (float)RAINDROP__LEAST_LAMP;
     for (c = 0; c < 3; c++) lit->irradiance[c] = share * lamp->intensity[c] / (distance * distance);
+    lit->cosine = raindrop__clamp(raindrop__dot(d, lit->to), -1, 1);
+    lit->angle = acosf(lit->cosine);
+    lit->low = lit->angle > lit->width ? lit->angle - lit->width : 0;
+    lit->high = lit->angle + lit->width < (float)RAINDROP__PI ? lit->angle + lit->width : (float)RAINDROP__PI;
+    lit->ring = 4 * sinf(0.5f * (lit->low + lit->high)) * sinf(0.5f * (lit->high - lit->low));
     return share > 0;
 }
 
+/* A path to a lamp: b^2, G without its share, the share; 0: there is none. */
+typedef struct raindrop__way { float b2, g, share; } raindrop__way;
+
+static inline int raindrop__find_way(raindrop__way *out, const raindrop__lit *lit, int path,
+                                     const raindrop__water *water, int orders, float per_distance)
+{
+    float low, high, per2 = per_distance * per_distance;
+    if (path == 0 && !(per_distance > 0)) { /* the usual case */
+        out->b2 = 0.5f + 0.5f * lit->cosine;
+        out->g = 0.25f;
+    } else {
+        if (path > 1 && (!orders || lit->high + 1.02f * per_distance < water->bow)) return 0;
+        low = raindrop__glint_b2(lit->low, path, water, per_distance);
+        high = raindrop__glint_b2(lit->high, path, water, per_distance);
+        out->g = fabsf(high - low) / (lit->ring + 1e-9f) * (1 - per2) / sqrtf(1 - 0.5f * (low + high) * per2);
+        if (!(out->g > 0)) return 0;
+        out->b2 = raindrop__glint_b2(lit->angle, path, water, per_distance);
+    }
+    out->share = raindrop__path_share(out->b2, path, water->n, orders);
+    return out->share > 0;
+}
+
+/* A glint: the unit vector that shows it; what it sends, E G; its radius in radii of the drop; the normal where its
+   light enters. */
+typedef struct raindrop__glint { float seen[3], light[3], radius, normal[3]; } raindrop__glint;
+
 /* The glint of a path in a drop that is seen along the unit vector d; per_distance: 0 for far drops. */
 static inline int raindrop__glint_of(raindrop__glint *out, const raindrop__lit *lit, const float d[3], int path,
-                                     float n, int orders, float per_distance)
+                                     const raindrop__water *water, int orders, float per_distance)
 {
-    float cosine = raindrop__clamp(raindrop__dot(d, lit->to), -1, 1), angle = acosf(cosine), b2, b, ring, g, side[3];
-    float p[3], low = angle > lit->width ? angle - lit->width : 0,
-          high = angle + lit->width < (float)RAINDROP__PI ? angle + lit->width : (float)RAINDROP__PI, share, off, sign;
-    float low_b2 = raindrop__glint_b2(low, path, n, per_distance),
-          high_b2 = raindrop__glint_b2(high, path, n, per_distance);
+    float b, side[3], p[3], off, sign = path && water->n > 1 ? -1.0f : 1;
+    raindrop__way way;
     int c;
-    if (path > 1 && (n < 1.1f || n > 1.9f)) return 0; /* no bow, or not of this kind */
-    ring = 4 * sinf(0.5f * (low + high)) * sinf(0.5f * (high - low)); /* 2 (cos low - cos high) */
-    g = fabsf(high_b2 - low_b2) / (ring + 1e-9f);
-    if (!(g > 0)) return 0;
-    b2 = raindrop__glint_b2(angle, path, n, per_distance);
-    share = raindrop__path_share(b2, path, n, orders);
-    g *= (1 - per_distance * per_distance) / sqrtf(1 - 0.5f * (low_b2 + high_b2) * per_distance * per_distance);
-    b = sqrtf(b2);
+    if (!raindrop__find_way(&way, lit, path, water, orders, per_distance)) return 0;
+    b = sqrtf(way.b2);
     off = b * per_distance;
-    sign = path && n > 1 ? -1.0f : 1;
-    raindrop__combine(side, 1, lit->to, -cosine, d);
+    raindrop__combine(side, 1, lit->to, -lit->cosine, d);
     if (!(raindrop__dot(side, side) > 1e-12f)) raindrop__perpendicular(side, p, d);
     raindrop__normalise(side);
     raindrop__combine(out->seen, sqrtf(1 - off * off), d, sign * off, side);
     raindrop__combine(p, sign * b * sqrtf(1 - off * off), side, -b * off, d);
     raindrop__combine(out->normal, -sqrtf((1 - b) * (1 + b)), out->seen, 1, p);
-    out->radius = lit->width * sqrtf(g);
-    for (c = 0; c < 3; c++) out->light[c] = lit->irradiance[c] * share * g;
-    return share > 0;
+    out->radius = lit->width * sqrtf(way.g);
+    for (c = 0; c < 3; c++) out->light[c] = lit->irradiance[c] * way.share * way.g;
+    return 1;
 }
 
 /* Adds the lamps' light to that of a far drop, the mean over its disc. */
 static inline void raindrop__far_lamps(float colour[3], const raindrop_render_options *o, const raindrop_drop *drop,
-                                       const float d[3], float n)
+                                       const float d[3], const raindrop__water *water)
 {
     raindrop__lit lit;
-    raindrop__glint glint;
+    raindrop__way way;
     int i, path, c;
     for (i = 0; i < o->lamp_count; i++) {
-        if (!raindrop__light(&lit, &o->lamps[i], drop->position, drop->radius)) continue;
+        float sum = 0;
+        if (!raindrop__light(&lit, &o->lamps[i], drop, d)) continue;
         for (path = 0; path < RAINDROP__GLINTS; path++)
-            if (raindrop__glint_of(&glint, &lit, d, path, n, o->orders, 0))
-                for (c = 0; c < 3; c++) colour[c] += glint.light[c] * (float)(1 / RAINDROP__PI);
+            if (raindrop__find_way(&way, &lit, path, water, o->orders, 0)) sum += way.share * way.g;
+        for (c = 0; c < 3; c++) colour[c] += lit.irradiance[c] * sum * (float)(1 / RAINDROP__PI);
     }
 }
 
@@ -3092,6 +3098,7 @@ typedef struct raindrop__frame {
     float focal, half_width, half_height; /* pixels */
     float side_x, side_y;                 /* lengths of the normals of the frustum's sides */
     const raindrop__pair *order;
+    raindrop__water water;                /* with lamps */
 } raindrop__frame;
 
 /* A drop in view space: x right, y up, z forward; the quantities drawing starts from. radius: half axis across; reach:
@@ -3373,7 +3380,7 @@ static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop
         raindrop__set(v->colour, colour[0], colour[1], colour[2]);
         if (frame->options.lamp_count > 0 && !raindrop__flickers(frame, drop)) {
             raindrop__normalise(world);
-            raindrop__far_lamps(v->colour, &frame->options, drop, world, frame->environment->n);
+            raindrop__far_lamps(v->colour, &frame->options, drop, world, &frame->water);
         }
     }
     return fate;
@@ -4109,20 +4116,15 @@ static inline void raindrop__draw_far_any(raindrop__batch *batch, const raindrop
 
 /* The glint of a lamp by one path as a far drop of its own: in a near drop at its place, in a far one all over it. */
 static inline int raindrop__glint_seen(raindrop__visible *out, float normal[3], const raindrop__frame *frame,
-                                       const raindrop__visible *v, const raindrop__lit *lit, int path)
+                                       const raindrop__visible *v, const raindrop__lit *lit, const float d[3],
+                                       float per_distance, int path)
 {
     const raindrop_camera *camera = &frame->camera;
-    const raindrop_drop *drop = &frame->rain->drops[v->drop & ~RAINDROP__FAR_BIT];
     const int is_far = (v->drop & RAINDROP__FAR_BIT) != 0;
     raindrop__glint glint;
-    float d[3], z, scale, distance;
+    float z, scale;
     int c;
-    raindrop__combine(d, 1, drop->position, -1, camera->position);
-    distance = sqrtf(raindrop__dot(d, d)) / drop->radius;
-    raindrop__normalise(d);
-    if (!raindrop__glint_of(&glint, lit, d, path, frame->environment->n, frame->options.orders,
-                            is_far ? 0 : raindrop__clamp(1 / distance, 0, 0.25f)))
-        return 0;
+    if (!raindrop__glint_of(&glint, lit, d, path, &frame->water, frame->options.orders, per_distance)) return 0;
     *out = *v;
     out->drop |= RAINDROP__FAR_BIT;
     if (!is_far) {
@@ -4148,14 +4150,19 @@ static inline void raindrop__draw_glints(raindrop__batch *batch, const raindrop_
     raindrop__visible glint;
     raindrop__box box;
     raindrop__lit lit;
-    float normal[3], flicker[2];
+    float normal[3], flicker[2], d[3], per_distance;
     int i, path;
+    raindrop__combine(d, 1, drop->position, -1, frame->camera.position);
+    per_distance = v->drop & RAINDROP__FAR_BIT
+                       ? 0
+                       : raindrop__clamp(drop->radius / sqrtf(raindrop__dot(d, d)), 0, 0.25f);
+    raindrop__normalise(d);
     batch->covers = 0;
     batch->swing = &swing;
     for (i = 0; i < frame->options.lamp_count; i++) {
-        if (!raindrop__light(&lit, &frame->options.lamps[i], drop->position, drop->radius)) continue;
+        if (!raindrop__light(&lit, &frame->options.lamps[i], drop, d)) continue;
         for (path = 0; path < RAINDROP__GLINTS; path++) {
-            if (!raindrop__glint_seen(&glint, normal, frame, v, &lit, path)) continue;
+            if (!raindrop__glint_seen(&glint, normal, frame, v, &lit, d, per_distance, path)) continue;
             raindrop__flicker_at(flicker, &swing, normal);
             batch->flicker = swing.amplitude > 0 ? flicker : NULL;
             box = raindrop__bounds(frame, &glint, &placed);
@@ -4390,6 +4397,7 @@ static inline int raindrop__frame_is_valid(raindrop__frame *frame)
 
 static inline void raindrop__set_frame(raindrop__frame *frame)
 {
+    if (frame->environment) frame->water = raindrop__water_of(frame->environment->n);
     if (raindrop__is_sprite(frame)) { /* still spheres under the environment alone, as published */
         frame->options.oscillation = 0;
         frame->options.lamp_count = 0;

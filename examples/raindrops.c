@@ -4,10 +4,12 @@
        raindrops forest.exr rain.png --rate 25mm --exposure 0.01            rain at a rate, streaks of 1/100 s
        raindrops city.exr drops.png --count 300000 --diameter 2             as published: one size, frozen
        raindrops --frames 24 --dt 0.0005 --out slow.png                     slow_000.png, slow_001.png, ...
+       raindrops night.exr lamps.png --lamps 8 --oscillation 0.1 --exposure 0.008    streaks that speckle under street lamps
+       raindrops forest.exr storm.png --rate 100mm --veil 200 --exposure 0.01    the rain beyond the drops, too
        raindrops night.exr sheet.png --sheet                                paused, slow motion and real time
        raindrops forest.exr drop.png --closeup                              one drop beside ray tracing
 
-   Without a picture the sky is made up. A .png is tone-mapped; .exr, .hdr and .pfm are written as they are. */
+   Without a picture the sky is made up. raindrops_views.h has what is not needed to draw rain: that sky, both sheets. A .png is tone-mapped; .exr, .hdr and .pfm are written as they are. */
 
 #define _POSIX_C_SOURCE 200809L
 #define LIGHTSCAN_IMPLEMENTATION
@@ -17,10 +19,12 @@
 
 typedef struct settings {
     const char *env;
-    int size[2], look, count, frames, seed, oblate, sheet, closeup;
-    float rate, diameter, box, exposure, aperture, focus, dt, fov, turn, key, depth_near, wind, bow;
+    int size[2], look, count, frames, seed, oblate, lamps, sheet, closeup;
+    float rate, diameter, box, exposure, aperture, focus, dt, fov, turn, key, depth_near, wind, bow, veil, oscillation;
     common_settings common;
 } settings;
+
+enum { LAMPS = 16 };
 
 typedef struct scene {
     settings *set;
@@ -29,6 +33,7 @@ typedef struct scene {
     raindrop_rain *rain;
     raindrop_camera camera;
     raindrop_render_options render;
+    raindrop_lamp lamps[LAMPS];
     image picture, background;
     tonemap *tone;
 } scene;
@@ -39,26 +44,9 @@ static int check(const char *what, sat_result result)
     return result == SAT_OK;
 }
 
-/* ---- what is around: a file, or dusk over hills ---- */
+static int made_up_sky(image *sky);
 
-static int made_up_sky(image *sky)
-{
-    int x, y, c;
-    if (!image_create(sky, 1024, 512, 3)) return 0;
-    for (y = 0; y < sky->height; y++) {
-        for (x = 0; x < sky->width; x++) {
-            double a = 6.283185 * (x + 0.5) / sky->width, up = cos(3.141593 * (y + 0.5) / sky->height),
-                   hills = 0.1 + 0.04 * sin(5 * a) + 0.02 * sin(13 * a + 1);
-            double glow = exp(-6 * fabs(up - hills)) * (0.6 - 0.4 * cos(a)),
-                   lamp = pow(fmax(0, cos(40 * a) * cos(31 * up)), 60);
-            double sky_rgb[3] = {0.12 + 2.2 * glow, 0.2 + 0.9 * glow, 0.5 + 0.35 * glow}, land[3] = {0.03, 0.035, 0.02};
-            float *p = sky->pixels + 3 * ((size_t)y * (size_t)sky->width + (size_t)x);
-            for (c = 0; c < 3; c++)
-                p[c] = (float)(up > hills ? sky_rgb[c] : land[c] + (up > -0.3 ? lamp * (c == 2 ? 8 : 20) : 0));
-        }
-    }
-    return 1;
-}
+/* ---- what is around: a file, or dusk over hills ---- */
 
 static int open_environment(scene *s)
 {
@@ -71,7 +59,13 @@ static int open_environment(scene *s)
         return common_say(&s->set->common, sky.message);
     view = image_view(&sky);
     o.threads = s->set->common.threads;
-    o.bow_optical_depth = s->set->bow;
+    o.bow_optical_depth = s->set->veil > 0 ? 0 : s->set->bow; /* the veil brings its own, by how much rain there is */
+    o.bow_by_depth = s->set->veil > 0 && s->set->bow > 0;
+    if (s->set->veil > 0) { /* which shows the prefilter in the large */
+        o.far_resolution = 32;
+        o.far_samples = 2048;
+    }
+    o.far_swing = s->set->oscillation > 0;
     o.sun_direction[0] = -0.5f; /* behind the left shoulder */
     o.sun_direction[1] = 0.5f;
     o.sun_direction[2] = 0.70710678f;
@@ -102,6 +96,56 @@ static int open_rain(scene *s)
     return check("rain", raindrop_rain_create(&s->rain, &o));
 }
 
+/* ---- street lamps: two rows along the view, shining down, drawn as the discs that they are ---- */
+
+static void place_lamps(scene *s)
+{
+    int i;
+    for (i = 0; i < s->set->lamps; i++) {
+        raindrop_lamp *lamp = &s->lamps[i];
+        *lamp = raindrop_lamp_defaults();
+        lamp->position[0] = i % 2 ? 3.5f : -3.5f;
+        lamp->position[1] = 3;
+        lamp->position[2] = (float)(-5 - 9 * (i / 2));
+        lamp->intensity[0] = 25;
+        lamp->intensity[1] = 17;
+        lamp->intensity[2] = 8;
+        lamp->radius = 0.12f;
+        lamp->inner = 1.1f;
+        lamp->outer = 1.5f;
+    }
+    s->render.lamps = s->lamps;
+    s->render.lamp_count = s->set->lamps;
+}
+
+static void draw_lamp(scene *s, const raindrop_lamp *lamp)
+{
+    const raindrop_camera *c = &s->camera;
+    float at[3], focal = 0.5f * (float)s->picture.height / tanf(0.5f * c->fov_y), radius, area;
+    int x, y, k;
+    for (k = 0; k < 3; k++) at[k] = lamp->position[k] - c->position[k];
+    {
+        float right = at[0] * c->right[0] + at[1] * c->right[1] + at[2] * c->right[2],
+              up = at[0] * c->up[0] + at[1] * c->up[1] + at[2] * c->up[2],
+              z = -(at[0] * c->back[0] + at[1] * c->back[1] + at[2] * c->back[2]);
+        if (!(z > 0.1f)) return;
+        at[0] = 0.5f * (float)s->picture.width + focal * right / z;
+        at[1] = 0.5f * (float)s->picture.height - focal * up / z;
+        radius = fmaxf(focal * lamp->radius / z, 0.6f);
+        area = focal * focal / (z * z * radius * radius * 3.14159265f); /* of the intensity on its pixels */
+    }
+    for (y = (int)(at[1] - radius - 1); y <= (int)(at[1] + radius + 1); y++)
+        for (x = (int)(at[0] - radius - 1); x <= (int)(at[0] + radius + 1); x++) {
+            float cover = radius + 0.5f - hypotf((float)x + 0.5f - at[0], (float)y + 0.5f - at[1]);
+            if (x < 0 || y < 0 || x >= s->picture.width || y >= s->picture.height || !(cover > 0)) continue;
+            for (k = 0; k < 3; k++)
+                s->background.pixels[3 * ((size_t)y * (size_t)s->picture.width + (size_t)x) + (size_t)k] +=
+                    fminf(cover, 1) * lamp->intensity[k] * area;
+        }
+}
+
+/* ---- a picture: what lies behind the rain, and the drops ---- */
+
 static void print_stats(const raindrop_render_stats *r, double seconds)
 {
     printf(
@@ -109,6 +153,22 @@ static void print_stats(const raindrop_render_stats *r, double seconds)
         r->drops, r->drawn_near, r->drawn_far, r->behind, r->outside, r->near_plane, r->inside, r->hidden,
         r->below_threshold, r->invalid);
     printf("fragments: %zu, with internal reflections %zu; %.1f ms\n", r->fragments, r->order_fragments, 1e3 * seconds);
+}
+
+/* The surroundings, the lamps, and the veil of the rain beyond the drops. */
+static int draw_background(scene *s)
+{
+    const ptrdiff_t stride = (ptrdiff_t)s->picture.width * 3 * (ptrdiff_t)sizeof(float);
+    raindrop_veil_options o = raindrop_veil_defaults();
+    int i;
+    if (!check("background", raindrop_environment_render(s->background.pixels, stride, s->picture.width, s->picture.height, &s->camera, s->environment, &s->set->common.threads))) return 0;
+    for (i = 0; i < s->set->lamps; i++) draw_lamp(s, &s->lamps[i]);
+    if (!(s->set->veil > 0)) return 1;
+    o.extinction = (float)raindrop_extinction((double)s->set->rate);
+    o.from = 0.5f * s->set->box;
+    o.reach = s->set->veil;
+    o.threads = s->set->common.threads;
+    return check("veil", raindrop_veil(s->background.pixels, stride, s->picture.width, s->picture.height, NULL, &s->camera, s->environment, &o));
 }
 
 /* The background and the drops into s->picture. */
@@ -157,141 +217,7 @@ static int save_frames(scene *s, const char *path)
     return 1;
 }
 
-/* Four moments each of a paused scene around which the camera turns, of slow motion (1/100) and of real time. */
-static int save_sheet(scene *s, const char *path)
-{
-    static const struct { const char *label; double dt, exposure, turn;
-    } rows[3] = {{"paused, the camera turns", 0, 0, 0.12},
-                 {"slow motion 1/100", 1 / 6000.0, 1 / 12000.0, 0},
-                 {"real time, 1/120 s exposure", 1 / 60.0, 1 / 120.0, 0}};
-    const ptrdiff_t stride = (ptrdiff_t)s->picture.width * 3 * (ptrdiff_t)sizeof(float);
-    size_t bytes = (size_t)s->picture.width * (size_t)s->picture.height * 3;
-    unsigned char *rgb = (unsigned char *)malloc(12 * bytes);
-    common_cell cells[12];
-    int row, i, ok = rgb != NULL;
-    for (row = 0; row < 3 && ok; row++) {
-        for (i = 0; i < 4 && ok; i++) {
-            float eye[3] = {0, 0, 0}, up[3] = {0, 1, 0}, target[3], angle = s->set->turn + (float)(rows[row].turn * i);
-            target[0] = sinf(angle);
-            target[1] = 0.05f;
-            target[2] = -cosf(angle);
-            eye[0] = (float)(-0.02 * rows[row].turn * i);
-            s->camera = raindrop_camera_look(eye, target, up, s->set->fov * 0.01745329f);
-            s->camera.depth_near = s->set->depth_near;
-            s->camera.exposure = (float)rows[row].exposure;
-            ok = check("background", raindrop_environment_render(s->background.pixels, stride, s->picture.width, s->picture.height, &s->camera, s->environment, &s->set->common.threads));
-            cells[4 * row + i].rgb = rgb + (size_t)(4 * row + i) * bytes;
-            cells[4 * row + i].width = s->picture.width;
-            cells[4 * row + i].height = s->picture.height;
-            cells[4 * row + i].label = rows[row].label;
-            ok = ok && draw(s) && tone(rgb + (size_t)(4 * row + i) * bytes, s) &&
-                 check("advance", raindrop_rain_advance(s->rain, rows[row].dt));
-        }
-    }
-    ok = ok && common_contact_sheet(&s->set->common, path, cells, 12, 4);
-    free(rgb);
-    return ok;
-}
-
-/* ---- one drop beside ray tracing (Slomp 2012, figure 2.1) ---- */
-
-/* out = refracted d, normal against d, relative index n; double, straight from Snell's law. */
-static void bend(double out[3], const double d[3], const double normal[3], double n)
-{
-    double c = -(d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]), k = sqrt(fmax(0, 1 - (1 - c * c) / (n * n)));
-    int i;
-    for (i = 0; i < 3; i++) out[i] = d[i] / n + normal[i] * (c / n - k);
-}
-
-/* Light along d through a sphere of radius 1 around `centre`: hit, bend, hit, bend, and the mirrored ray; 0: no hit. */
-static int trace(float rgb[3], const scene *s, const double d[3], const double centre[3])
-{
-    double along = 0, b2 = 0, t, n = (double)RAINDROP_WATER, p[3], q[3], inner[3], leave[3], ci, cr, fs, fp, fresnel;
-    float direction[3], mirrored[3], through[3];
-    int i;
-    for (i = 0; i < 3; i++) along += d[i] * centre[i];
-    for (i = 0; i < 3; i++) b2 += (d[i] * along - centre[i]) * (d[i] * along - centre[i]);
-    if (b2 >= 1) return 0;
-    t = along - sqrt(1 - b2);
-    for (i = 0; i < 3; i++) p[i] = d[i] * t - centre[i]; /* the normal, too */
-    ci = sqrt(1 - b2);
-    bend(inner, d, p, n);
-    cr = -(inner[0] * p[0] + inner[1] * p[1] + inner[2] * p[2]);
-    for (i = 0; i < 3; i++) q[i] = p[i] + 2 * cr * inner[i];
-    for (i = 0; i < 3; i++) leave[i] = -q[i];
-    bend(leave, inner, leave, 1 / n);
-    fs = (ci - n * cr) / (ci + n * cr);
-    fp = (n * ci - cr) / (n * ci + cr);
-    fresnel = 0.5 * (fs * fs + fp * fp);
-    for (i = 0; i < 3; i++) direction[i] = (float)(d[i] + 2 * ci * p[i]);
-    raindrop_environment_sample(mirrored, s->environment, direction, 0);
-    for (i = 0; i < 3; i++) direction[i] = (float)leave[i];
-    raindrop_environment_sample(through, s->environment, direction, 0);
-    for (i = 0; i < 3; i++) rgb[i] = (float)(fresnel * (double)mirrored[i] + (1 - fresnel) * (double)through[i]);
-    return 1;
-}
-
-static void trace_picture(scene *s, const double centre[3])
-{
-    const raindrop_camera *camera = &s->camera;
-    int w = s->picture.width, h = s->picture.height, x, y, k, i, c;
-    double focal = 0.5 * h / tan(0.5 * (double)camera->fov_y);
-    for (y = 0; y < h; y++) {
-        for (x = 0; x < w; x++) {
-            float *out = s->picture.pixels + 3 * ((size_t)y * (size_t)w + (size_t)x), rgb[3], f[3];
-            double sum[3] = {0, 0, 0};
-            for (k = 0; k < 64; k++) { /* 8 x 8 rays */
-                double px = (x + (k % 8 + 0.5) / 8 - 0.5 * w) / focal, py = (0.5 * h - y - (k / 8 + 0.5) / 8) / focal,
-                       d[3], length = sqrt(px * px + py * py + 1);
-                for (i = 0; i < 3; i++)
-                    d[i] =
-                        (px * (double)camera->right[i] + py * (double)camera->up[i] - (double)camera->back[i]) / length;
-                for (i = 0; i < 3; i++) f[i] = (float)d[i];
-                if (!trace(rgb, s, d, centre)) raindrop_environment_sample(rgb, s->environment, f, 0);
-                for (c = 0; c < 3; c++) sum[c] += (double)rgb[c] / 64;
-            }
-            for (c = 0; c < 3; c++) out[c] = (float)sum[c];
-        }
-    }
-}
-
-static int save_closeup(scene *s, const char *path)
-{
-    static const char *const labels[4] = {"ray traced, 8 x 8 rays", "ray (closed form)", "closed form on a sprite",
-                                          "published map"};
-    static const raindrop_look looks[4] = {RAINDROP_LOOK_RAY, RAINDROP_LOOK_RAY, RAINDROP_LOOK_SPRITE,
-                                           RAINDROP_LOOK_MAP};
-    size_t bytes = (size_t)s->picture.width * (size_t)s->picture.height * 3;
-    unsigned char *rgb = (unsigned char *)malloc(8 * bytes);
-    common_cell cells[8];
-    int place, i, k, ok = rgb != NULL;
-    s->render.orders = 0; /* eq 2.5 in all of them */
-    for (place = 0; place < 2 && ok; place++) { /* in the middle, and to the side, where a sprite cannot be right */
-        raindrop_drop drop;
-        double centre[3];
-        memset(&drop, 0, sizeof drop);
-        drop.radius = drop.axis_ratio = 1;
-        for (k = 0; k < 3; k++) {
-            drop.position[k] =
-                (place ? 1.15f * s->camera.right[k] + 0.7f * s->camera.up[k] : 0) - 2.3f * s->camera.back[k];
-            centre[k] = (double)drop.position[k];
-        }
-        ok = check("drop", raindrop_rain_set_drops(s->rain, &drop, 1));
-        for (i = 0; i < 4 && ok; i++) {
-            s->render.look = looks[i];
-            if (i == 0) trace_picture(s, centre);
-            else ok = draw(s);
-            cells[4 * place + i].rgb = rgb + (size_t)(4 * place + i) * bytes;
-            cells[4 * place + i].width = s->picture.width;
-            cells[4 * place + i].height = s->picture.height;
-            cells[4 * place + i].label = labels[i];
-            ok = ok && tone(rgb + (size_t)(4 * place + i) * bytes, s);
-        }
-    }
-    ok = ok && common_contact_sheet(&s->set->common, path, cells, 8, 4);
-    free(rgb);
-    return ok;
-}
+#include "raindrops_views.h"
 
 /* ---- the program ---- */
 
@@ -301,6 +227,8 @@ static int set_look(scene *s)
     o.resolution = 512;
     s->render = raindrop_render_defaults();
     s->render.look = (raindrop_look)s->set->look;
+    s->render.oscillation = s->set->oscillation;
+    place_lamps(s);
     if (s->set->look > 0 && !s->set->closeup) return 1;
     if (!check("map", raindrop_map_create(&s->map, &o))) return 0;
     s->render.map = s->map;
@@ -322,8 +250,7 @@ static int set_camera(scene *s)
     if (!image_create(&s->picture, set->size[0], set->size[1], 3) ||
         !image_create(&s->background, set->size[0], set->size[1], 3))
         return common_say(&set->common, s->picture.pixels ? s->background.message : s->picture.message);
-    return check("background", raindrop_environment_render(s->background.pixels, (ptrdiff_t)set->size[0] * 3 * (ptrdiff_t)sizeof(float), set->size[0], set->size[1],
-                                                           &s->camera, s->environment, &set->common.threads));
+    return draw_background(s);
 }
 
 static int set_tone(scene *s)
@@ -348,7 +275,10 @@ int main(int argc, char **argv)
         {"box", 'f', &set.box, 0.1, 1000, "edge of the rain box in metres"},
         {"wind", 'f', &set.wind, -100, 100, "m/s to the right"},
         {"oblate", 'b', &set.oblate, 0, 0, "flattened drops"},
-        {"bow", 'f', &set.bow, 0, 10, "optical depth of the rain that shows bows"},
+        {"bow", 'f', &set.bow, 0, 10, "optical depth of the rain that shows bows; with --veil any but 0: its own"},
+        {"veil", 'f', &set.veil, 0, 1e6, "metres to which it rains, beyond the box as a veil; 0: no veil"},
+        {"lamps", 'i', &set.lamps, 0, LAMPS, "street lamps that light the drops"},
+        {"oscillation", 'f', &set.oscillation, 0, 0.25, "share by which the drops' axes swing; 0.1 is much"},
         {"exposure", 'f', &set.exposure, 0, 10, "seconds; 0: frozen drops"},
         {"aperture", 'f', &set.aperture, 0, 1, "diameter of the lens in metres; 0: all in focus"},
         {"focus", 'f', &set.focus, 0.001, 1000, "metres"},

@@ -1917,6 +1917,7 @@ TEST(raindrop_lamps_all_around_are_a_white_sky)
             raindrop_lamp lamp = raindrop_lamp_defaults();
             raindrop_render_options o = raindrop_render_defaults();
             float colour[3] = {0, 0, 0};
+            raindrop__water water = raindrop__water_of(indices[k]);
             double bubble = 0;
             if (k == 2 && orders) continue; /* a bubble shows no bow of order 1 */
             o.lamps = &lamp;
@@ -1927,7 +1928,7 @@ TEST(raindrop_lamps_all_around_are_a_white_sky)
                 double t = 1 - (2 * i + 1.0) / LAMPS, a = 2.39996323 * i, s = sqrt(1 - t * t);
                 raindrop__set(lamp.position, (float)(10 * s * cos(a)), (float)(10 * t), (float)(10 * s * sin(a)));
                 lamp.intensity[0] = lamp.intensity[1] = lamp.intensity[2] = (float)(100 * 4 * acos(-1.0) / LAMPS);
-                raindrop__far_lamps(colour, &o, &drop, d, indices[k]);
+                raindrop__far_lamps(colour, &o, &drop, d, &water);
             }
             EXPECT_NEAR(colour[0], 1, 0.01);
             bubble += (double)colour[0];
@@ -2101,6 +2102,7 @@ TEST(raindrop_lamps_refuse_nonsense)
     float spot[3] = {0, 0, 0}, all[3] = {0, 0, 0};
     raindrop_drop drop = rt_drop(0, -5, 0, 0.001f);
     const float d[3] = {0, 0, -1};
+    const raindrop__water water = raindrop__water_of(1.33f);
     lamps[0] = lamps[1] = raindrop_lamp_defaults();
     EXPECT(strcmp(raindrop_explain_lamp(text, sizeof text, &lamps[0]), "") == 0);
     EXPECT(strcmp(raindrop_explain_lamp(text, sizeof text, NULL), "lamp is NULL") == 0);
@@ -2121,22 +2123,22 @@ TEST(raindrop_lamps_refuse_nonsense)
     EXPECT(strcmp(raindrop_explain_lamp(text, sizeof text, &lamps[1]), "intensity[2] is -1; 0..1e18") == 0);
     /* a cone lights what it points at, as brightly as a lamp all around, and nothing beside it */
     o.lamp_count = 1;
-    raindrop__far_lamps(all, &o, &drop, d, 1.33f);
+    raindrop__far_lamps(all, &o, &drop, d, &water);
     lamps[0].inner = 0.3f;
     lamps[0].outer = 0.5f;
-    raindrop__far_lamps(spot, &o, &drop, d, 1.33f);
+    raindrop__far_lamps(spot, &o, &drop, d, &water);
     EXPECT(all[0] > 0 && memcmp(all, spot, sizeof all) == 0);
     raindrop__set(spot, 0, 0, 0);
     drop.position[0] = 5 * tanf(0.4f);
-    raindrop__far_lamps(spot, &o, &drop, d, 1.33f);
+    raindrop__far_lamps(spot, &o, &drop, d, &water);
     EXPECT(spot[0] > 0);
     raindrop__set(spot, 0, 0, 0);
     drop.position[0] = 5 * tanf(0.51f);
-    raindrop__far_lamps(spot, &o, &drop, d, 1.33f);
+    raindrop__far_lamps(spot, &o, &drop, d, &water);
     EXPECT(!(spot[0] > 0));
     drop.position[1] = 0; /* in the drop */
     drop.position[0] = 0;
-    raindrop__far_lamps(spot, &o, &drop, d, 1.33f);
+    raindrop__far_lamps(spot, &o, &drop, d, &water);
     EXPECT(!(spot[0] > 0));
 }
 
