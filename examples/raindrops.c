@@ -4,12 +4,13 @@
        raindrops forest.exr rain.png --rate 25mm --exposure 0.01            rain at a rate, streaks of 1/100 s
        raindrops city.exr drops.png --count 300000 --diameter 2             as published: one size, frozen
        raindrops --frames 24 --dt 0.0005 --out slow.png                     slow_000.png, slow_001.png, ...
-       raindrops night.exr lamps.png --lamps 8 --oscillation 0.1 --exposure 0.008    streaks that speckle under street lamps
+       raindrops night.exr lamps.png --lamps 8 --oscillation 0.1 --exposure 0.008    speckled streaks under lamps
        raindrops forest.exr storm.png --rate 100mm --veil 200 --exposure 0.01    the rain beyond the drops, too
        raindrops night.exr sheet.png --sheet                                paused, slow motion and real time
        raindrops forest.exr drop.png --closeup                              one drop beside ray tracing
 
-   Without a picture the sky is made up. raindrops_views.h has what is not needed to draw rain: that sky, both sheets. A .png is tone-mapped; .exr, .hdr and .pfm are written as they are. */
+   Without a picture the sky is made up. A .png is tone-mapped; .exr, .hdr and .pfm are written as they are. What drawing
+   rain does not need is in raindrops_views.h: that sky, and both sheets. */
 
 #define _POSIX_C_SOURCE 200809L
 #define LIGHTSCAN_IMPLEMENTATION

@@ -1,5 +1,6 @@
-/* raindrops_views.h - for raindrops.c: a sky where there is no picture, a sheet of three speeds, and one drop beside ray
-   tracing. SPDX-License-Identifier: MIT-0 OR Unlicense */
+/* raindrops_views.h - for raindrops.c: a sky where there is no picture, a sheet of three speeds, and one drop beside
+   ray tracing.
+   SPDX-License-Identifier: MIT-0 OR Unlicense */
 
 /* ---- dusk over hills with lamps ---- */
 

@@ -620,8 +620,9 @@ static void blend_weighted(single *s, const raindrop__pair *order, int n, double
     }
     for (k = 0; k < SIZE * SIZE; k++)
         for (c = 0; c < 3; c++)
-            the.picture[3 * k + (size_t)c] = (float)(sum[5 * k + 4] * (double)the.background[3 * k + (size_t)c] +
-                                                     (1 - sum[5 * k + 4]) * sum[5 * k + (size_t)c] / (sum[5 * k + 3] + 1e-30));
+            the.picture[3 * k + (size_t)c] =
+                (float)(sum[5 * k + 4] * (double)the.background[3 * k + (size_t)c] +
+                        (1 - sum[5 * k + 4]) * sum[5 * k + (size_t)c] / (sum[5 * k + 3] + 1e-30));
     free(sum);
 }
 
