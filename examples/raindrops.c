@@ -9,8 +9,8 @@
        raindrops night.exr sheet.png --sheet                                paused, slow motion and real time
        raindrops forest.exr drop.png --closeup                              one drop beside ray tracing
 
-   Without a picture the sky is made up. A .png is tone-mapped; .exr, .hdr and .pfm are written as they are. What drawing
-   rain does not need is in raindrops_views.h: that sky, and both sheets. */
+   Without a picture the sky is made up. A .png is tone-mapped; .exr, .hdr and .pfm are written as they are. What
+   drawing rain does not need is in raindrops_views.h: that sky, and both sheets. */
 
 #define _POSIX_C_SOURCE 200809L
 #define LIGHTSCAN_IMPLEMENTATION
