@@ -60,7 +60,23 @@ else skip "no meson or ninja (meson, ninja-build)"; fi
 
 if have python3; then
     block conan >"$dir/conanfile.py"
-    ok "Conan's recipe is Python" python3 -m py_compile "$dir/conanfile.py"
+    # stand-ins for the parts of Conan that the recipe asks for; the package is then used by the compiler
+    mkdir -p "$dir/conan/conan/tools" "$dir/conan/package"
+    echo 'class ConanFile: pass' >"$dir/conan/conan/__init__.py"; : >"$dir/conan/conan/tools/__init__.py"
+    printf '%s\n' 'import os, shutil' 'def get(*a, **k): pass' 'def copy(recipe, name, src, dst):' '    os.makedirs(dst, exist_ok=True)' \
+        '    shutil.copy(os.path.join(src, name), dst)' >"$dir/conan/conan/tools/files.py"
+    printf '%s\n' 'import sys' 'sys.path.insert(0, sys.argv[1])' 'from types import SimpleNamespace as S' 'from conanfile import LightscanConan as C' \
+        'c = C(); c.source_folder, c.package_folder = sys.argv[2], sys.argv[1] + "/package"' 'c.settings = S(os="Linux"); c.cpp_info = S(); c.info = S(clear=lambda: None)' \
+        'c.package(); c.package_id(); c.package_info(); assert c.cpp_info.system_libs == ["m"] and not c.cpp_info.libdirs' >"$dir/conan/run.py"
+    cp "$dir/conanfile.py" "$dir/conan"
+    ok "Conan's recipe" python3 "$dir/conan/run.py" "$dir/conan" "$here"
+    ok "Conan's package" ${CC:-cc} -I"$dir/conan/package/include" "$dir/main.c" -o "$dir/conan/main" -lm
+    ok "Conan's package has the licence" test -s "$dir/conan/package/licenses/LICENSE"
+    block "conan test" >"$dir/conan/test.py"; ok "Conan's test is Python" python3 -m py_compile "$dir/conan/test.py"
+    version=$(awk '/define SAT_VERSION_(MAJOR|MINOR|PATCH)/ { printf "%s%s", dot, $3; dot = "." }' sat.h)
+    for block in "conan data" "conan config" "vcpkg json"; do
+        if block "$block" | grep -q "\"$version\""; then pass; else fail "the version under $block is not $version, that of sat.h"; fi
+    done
     block "vcpkg json" >"$dir/vcpkg.json"
     ok "vcpkg.json" python3 -m json.tool "$dir/vcpkg.json"
 else skip "no python3"; fi
