@@ -14,6 +14,9 @@ static unsigned char shown[WIDTH * HEIGHT * 3];
 int main(void)
 {
     tonemap_options options = tonemap_defaults();
+    sat_image hdr = sat_image_f32(pixels, WIDTH, HEIGHT, 3);
+    sat_result result;
+    tonemap *map;
     char why[200];
     int x, y, c;
     for (y = 0; y < HEIGHT; y++) /* a tiled wall, and a window to the sun */
@@ -29,9 +32,12 @@ int main(void)
     options.mesopic = TONEMAP_MESOPIC_LOCAL;   /* reds fade where it is dark */
     options.cd_per_unit = 1;                   /* a luminance of 1 is 1 cd/m2 */
     options.dither = 1;                        /* no bands in the slow gradients of the wall */
-    if (tonemap_once_u8(shown, pixels, WIDTH, HEIGHT, 3, &options) != SAT_OK) {
+    if (tonemap_create(&map, WIDTH, HEIGHT, &options) != SAT_OK) {
         fprintf(stderr, "%s\n", tonemap_explain(why, sizeof why, WIDTH, HEIGHT, &options));
         return 1;
     }
+    result = tonemap_apply_u8(map, shown, 0, &hdr, 0, NULL); /* for every frame */
+    tonemap_destroy(map);
+    if (result != SAT_OK) return 1;
     return !png_save("first_tonemap.png", shown, WIDTH, HEIGHT, 3);
 }

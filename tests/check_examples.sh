@@ -160,14 +160,24 @@ check_programs() {
     [ -z "$mounted" ] || umount $mounted
 }
 
-# The first programs: at most 60 lines, one header and nothing else, and they run by themselves.
+# calls_of LIB: the library's functions that stand on standard input, one a line
+calls_of() { grep -oE "\\b(sat|$1)_[a-z0-9_]+ ?\(" | tr -d ' (' | sort -u; }
+
+# The first programs: at most 60 lines, one header and nothing else, they run by themselves, and make every call that README
+# and the header's USE show.
 check_first() {
-    local source name
+    local source name shown
     for source in examples/first_*.c; do
         [ -f "$source" ] || continue
         name=$(basename "$source" .c)
         if [ "$(wc -l <"$source")" -le 60 ]; then pass; else fail "$source has more than 60 lines"; fi
         empty "$source includes more than its header and libc" "$(grep '#include' "$source" | grep -vE "<[a-z]+\.h>|\"png\.h\"|\"\.\./${name#first_}\.h\"")"
+        lib=${name#first_}
+        shown=$({ awk -v n="<!-- $lib -->" '$0 == n { on = 1; next } on && /^```$/ { exit } on' README.md
+                  awk '/^ *USE$/ { on = 1; next } on && /^   [A-Z][A-Z ]+$/ { exit } on' "$lib.h"; } | calls_of "$lib")
+        if [ -n "$shown" ]; then pass; else fail "README and $lib.h show no calls"; fi
+        empty "shown in README or $lib.h and not in $source" "$(comm -23 <(echo "$shown") <(calls_of "$lib" <"$source"))"
+        lib=examples
         ok "$source compiles alone" ${CC:-cc} -std=c99 -O2 $DEFS $WARN_C "$source" -o "$dir/$name" $LIBS
         [ -x "$dir/$name" ] || continue
         rm -rf "$dir/first"; mkdir -p "$dir/first"

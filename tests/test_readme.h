@@ -45,11 +45,14 @@ TEST(readme_tonemap)
     fill(0, 1e4);
     {
         /* README: tonemap */
+        tonemap *map;
         tonemap_options options = tonemap_defaults();                   /* photographic curve, guided filter */
+        sat_image hdr = sat_image_f32(pixels, width, height, 3);
         options.mesopic = TONEMAP_MESOPIC_LOCAL;                        /* reds fade in the dark */
         options.cd_per_unit = 1;
-        result = tonemap_once_u8(screen, pixels, width, height, 3, &options);
-        if (result != SAT_OK) puts(sat_result_text(result));
+        tonemap_create(&map, width, height, &options);
+        result = tonemap_apply_u8(map, screen, 0, &hdr, 0, NULL);       /* every frame: linear light in, sRGB out */
+        tonemap_destroy(map);
         /* README end */
     }
     EXPECT_EQ(result, SAT_OK);
