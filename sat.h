@@ -1540,6 +1540,7 @@ enum {
     SAT__GL_DEPTH_ATTACHMENT = 0x8D00,
     SAT__GL_COLOR = 0x1800,
     SAT__GL_WRITE_ONLY = 0x88B9,
+    SAT__GL_READ_WRITE = 0x88BA,
     SAT__GL_IMAGE_BINDING_NAME = 0x8F3A,
     SAT__GL_IMAGE_BINDING_LEVEL = 0x8F3B,
     SAT__GL_IMAGE_BINDING_LAYERED = 0x8F3C,
@@ -1758,6 +1759,13 @@ static inline void sat__gl_define(sat__gl *gl, const char *name, int value)
     snprintf(gl->defines + used, sizeof gl->defines - used, "#define %s %d\n", name, value);
 }
 
+static inline void sat__gl_define_text(sat__gl *gl, const char *name, const char *text)
+{
+    size_t used = strlen(gl->defines);
+    SAT_ASSERT(used + strlen(name) + strlen(text) + 12 < sizeof gl->defines);
+    snprintf(gl->defines + used, sizeof gl->defines - used, "#define %s %s\n", name, text);
+}
+
 /* The same for a float, bit by bit: locales write decimal points as they like. */
 static inline void sat__gl_define_float(sat__gl *gl, const char *name, float value)
 {
@@ -1887,7 +1895,7 @@ static inline sat_result sat__gl_build(sat__gl *gl, unsigned *program, const sat
    array of programs with an enum of the same order, and where a pass is run its textures follow in the order of the
    samplers (SAT__GL_PASS). */
 
-enum { SAT__GL_COMPUTE = 1 << 30 }; /* in `when`: a compute shader, made only where the context has them */
+#define SAT__GL_COMPUTE (1 << 30) /* in `when`: a compute shader, made only where the context has them */
 
 typedef struct sat__gl_program {
     const char *name;        /* for messages, such as "tonemap: steps" */

@@ -314,9 +314,10 @@ extern "C" {
 
 /* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL
    state as it was (but for pending errors, which are lost). Nothing waits for the GPU: the log-average and the
-   adaptation stay there. All options but threads work. Metering by percentiles (the default), an
-   estimated key or white, and Ashikhmin's range take a histogram that draws one point a pixel, and on ES
-   EXT_float_blend; TONEMAP_METERING_LOG_AVERAGE with a white above 0 does without. */
+   adaptation stay there. All options but threads work. Metering by percentiles (the default), an estimated key or
+   white, and Ashikhmin's range take a histogram: by compute shaders where there is GL 4.3, else by one point a pixel,
+   which on ES asks for EXT_float_blend; TONEMAP_METERING_LOG_AVERAGE with a white above 0 does without.
+   What the CPU has and OpenGL has not: statistics, and floats beside bytes (draw into a float texture). */
 typedef struct tonemap_gl tonemap_gl;
 
 /* On an OpenGL error *out only answers tonemap_gl_message, and is to be destroyed; on the others it is NULL. */
@@ -2694,7 +2695,37 @@ static const char tonemap__glsl_reduce[] =
             value = ivec4(sum.x + (sum.y >> 16), sum.y & 65535, sum.z, 0);
         });
 
-/* The histogram: a point a pixel, added up by blending; bins as on the CPU, 64 in a row. */
+/* The histogram, with the CPU's bins, 64 in a row: by compute shaders, 64 x 64 pixels in shared memory at a time ... */
+static const char tonemap__glsl_squares[] =
+    SAT__GLSL(
+        layout(local_size_x = 256) in;
+        layout(r32ui, binding = 0) uniform highp uimage2D counts;
+        uniform sampler2D luminance, mask;
+        shared uint bins[TONEMAP_BINS];
+        void main() {
+            ivec2 size = textureSize(luminance, 0), low = 64 * ivec2(gl_WorkGroupID.xy);
+            int lane = int(gl_LocalInvocationIndex);
+            for (int i = lane; i < TONEMAP_BINS; i += 256) bins[i] = 0u;
+            barrier();
+            for (int i = lane; i < 4096; i += 256) {
+                ivec2 p = low + ivec2(i % 64, i / 64);
+                float y = all(lessThan(p, size)) ? texelFetch(luminance, p, 0).x : 0.0;
+                uint bits = floatBitsToUint(y);
+                if (!(y > 0.0) || bits >= 0x71800000u) continue;
+                uint weight = TONEMAP_MASK == 1 ? uint(texelFetch(mask, p, 0).x) : 1u;
+                atomicAdd(bins[(bits - 0x0d800000u) >> 19], weight);
+            }
+            barrier();
+            for (int i = lane; i < TONEMAP_BINS; i += 256)
+                if (bins[i] > 0u) imageAtomicAdd(counts, ivec2(i % 64, i / 64), bins[i]);
+        });
+
+static const char tonemap__glsl_nothing[] =
+    SAT__GLSL(
+        out uint value;
+        void main() { value = 0u; });
+
+/* ... or a point a pixel, added up by blending, which is exact up to 2^24 pixels in a bin. */
 static const char tonemap__glsl_scatter[] =
     SAT__GLSL(
         uniform sampler2D luminance, mask;
@@ -2717,54 +2748,79 @@ static const char tonemap__glsl_count[] =
         out float value;
         void main() { value = weight; });
 
+/* The sums of the rows: most are empty, and the adaptation leaves those at the ends out. */
+static const char tonemap__glsl_rows[] =
+    SAT__GLSL(
+        uniform highp TONEMAP_COUNTS histogram;
+        out float value;
+        void main() {
+            value = 0.0;
+            for (int x = 0; x < 64; x++) value += float(texelFetch(histogram, ivec2(x, int(gl_FragCoord.y)), 0).x);
+        });
+
+/* What is read from the histogram: in one loop each, quantiles and means. */
+static const char tonemap__glsl_stats[] =
+    SAT__GLSL(
+        uniform sampler2D rows;
+        uniform highp TONEMAP_COUNTS histogram;
+        float tonemap_value(int bin, float part) {
+            return float(bin / 16 - 100) + log2(1.0 + (float(bin % 16) + part) / 16.0);
+        })
+    SAT__GLSL(float tonemap_count(int bin) { return float(texelFetch(histogram, ivec2(bin % 64, bin / 64), 0).x); })
+    SAT__GLSL(
+        /* the bins before and from which on all are empty, by whole rows */
+        ivec2 tonemap_filled() {
+            ivec2 filled = ivec2(0, TONEMAP_BINS / 64);
+            while (filled.x < filled.y && texelFetch(rows, ivec2(0, filled.x), 0).x <= 0.0) filled.x++;
+            while (filled.x < filled.y && texelFetch(rows, ivec2(0, filled.y - 1), 0).x <= 0.0) filled.y--;
+            return 64 * filled;
+        })
+    SAT__GLSL(
+        vec4 tonemap_quantiles(vec4 shares, float positive, ivec2 filled) {
+            vec4 wanted = shares * positive, found = vec4(0.0), open = vec4(1.0);
+            float seen = 0.0;
+            for (int bin = filled.x; bin < filled.y; bin++) {
+                float count = tonemap_count(bin);
+                vec4 hit = count > 0.0 ? vec4(lessThanEqual(wanted, vec4(seen + count))) * open : vec4(0.0);
+                if (dot(hit, vec4(1.0)) > 0.0) {
+                    vec4 part = float(bin % 16) + max(wanted - seen, 0.0) / count;
+                    found = mix(found, float(bin / 16 - 100) + log2(1.0 + part / 16.0), hit);
+                    open -= hit;
+                }
+                seen += count;
+            }
+            return found;
+        })
+    SAT__GLSL(
+        float tonemap_share(float count, float octaves) { return count * clamp((octaves + 24.0) / 6.0, 0.0, 1.0); })
+    SAT__GLSL(
+        /* xyz: means between shares of what lies not too far below top; w: the mean of all; above top */
+        vec4 tonemap_means(vec3 low, vec3 high, float positive, float top, ivec2 filled) {
+            vec3 inner = vec3(0.0), sum = vec3(0.0);
+            float all = 0.0, whole = 0.0, seen = 0.0;
+            for (int bin = filled.x; bin < filled.y; bin++)
+                all += tonemap_share(tonemap_count(bin), tonemap_value(bin, 0.5) - top);
+            for (int bin = filled.x; bin < filled.y; bin++) {
+                float count = tonemap_count(bin), octaves = tonemap_value(bin, 0.5) - top;
+                float next = seen + tonemap_share(count, octaves);
+                vec3 n = max(min(vec3(next), high * all) - max(vec3(seen), low * all), 0.0);
+                inner += n;
+                sum += n * octaves;
+                whole += count * octaves;
+                seen = next;
+            }
+            return vec4(sum / max(inner, 1e-30), whole / positive);
+        });
+
 /* The state, two texels: log2 of average, key and white, and 1; log2 of low and high, what the meter and what the white
    hold. An empty picture keeps the old one. */
 static const char tonemap__glsl_state[] =
     SAT__GLSL(
         uniform highp isampler2D sums;
-        uniform sampler2D old, histogram;
+        uniform sampler2D old;
         /* key and white as log2; 0: estimated */
         uniform float weight, weight_darker, key, white, pixels, exposure, lowest, highest, dead_band;
         out vec4 value;
-        float tonemap_value(int bin, float part) {
-            return float(bin / 16 - 100) + log2(1.0 + (float(bin % 16) + part) / 16.0);
-        })
-    SAT__GLSL(float tonemap_count(int bin) { return texelFetch(histogram, ivec2(bin % 64, bin / 64), 0).x; })
-    SAT__GLSL(
-        float tonemap_quantile(float share, float positive) {
-            float wanted = share * positive, seen = 0.0;
-            for (int bin = 0; bin < TONEMAP_BINS; bin++) {
-                float count = tonemap_count(bin);
-                if (count > 0.0 && seen + count >= wanted) return tonemap_value(bin, max(wanted - seen, 0.0) / count);
-                seen += count;
-            }
-            return 0.0;
-        })
-    SAT__GLSL(
-        float tonemap_share(int bin, float top) {
-            return tonemap_count(bin) * clamp((tonemap_value(bin, 0.5) - top + 24.0) / 6.0, 0.0, 1.0);
-        })
-    SAT__GLSL(
-        float tonemap_between(float low, float high, float top) { /* above top */
-            float all = 0.0, inner = 0.0, sum = 0.0, seen = 0.0;
-            for (int bin = 0; bin < TONEMAP_BINS; bin++) all += tonemap_share(bin, top);
-            for (int bin = 0; bin < TONEMAP_BINS; bin++) {
-                float next = seen + tonemap_share(bin, top), n = max(min(next, high * all) - max(seen, low * all), 0.0);
-                inner += n;
-                sum += n * (tonemap_value(bin, 0.5) - top);
-                seen = next;
-            }
-            return sum / max(inner, 1e-30);
-        })
-    SAT__GLSL(
-        float tonemap_metered(float average, float positive, float top) {
-            float whole = 0.0;
-            for (int bin = 0; bin < TONEMAP_BINS; bin++) whole += tonemap_count(bin) * (tonemap_value(bin, 0.5) - top);
-            average += tonemap_between(TONEMAP_METER_LOW, TONEMAP_METER_HIGH, top) - whole / positive;
-            return max(average, top + tonemap_between(0.8, TONEMAP_METER_HIGH > 0.8 ? TONEMAP_METER_HIGH : 1.0, top)
-                - 4.5);
-        })
-    SAT__GLSL(
         float tonemap_hold(float held, bool fresh, float now, float steps) {
             return fresh || abs(now - held) * steps > dead_band ? floor(now * steps + 0.5) / steps : held;
         })
@@ -2783,27 +2839,33 @@ static const char tonemap__glsl_state[] =
                     average = float(whole) + (float(sum.x - whole * sum.z) + float(sum.y) / 65536.0) / positive;
                 vec2 range = vec2(0.0);)
     "#if TONEMAP_HISTOGRAM\n"
-    SAT__GLSL(float top = tonemap_quantile(0.99, positive);)
+    SAT__GLSL(
+                ivec2 filled = tonemap_filled();
+                vec4 quantiles = tonemap_quantiles(vec4(0.0005, 0.01, 0.99, 0.9995), positive, filled);
+                vec3 from = vec3(TONEMAP_METER_LOW, 0.8, 0.995);
+                vec3 to = vec3(TONEMAP_METER_HIGH, TONEMAP_METER_HIGH > 0.8 ? TONEMAP_METER_HIGH : 1.0, 0.9995);
+                float top = quantiles.z;
+                vec4 means = tonemap_means(from, to, positive, top, filled);)
     "#endif\n"
     "#if TONEMAP_METERING == 0\n"
     SAT__GLSL(
-                average = second.z = tonemap_hold(second.z, first.w <= 0.0, tonemap_metered(average, positive, top),
-                    64.0);)
+                average = max(average + means.x - means.w, top + means.y - 4.5);
+                average = second.z = tonemap_hold(second.z, first.w <= 0.0, average, 64.0);)
     "#endif\n"
     SAT__GLSL(
                 average = max(min(average, highest), lowest);
                 vec4 now = vec4(average, key, white, 1.0);)
     "#if TONEMAP_HISTOGRAM\n"
     SAT__GLSL(
-                float low = tonemap_quantile(0.01, positive), high = top;
+                float low = quantiles.y, high = top;
                 float place = high - low > 0.125 ? clamp((2.0 * average - low - high) / (high - low), -1.0, 1.0) : 0.0;
                 if (TONEMAP_HISTOGRAM % 4 / 2 == 1) now.y = log2(0.18) + 2.0 * place;
-                float scaled = top + tonemap_between(0.995, 0.9995, top)
+                float scaled = top + means.z
                     + (exposure > 0.0 ? log2(exposure) : now.y - average);
                 float burn = max(min(log2(1.5) + high - low - 5.0, scaled), 0.0);
                 if (TONEMAP_HISTOGRAM % 8 / 4 == 1)
                     now.z = second.w = tonemap_hold(second.w, first.w <= 0.0, burn, 8.0);
-                range = vec2(tonemap_quantile(0.0005, positive), tonemap_quantile(0.9995, positive));)
+                range = quantiles.xw;)
     "#endif\n"
     SAT__GLSL(
                 float share = first.w > 0.0 ? average < first.x ? weight_darker : weight : 1.0;
@@ -3109,11 +3171,15 @@ static const char tonemap__glsl_map[] =
 /* ---- >> passes of OpenGL */
 
 /* What is made for some options only. */
-enum { TONEMAP__IF_GUIDED = 1, TONEMAP__IF_TABLE = 2, TONEMAP__IF_HISTOGRAM = 4 };
+enum {
+    TONEMAP__IF_GUIDED = 1, TONEMAP__IF_TABLE = 2, TONEMAP__IF_HISTOGRAM = 4,
+    TONEMAP__IF_BLENDED = 8, TONEMAP__IF_COUNTED = 16 /* how the histogram is made */
+};
 
 /* The programs, in the order of the table. */
 enum {
-    TONEMAP__GL_LUMINANCE, TONEMAP__GL_LOGARITHMS, TONEMAP__GL_REDUCE, TONEMAP__GL_COUNT, TONEMAP__GL_ADAPT,
+    TONEMAP__GL_LUMINANCE, TONEMAP__GL_LOGARITHMS, TONEMAP__GL_REDUCE, TONEMAP__GL_BLEND, TONEMAP__GL_NOTHING,
+    TONEMAP__GL_COUNT, TONEMAP__GL_ROWS, TONEMAP__GL_ADAPT,
     TONEMAP__GL_ROUND, TONEMAP__GL_STEPS, TONEMAP__GL_SUMS, TONEMAP__GL_FIT, TONEMAP__GL_SUMS_OF_FITS, TONEMAP__GL_MAP,
     TONEMAP__GL_PROGRAMS
 };
@@ -3122,8 +3188,12 @@ static const sat__gl_program tonemap__programs[TONEMAP__GL_PROGRAMS] = {
     {"tonemap: luminance", 0, "hdr", NULL, NULL, {SAT__GL_FROM, tonemap__glsl_luminance}},
     {"tonemap: log-average", 0, "source mask", "#define TONEMAP_FIRST\n", NULL, {tonemap__glsl_reduce}},
     {"tonemap: reduction", 0, "source", NULL, NULL, {tonemap__glsl_reduce}},
-    {"tonemap: histogram", TONEMAP__IF_HISTOGRAM, "luminance mask", NULL, tonemap__glsl_scatter, {tonemap__glsl_count}},
-    {"tonemap: adaptation", 0, "sums old histogram", NULL, NULL, {tonemap__glsl_state}},
+    {"tonemap: histogram", TONEMAP__IF_BLENDED, "luminance mask", NULL, tonemap__glsl_scatter, {tonemap__glsl_count}},
+    {"tonemap: no counts", TONEMAP__IF_COUNTED, "", NULL, NULL, {tonemap__glsl_nothing}},
+    {"tonemap: counts", TONEMAP__IF_COUNTED | SAT__GL_COMPUTE, "luminance mask", NULL, NULL, {tonemap__glsl_squares}},
+    {"tonemap: rows", TONEMAP__IF_HISTOGRAM, "histogram", NULL, NULL, {tonemap__glsl_rows}},
+    {"tonemap: adaptation", 0, "sums old histogram rows", NULL, NULL,
+     {tonemap__glsl_stats, tonemap__glsl_state}},
     {"tonemap: rounding", TONEMAP__IF_TABLE, "luminance state", NULL, NULL, {tonemap__glsl_frame, tonemap__glsl_quantise}},
     {"tonemap: steps", TONEMAP__IF_GUIDED, "luminance state", NULL, NULL, {tonemap__glsl_frame, tonemap__glsl_steps}},
     {"tonemap: sums", TONEMAP__IF_GUIDED, "source", "#define TONEMAP_FIRST\n", NULL, {tonemap__glsl_along}},
@@ -3136,7 +3206,8 @@ static const sat__gl_program tonemap__programs[TONEMAP__GL_PROGRAMS] = {
 /* What they draw into, in the order of the table; of the state [0] is the new one. */
 enum { TONEMAP__LEVELS = 14, TONEMAP__BIN_ROWS = (TONEMAP__BINS + 63) / 64, TONEMAP__GL_UNITS = 5 };
 enum {
-    TONEMAP__T_LUMINANCE, TONEMAP__T_OUT, TONEMAP__T_STATE, TONEMAP__T_OLD_STATE, TONEMAP__T_BINS, TONEMAP__T_QUANTA,
+    TONEMAP__T_LUMINANCE, TONEMAP__T_OUT, TONEMAP__T_STATE, TONEMAP__T_OLD_STATE, TONEMAP__T_BINS, TONEMAP__T_COUNTS,
+    TONEMAP__T_ROWS, TONEMAP__T_QUANTA,
     TONEMAP__T_STEPS, TONEMAP__T_PAIR, TONEMAP__T_PAIR_1, TONEMAP__T_LEVEL, TONEMAP__TARGETS = TONEMAP__T_LEVEL + 14
 };
 
@@ -3145,7 +3216,9 @@ static const struct { int when; unsigned internal; int width, height; } tonemap_
     {0, SAT__GL_RGBA8, 0, 0},
     {0, SAT__GL_RGBA32F, 2, 1},
     {0, SAT__GL_RGBA32F, 2, 1},
-    {TONEMAP__IF_HISTOGRAM, SAT__GL_R32F, 64, TONEMAP__BIN_ROWS},
+    {TONEMAP__IF_BLENDED, SAT__GL_R32F, 64, TONEMAP__BIN_ROWS},
+    {TONEMAP__IF_COUNTED, SAT__GL_R32UI, 64, TONEMAP__BIN_ROWS},
+    {TONEMAP__IF_HISTOGRAM, SAT__GL_R32F, 1, TONEMAP__BIN_ROWS},
     {TONEMAP__IF_TABLE, SAT__GL_R32UI, 0, 0},
     {TONEMAP__IF_GUIDED, SAT__GL_R32F, 0, 0},
     {TONEMAP__IF_GUIDED, SAT__GL_RG32UI, 0, 0},
@@ -3189,6 +3262,7 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define(gl, "TONEMAP_ENCODING", (int)o->encoding);
     sat__gl_define(gl, "TONEMAP_DITHER", o->dither);
     sat__gl_define(gl, "TONEMAP_BINS", TONEMAP__BIN_ROWS * 64);
+    sat__gl_define_text(gl, "TONEMAP_COUNTS", g->given & TONEMAP__IF_COUNTED ? "usampler2D" : "sampler2D");
     sat__gl_define(gl, "TONEMAP_BURN",
                    !tonemap__is_infinite(o->white) && (o->white > 0 || o->operation != TONEMAP_LINEAR));
     sat__gl_define_float(gl, "TONEMAP_EPSILON", (float)o->epsilon);
@@ -3236,13 +3310,13 @@ static inline sat_result tonemap__gl_make_targets(tonemap_gl *g)
     return r == SAT_OK && g->options.meter_weights ? tonemap__gl_make_mask(g) : r;
 }
 
-static inline void tonemap__gl_count(tonemap_gl *g);
+static inline void tonemap__gl_blend(tonemap_gl *g);
 
 /* OpenGL ES blends into floats of 32 bits only with an extension, and says so when it draws. */
 static inline sat_result tonemap__gl_try_blending(tonemap_gl *g)
 {
     sat__gl_clear_errors(&g->gl);
-    tonemap__gl_count(g);
+    tonemap__gl_blend(g);
     if (g->gl.GetError() == SAT__GL_NO_ERROR) return SAT_OK;
     return sat__gl_fail(&g->gl, SAT_ERR_GL_STATE,
                         "the context lacks EXT_float_blend, which metering by percentiles (the default), an estimated key "
@@ -3270,13 +3344,15 @@ static inline sat_result tonemap__gl_make(tonemap_gl *g, sat_gl_get_proc *get_pr
     g->histogram = (tonemap__is_ashikhmin(o) ? 1 : 0) + (o->key > 0 ? 0 : 2) + (o->white > 0 ? 0 : 4) +
                    (o->metering == TONEMAP_METERING_PERCENTILES ? 8 : 0);
     g->given = (o->operation == TONEMAP_GUIDED ? TONEMAP__IF_GUIDED : 0) | (g->sat ? TONEMAP__IF_TABLE : 0) |
-               (g->histogram ? TONEMAP__IF_HISTOGRAM : 0);
+               (!g->histogram      ? 0
+                : g->gl.has_compute ? TONEMAP__IF_HISTOGRAM | TONEMAP__IF_COUNTED
+                                    : TONEMAP__IF_HISTOGRAM | TONEMAP__IF_BLENDED);
     sat__gl_begin(&g->gl, &state, TONEMAP__GL_UNITS);
     r = tonemap__gl_make_targets(g);
     tonemap__gl_define_options(g);
     if (r == SAT_OK)
         r = sat__gl_build_table(&g->gl, g->program, tonemap__programs, TONEMAP__GL_PROGRAMS, g->given, library);
-    if (r == SAT_OK && g->histogram && g->gl.is_es) r = tonemap__gl_try_blending(g);
+    if (r == SAT_OK && g->given & TONEMAP__IF_BLENDED && g->gl.is_es) r = tonemap__gl_try_blending(g);
     g->ready = r == SAT_OK;
     sat__gl_end(&g->gl, &state);
     return r;
@@ -3369,11 +3445,12 @@ static inline void tonemap__gl_measure(tonemap_gl *g, const sat_gl_target *to, u
     }
 }
 
-static inline void tonemap__gl_count(tonemap_gl *g)
+/* As floats: what ES draws into. */
+static inline void tonemap__gl_blend(tonemap_gl *g)
 {
     static const float nothing[4] = {0, 0, 0, 0};
     sat__gl *gl = &g->gl;
-    unsigned program = g->program[TONEMAP__GL_COUNT];
+    unsigned program = g->program[TONEMAP__GL_BLEND];
     SAT__GL_START(gl, program, &g->target[TONEMAP__T_BINS], g->target[TONEMAP__T_LUMINANCE].texture, g->mask);
     gl->ClearBufferfv(SAT__GL_COLOR, 0, nothing);
     gl->Enable(SAT__GL_BLEND);
@@ -3385,6 +3462,24 @@ static inline void tonemap__gl_count(tonemap_gl *g)
     gl->Disable(SAT__GL_BLEND);
 }
 
+static inline void tonemap__gl_count(tonemap_gl *g)
+{
+    sat__gl *gl = &g->gl;
+    const sat__gl_target *t = g->target, *counts = &t[TONEMAP__T_BINS];
+    if (g->given & TONEMAP__IF_COUNTED) {
+        counts = &t[TONEMAP__T_COUNTS];
+        SAT__GL_PASS(gl, g->program[TONEMAP__GL_NOTHING], counts, 0);
+        gl->UseProgram(g->program[TONEMAP__GL_COUNT]);
+        SAT__GL_INPUTS(gl, t[TONEMAP__T_LUMINANCE].texture, g->mask);
+        gl->BindImageTexture(0, counts->texture, 0, 0, 0, SAT__GL_READ_WRITE, SAT__GL_R32UI);
+        gl->DispatchCompute((unsigned)(g->width + 63) / 64, (unsigned)(g->height + 63) / 64, 1);
+        gl->MemoryBarrier(SAT__GL_TEXTURE_FETCH_BARRIER_BIT | SAT__GL_FRAMEBUFFER_BARRIER_BIT);
+    } else {
+        tonemap__gl_blend(g);
+    }
+    SAT__GL_PASS(gl, g->program[TONEMAP__GL_ROWS], &t[TONEMAP__T_ROWS], counts->texture);
+}
+
 static inline void tonemap__gl_adapt(tonemap_gl *g, double dt)
 {
     sat__gl *gl = &g->gl;
@@ -3394,7 +3489,8 @@ static inline void tonemap__gl_adapt(tonemap_gl *g, double dt)
     t[TONEMAP__T_STATE] = t[TONEMAP__T_OLD_STATE];
     t[TONEMAP__T_OLD_STATE] = old;
     SAT__GL_START(gl, program, &t[TONEMAP__T_STATE], t[TONEMAP__T_LEVEL + g->levels - 1].texture, old.texture,
-                  t[TONEMAP__T_BINS].texture);
+                  t[g->given & TONEMAP__IF_COUNTED ? TONEMAP__T_COUNTS : TONEMAP__T_BINS].texture,
+                  t[TONEMAP__T_ROWS].texture);
     sat__gl_set_float(gl, program, "weight", (float)tonemap__share(o, 0, dt));
     sat__gl_set_float(gl, program, "weight_darker", (float)tonemap__share(o, 1, dt));
     sat__gl_set_float(gl, program, "exposure", (float)o->exposure);

@@ -89,12 +89,15 @@ static void library(const char *const *parts, const char *defines, const char *c
     save("frag", text);
 }
 
-static void expect_ok(sat_result result, const char *message)
-{
-    if (result == SAT_OK) return;
-    fprintf(stderr, "%s: %s\n", sat_result_text(result), message);
-    exit(2);
-}
+/* The message is asked for after the call. */
+#define expect_ok(call, message)                                                                                       \
+    do {                                                                                                               \
+        sat_result result = call;                                                                                      \
+        if (result != SAT_OK) {                                                                                        \
+            fprintf(stderr, "%s: %s\n", sat_result_text(result), message);                                             \
+            exit(2);                                                                                                   \
+        }                                                                                                              \
+    } while (0)
 
 #if !defined(TONEMAP_GL) && !defined(SSAO_SAT_GL) && !defined(FIV_GL) && !defined(RAINDROP_GL) && !defined(SOFTASSIGN_GL)
 static void dump_sat(void)
@@ -130,6 +133,12 @@ static void dump_sat(void)
 #endif
 
 #ifdef TONEMAP_GL
+/* Without compute shaders. */
+static sat_gl_proc plain_proc(const char *name)
+{
+    return strcmp(name, "glDispatchCompute") == 0 ? NULL : gl_fake_proc(name);
+}
+
 static void dump_tonemap(void)
 {
     /* operator, mesopic, metering, scales, soft, key, white; the others are numbers in an expression */
@@ -150,6 +159,8 @@ static void dump_tonemap(void)
         if (tonemap_create(&same, 2, 2, &o) != SAT_OK) continue; /* not a combination */
         tonemap_destroy(same);
         expect_ok(tonemap_gl_create(&gl, gl_fake_proc, 64, 32, &o), tonemap_gl_message(gl));
+        tonemap_gl_destroy(gl);
+        expect_ok(tonemap_gl_create(&gl, plain_proc, 64, 32, &o), tonemap_gl_message(gl));
         tonemap_gl_destroy(gl);
     } while (next(d, most, 7));
     parts[0] = sat_gl_glsl();

@@ -312,6 +312,70 @@ TEST(gl_takes_thin_pictures)
     screen_close(&s);
 }
 
+static sat_gl_get_proc *screen_proc;
+
+/* The context without compute shaders. */
+static sat_gl_proc screen_plain(const char *name)
+{
+    return strcmp(name, "glDispatchCompute") == 0 ? NULL : screen_proc(name);
+}
+
+/* A histogram of counts in shared memory is that of blended points; the state that comes from it has the same bits. */
+TEST(gl_counts_by_compute_as_by_blending)
+{
+    static const int sizes[][2] = {{1, 1}, {64, 64}, {131, 67}, {1, 200}, {65, 3}};
+    float state[2][8];
+    int i, k, masked;
+    screen s;
+    if (!screen_open(&s)) return;
+    if (!s.gl.has_compute) {
+        expect_skip("the context has no compute shaders");
+        screen_close(&s);
+        return;
+    }
+    screen_proc = s.context.get_proc;
+    for (i = 0; i < 5; i++)
+        for (masked = 0; masked < 2; masked++) {
+            int width = sizes[i][0], height = sizes[i][1], n = width * height, j;
+            float *pixels = lit_pixels(width, height, 0), *weights = (float *)malloc((size_t)n * sizeof(float));
+            uint32_t *counts = (uint32_t *)malloc(64 * TONEMAP__BIN_ROWS * 4);
+            float *blended = (float *)malloc(64 * TONEMAP__BIN_ROWS * 4);
+            tonemap_options o = tonemap_defaults();
+            unsigned hdr;
+            int differ = 0;
+            o.white = 0, o.key = 0;
+            for (j = 0; j < n; j++) weights[j] = (float)(j % 16) / 15;
+            if (n > 6) pixels[9] = -1, pixels[14] = 1e30f;
+            if (masked) o.meter_weights = weights;
+            hdr = screen_texture(&s, SAT__GL_RGBA32F, width, height, pixels);
+            for (k = 0; k < 2; k++) {
+                tonemap_gl *gl = NULL;
+                sat__gl_state saved;
+                EXPECT_EQ(tonemap_gl_create(&gl, k ? screen_plain : screen_proc, width, height, &o), SAT_OK);
+                EXPECT_EQ(tonemap_gl_apply(gl, NULL, hdr, 0), SAT_OK);
+                EXPECT_EQ(tonemap_gl_apply(gl, NULL, hdr, 0), SAT_OK); /* counts begin anew */
+                sat__gl_begin(&s.gl, &saved, 1);
+                EXPECT_EQ(sat__gl_read(&s.gl, state[k], gl->target[TONEMAP__T_STATE].texture, SAT__GL_RGBA32F, 2, 1),
+                          SAT_OK);
+                EXPECT_EQ(sat__gl_read(&s.gl, k ? (void *)blended : (void *)counts,
+                                       gl->target[k ? TONEMAP__T_BINS : TONEMAP__T_COUNTS].texture,
+                                       k ? SAT__GL_R32F : SAT__GL_R32UI, 64, TONEMAP__BIN_ROWS),
+                          SAT_OK);
+                sat__gl_end(&s.gl, &saved);
+                tonemap_gl_destroy(gl);
+            }
+            for (j = 0; j < 64 * TONEMAP__BIN_ROWS; j++) differ += (float)counts[j] != blended[j];
+            EXPECT_EQ(differ, 0);
+            EXPECT(memcmp(state[0], state[1], sizeof state[0]) == 0);
+            s.gl.DeleteTextures(1, &hdr);
+            free(pixels);
+            free(weights);
+            free(counts);
+            free(blended);
+        }
+    screen_close(&s);
+}
+
 /* The rounded luminances and their sums are the CPU's integers. */
 TEST(gl_sums_are_the_cpus_integers)
 {
