@@ -33,7 +33,8 @@
      * capacities, forbidden pairs, minimum use, minimum distance of repeats, a bonus for staying (video)
      * rows left out at a price, the largest instead of the least, dual prices, the margin of each pair of the optimum
      * a solver that goes on from its prices, stops at any time and then still has a valid answer
-     * the methods of Slomp 2012, chapter 3: greedy, annealing, softassign as published, ants; GPU passes (section 3.7)
+     * the methods of Slomp 2012, chapter 3: greedy, annealing, softassign as published, ants; GPU passes (section 3.7),
+       whose assignment stays in a texture
      * features of eq 3.1 from pictures, and the drawing of the mosaic
    DOES NOT
      * quadratic or multi-way assignment; transport of fractions
@@ -62,7 +63,7 @@
      pointer at the top one. Features are means of the values as they are: sRGB codes are the more even measure of what
      is seen, linear light of what is drawn small. A create that fails sets *out to NULL and holds nothing (OpenGL: an
      object for its message, to be destroyed). On OpenGL matrices go up by softassign_gl_set_costs and come back by
-     softassign_gl_published.
+     softassign_gl_published, assignments by softassign_gl_assign.
 
    NUMERICS
      Costs are floats, prices and path lengths doubles, sums compensated. A pair has one cost, always rounded the same
@@ -412,6 +413,15 @@ SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softa
    texel a temperature. */
 SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft, ptrdiff_t soft_stride,
                                                   double *soft_cost);
+
+/* Who gets what in the soft matrix of the last softassign_gl_published: the largest element of a row; of rows that want
+   one column the first keeps it, and the others take turns for the nearest that is left. The texture of
+   softassign_gl_columns then holds it, for shaders that draw; column_of_row: rows ints, or NULL: nothing is read but
+   one texel in eight turns. SAT_ERR_LIMIT: forbidden pairs, or columns fewer than rows, leave a row without (-1). */
+SOFTASSIGN_DEF sat_result softassign_gl_assign(softassign_gl *gl, int *column_of_row);
+/* Its name: R32F, one texel wide, as high as there are rows: texelFetch(columns, ivec2(0, row), 0).x; 0 before
+   softassign_gl_set_costs, whose next problem of another size makes another one. */
+SOFTASSIGN_DEF unsigned softassign_gl_columns(const softassign_gl *gl);
 
 /* `sweeps` sweeps of softassign with inequality columns at one temperature (in units of cost), from the prices given,
    one a column and all <= 0; they are replaced. lower_bound: of the last sweep's start, less its rounding; or NULL. */
@@ -4728,6 +4738,59 @@ static const char softassign__glsl_prices[] =
             result = vec4(min(0.0, s < 1e-36 ? v + 82.0 * factor : v - factor * log(s)));
         });
 
+/* What a row without a seat wants of K columns without an owner: (minus the element of S, or the cost; column).
+   source = S or D, first = seats, second = owners. The next level: source = such pairs. */
+static const char softassign__glsl_choose[] =
+    SAT__GLSL(
+        void main() {
+            vec2 best = vec2(3e38, -1.0);
+            for (int k = 0; k < K; k++) {
+                int x = here().x * K + k;
+                if (x >= size.x || (FIRST_LEVEL == 1 && at(first, ivec2(0, here().y)) >= 0.0)) break;)
+    "#if FIRST_LEVEL\n"
+    SAT__GLSL(
+                float value = at(source, ivec2(x, here().y)) * factor;
+                bool open = at(second, ivec2(x, 0)) < 0.0 && (factor < 0.0 ? value < 0.0 : value < 1e37);
+                vec2 other = open ? vec2(value, float(x)) : vec2(3e38, -1.0);)
+    "#else\n"
+    SAT__GLSL(vec2 other = texelFetch(source, ivec2(x, here().y), 0).xy;)
+    "#endif\n"
+    SAT__GLSL(
+                if (other.x < best.x) best = other;
+            }
+            result = vec4(best, 0.0, 0.0);
+        });
+
+/* The first row without a seat that wants a column gets it. source = owners, first = seats, second = choices; size.y =
+   rows. */
+static const char softassign__glsl_grant[] =
+    SAT__GLSL(
+        void main() {
+            float owner = at(source, ivec2(here().x, 0));
+            for (int y = 0; y < size.y && owner < 0.0; y++)
+                if (at(first, ivec2(0, y)) < 0.0 && int(texelFetch(second, ivec2(0, y), 0).y) == here().x)
+                    owner = float(y);
+            result = vec4(owner);
+        });
+
+/* source = seats, first = owners, second = choices. */
+static const char softassign__glsl_seat[] =
+    SAT__GLSL(
+        void main() {
+            float seat = at(source, ivec2(0, here().y)), column = texelFetch(second, ivec2(0, here().y), 0).y;
+            if (seat < 0.0 && column >= 0.0 && int(at(first, ivec2(int(column), 0))) == here().y) seat = column;
+            result = vec4(seat);
+        });
+
+/* How many rows have no seat. */
+static const char softassign__glsl_count[] =
+    SAT__GLSL(
+        void main() {
+            float left = 0.0;
+            for (int y = 0; y < size.y; y++) left += at(source, ivec2(0, y)) < 0.0 ? 1.0 : 0.0;
+            result = vec4(left);
+        });
+
 /* A plain copy. */
 static const char softassign__glsl_copy[] = SAT__GLSL(void main() { result = vec4(at(source, here())); });
 
@@ -4748,6 +4811,11 @@ enum {
     SOFTASSIGN__ROWS_NEXT,
     SOFTASSIGN__COLUMNS,
     SOFTASSIGN__UPDATE_PRICES,
+    SOFTASSIGN__CHOOSE_FIRST,
+    SOFTASSIGN__CHOOSE_NEXT,
+    SOFTASSIGN__GRANT,
+    SOFTASSIGN__SEAT,
+    SOFTASSIGN__COUNT,
     SOFTASSIGN__COPY,
     SOFTASSIGN__PROGRAMS
 };
@@ -4765,21 +4833,23 @@ enum {
     SOFTASSIGN__OUTLIERS_2,
     SOFTASSIGN__V,
     SOFTASSIGN__V_2,
+    SOFTASSIGN__SEATS, /* a column: of the rows; all from here on */
+    SOFTASSIGN__SEATS_2,
     SOFTASSIGN__TEXTURES
 };
 
-typedef struct softassign__gl_program {
-    unsigned program;
-    int size, alpha, inverse_t, factor, scale;
-} softassign__gl_program;
+typedef struct softassign__gl_uniforms {
+    int size, alpha, inverse_t, factor, scale; /* locations */
+} softassign__gl_uniforms;
 
 struct softassign_gl {
     sat__gl gl;
     softassign_options options;
     sat_allocator allocator;
-    softassign__gl_program programs[SOFTASSIGN__PROGRAMS];
+    unsigned program[SOFTASSIGN__PROGRAMS];
+    softassign__gl_uniforms uniforms[SOFTASSIGN__PROGRAMS];
     unsigned texture[SOFTASSIGN__TEXTURES], framebuffer[SOFTASSIGN__TEXTURES];
-    int rows, columns;
+    int rows, columns, has_soft; /* has_soft: of these costs, softassign_gl_published was here */
     float *scratch;  /* a row of costs or prices, or two floats a row: from softassign_gl_set_costs on */
     size_t scratch_bytes;
     float largest; /* cost */
@@ -4799,66 +4869,50 @@ static void softassign__gl_delete_textures(softassign_gl *g)
     g->rows = g->columns = 0;
 }
 
-static sat_result softassign__gl_make_program(softassign_gl *g, int which, const char *name, const char *body,
-                                              int vertical, int first)
-{
-    softassign__gl_program *p = &g->programs[which];
-    const char *library[2], *text[3];
-    sat__gl_shaders shaders;
-    sat_result result;
-    memset(&shaders, 0, sizeof shaders);
-    library[0] = softassign_gl_glsl();
-    library[1] = NULL;
-    text[0] = softassign__glsl_inputs;
-    text[1] = body;
-    text[2] = NULL;
-    shaders.name = name;
-    shaders.library = library;
-    shaders.fragment = text;
-    sat__gl_define(&g->gl, "K", g->options.gather);
-    sat__gl_define(&g->gl, "VERTICAL", vertical);
-    sat__gl_define(&g->gl, "FIRST_LEVEL", first);
-    sat__gl_define(&g->gl, "WRITES_Q", first);
-    sat__gl_define(&g->gl, "TAKES_MAX", first);
-    result = sat__gl_build(&g->gl, &p->program, &shaders);
-    if (result != SAT_OK) return result;
-    p->size = g->gl.GetUniformLocation(p->program, "size");
-    p->alpha = g->gl.GetUniformLocation(p->program, "alpha");
-    p->inverse_t = g->gl.GetUniformLocation(p->program, "inverse_t");
-    p->factor = g->gl.GetUniformLocation(p->program, "factor");
-    p->scale = g->gl.GetUniformLocation(p->program, "scale");
-    g->gl.UseProgram(p->program);
-    sat__gl_set_int(&g->gl, p->program, "source", 0);
-    sat__gl_set_int(&g->gl, p->program, "first", 1);
-    sat__gl_set_int(&g->gl, p->program, "second", 2);
-    return SAT_OK;
-}
+#define SOFTASSIGN__LINE(name, defines, text)                                                                          \
+    {"softassign: " name, 0, "source first second", defines, NULL, {softassign__glsl_inputs, text}}
+
+/* In the order of the enumeration. */
+static const sat__gl_program softassign__programs[SOFTASSIGN__PROGRAMS] = {
+    SOFTASSIGN__LINE("distances", NULL, softassign__glsl_distance),
+    SOFTASSIGN__LINE("Q", "#define WRITES_Q 1\n", softassign__glsl_update),
+    SOFTASSIGN__LINE("M", "#define WRITES_Q 0\n", softassign__glsl_update),
+    SOFTASSIGN__LINE("sum_cols", "#define VERTICAL 1\n#define TAKES_MAX 0\n", softassign__glsl_reduce),
+    SOFTASSIGN__LINE("sum_rows", "#define VERTICAL 0\n#define TAKES_MAX 0\n", softassign__glsl_reduce),
+    SOFTASSIGN__LINE("largest of columns", "#define VERTICAL 1\n#define TAKES_MAX 1\n", softassign__glsl_reduce),
+    SOFTASSIGN__LINE("largest of rows", "#define VERTICAL 0\n#define TAKES_MAX 1\n", softassign__glsl_reduce),
+    SOFTASSIGN__LINE("columns", "#define VERTICAL 1\n", softassign__glsl_divide),
+    SOFTASSIGN__LINE("rows", "#define VERTICAL 0\n", softassign__glsl_divide),
+    SOFTASSIGN__LINE("outliers", NULL, softassign__glsl_outlier),
+    SOFTASSIGN__LINE("entropic rows, first", "#define FIRST_LEVEL 1\n", softassign__glsl_rows),
+    SOFTASSIGN__LINE("entropic rows, next", "#define FIRST_LEVEL 0\n", softassign__glsl_rows),
+    SOFTASSIGN__LINE("entropic columns", NULL, softassign__glsl_columns),
+    SOFTASSIGN__LINE("prices", NULL, softassign__glsl_prices),
+    SOFTASSIGN__LINE("choices, first", "#define FIRST_LEVEL 1\n", softassign__glsl_choose),
+    SOFTASSIGN__LINE("choices, next", "#define FIRST_LEVEL 0\n", softassign__glsl_choose),
+    SOFTASSIGN__LINE("grants", NULL, softassign__glsl_grant),
+    SOFTASSIGN__LINE("seats", NULL, softassign__glsl_seat),
+    SOFTASSIGN__LINE("rows left", NULL, softassign__glsl_count),
+    SOFTASSIGN__LINE("copy", NULL, softassign__glsl_copy)};
 
 static sat_result softassign__gl_make_programs(softassign_gl *g)
 {
-    const struct { int which; const char *name, *body; int vertical, first; } all[SOFTASSIGN__PROGRAMS] = {
-        {SOFTASSIGN__DISTANCE, "softassign: distances", softassign__glsl_distance, 0, 0},
-        {SOFTASSIGN__UPDATE_Q, "softassign: Q", softassign__glsl_update, 0, 1},
-        {SOFTASSIGN__UPDATE_M, "softassign: M", softassign__glsl_update, 0, 0},
-        {SOFTASSIGN__SUM_DOWN, "softassign: sum_cols", softassign__glsl_reduce, 1, 0},
-        {SOFTASSIGN__SUM_ACROSS, "softassign: sum_rows", softassign__glsl_reduce, 0, 0},
-        {SOFTASSIGN__MAX_DOWN, "softassign: largest of columns", softassign__glsl_reduce, 1, 1},
-        {SOFTASSIGN__MAX_ACROSS, "softassign: largest of rows", softassign__glsl_reduce, 0, 1},
-        {SOFTASSIGN__DIVIDE_COLUMNS, "softassign: columns", softassign__glsl_divide, 1, 0},
-        {SOFTASSIGN__DIVIDE_ROWS, "softassign: rows", softassign__glsl_divide, 0, 0},
-        {SOFTASSIGN__OUTLIER, "softassign: outliers", softassign__glsl_outlier, 0, 0},
-        {SOFTASSIGN__ROWS_FIRST, "softassign: entropic rows", softassign__glsl_rows, 0, 1},
-        {SOFTASSIGN__ROWS_NEXT, "softassign: entropic rows", softassign__glsl_rows, 0, 0},
-        {SOFTASSIGN__COLUMNS, "softassign: entropic columns", softassign__glsl_columns, 0, 0},
-        {SOFTASSIGN__UPDATE_PRICES, "softassign: prices", softassign__glsl_prices, 0, 0},
-        {SOFTASSIGN__COPY, "softassign: copy", softassign__glsl_copy, 0, 0}};
+    const char *library[2];
+    sat_result result;
     int i;
-    for (i = 0; i < SOFTASSIGN__PROGRAMS; i++) {
-        sat_result result =
-            softassign__gl_make_program(g, all[i].which, all[i].name, all[i].body, all[i].vertical, all[i].first);
-        if (result != SAT_OK) return result;
+    library[0] = softassign_gl_glsl();
+    library[1] = NULL;
+    sat__gl_define(&g->gl, "K", g->options.gather);
+    result = sat__gl_build_table(&g->gl, g->program, softassign__programs, SOFTASSIGN__PROGRAMS, 0, library);
+    for (i = 0; i < SOFTASSIGN__PROGRAMS && result == SAT_OK; i++) {
+        softassign__gl_uniforms *u = &g->uniforms[i];
+        u->size = g->gl.GetUniformLocation(g->program[i], "size");
+        u->alpha = g->gl.GetUniformLocation(g->program[i], "alpha");
+        u->inverse_t = g->gl.GetUniformLocation(g->program[i], "inverse_t");
+        u->factor = g->gl.GetUniformLocation(g->program[i], "factor");
+        u->scale = g->gl.GetUniformLocation(g->program[i], "scale");
     }
-    return SAT_OK;
+    return result;
 }
 
 SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_proc *get_proc,
@@ -4891,10 +4945,8 @@ SOFTASSIGN_DEF sat_result softassign_gl_create(softassign_gl **out, sat_gl_get_p
 SOFTASSIGN_DEF void softassign_gl_destroy(softassign_gl *gl)
 {
     sat_allocator allocator;
-    int i;
     if (!gl) return;
-    for (i = 0; i < SOFTASSIGN__PROGRAMS; i++)
-        if (gl->programs[i].program) gl->gl.DeleteProgram(gl->programs[i].program);
+    if (gl->program[0]) sat__gl_delete_programs(&gl->gl, gl->program, SOFTASSIGN__PROGRAMS);
     if (gl->texture[0] || gl->framebuffer[0] || gl->scratch) softassign__gl_delete_textures(gl);
     sat__gl_close(&gl->gl);
     allocator = gl->allocator;
@@ -4904,7 +4956,7 @@ SOFTASSIGN_DEF void softassign_gl_destroy(softassign_gl *gl)
 SOFTASSIGN_DEF sat_result softassign_gl_set_options(softassign_gl *gl, const softassign_options *options)
 {
     softassign_options o = options ? *options : softassign_defaults();
-    if (!gl || !gl->programs[SOFTASSIGN__PROGRAMS - 1].program || !softassign__options_are_valid(&o))
+    if (!gl || !gl->program[SOFTASSIGN__PROGRAMS - 1] || !softassign__options_are_valid(&o))
         return SAT_ERR_ARGUMENT;
     if (o.gather != gl->options.gather) return SAT_ERR_MISMATCH;
     gl->options = o;
@@ -4932,6 +4984,10 @@ static sat_result softassign__gl_make_textures(softassign_gl *g, int rows, int c
             internal = SAT__GL_RG32F;
         }
         if (i >= SOFTASSIGN__OUTLIERS) height = 1;
+        if (i >= SOFTASSIGN__SEATS) {
+            width = 1;
+            height = rows;
+        }
         result = sat__gl_texture(&g->gl, &g->texture[i], internal, width, height, NULL);
         if (result == SAT_OK) result = sat__gl_framebuffer(&g->gl, &g->framebuffer[i], &g->texture[i], 1, 0);
         if (result != SAT_OK) {
@@ -4953,28 +5009,27 @@ static sat_result softassign__gl_make_textures(softassign_gl *g, int rows, int c
 static void softassign__gl_run(softassign_gl *g, int program, int to, int width, int height, unsigned source,
                                unsigned first, unsigned second, int size_x, int size_y)
 {
-    const softassign__gl_program *p = &g->programs[program];
     sat__gl *gl = &g->gl;
     unsigned bound[3];
     int i;
     bound[0] = source;
     bound[1] = first;
     bound[2] = second;
-    sat__gl_pass(gl, p->program, g->framebuffer[to], width, height);
+    sat__gl_pass(gl, g->program[program], g->framebuffer[to], width, height);
     for (i = 0; i < 3; i++) {
         gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)i);
         gl->BindTexture(SAT__GL_TEXTURE_2D, bound[i]);
         gl->BindSampler((unsigned)i, 0);
     }
-    gl->Uniform2i(p->size, size_x, size_y);
+    gl->Uniform2i(g->uniforms[program].size, size_x, size_y);
     sat__gl_draw(gl);
 }
 
 static void softassign__gl_values(softassign_gl *g, int program, float alpha, float inverse_t, float factor,
                                   float scale)
 {
-    const softassign__gl_program *p = &g->programs[program];
-    g->gl.UseProgram(p->program);
+    const softassign__gl_uniforms *p = &g->uniforms[program];
+    g->gl.UseProgram(g->program[program]);
     g->gl.Uniform1f(p->alpha, alpha);
     g->gl.Uniform1f(p->inverse_t, inverse_t);
     g->gl.Uniform1f(p->factor, factor);
@@ -5116,6 +5171,7 @@ SOFTASSIGN_DEF sat_result softassign_gl_set_costs(softassign_gl *gl, const softa
     if (!softassign__gl_explain(gl, problem)) return SAT_ERR_ARGUMENT;
     result = softassign__gl_check_costs(problem);
     if (result != SAT_OK) return result;
+    gl->has_soft = 0;
     sat__gl_begin(&gl->gl, &state, 3);
     if (gl->rows != problem->rows || gl->columns != problem->columns)
         result = softassign__gl_make_textures(gl, problem->rows, problem->columns);
@@ -5222,8 +5278,78 @@ SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft
     }
     if (result == SAT_OK) result = sat__gl_check(&g->gl, "OpenGL refused a pass");
     sat__gl_end(&g->gl, &state);
+    g->has_soft = result == SAT_OK;
     if (soft_cost) *soft_cost = lowest;
     return result;
+}
+
+/* ---- who gets what */
+
+/* One turn: rows without a seat choose by S or by D, columns grant, rows sit down. Owners and seats change textures. */
+static void softassign__gl_turn(softassign_gl *g, int by, int *owners, int *seats)
+{
+    int k = g->options.gather, w = g->columns, h = g->rows, width = w, from = by, to = SOFTASSIGN__ACROSS;
+    int next_owners = *owners == SOFTASSIGN__V ? SOFTASSIGN__V_2 : SOFTASSIGN__V,
+        next_seats = *seats == SOFTASSIGN__SEATS ? SOFTASSIGN__SEATS_2 : SOFTASSIGN__SEATS;
+    softassign__gl_values(g, SOFTASSIGN__CHOOSE_FIRST, 0, 0, by == SOFTASSIGN__S ? -1.0f : 1.0f, 0);
+    do {
+        int program = from == by ? SOFTASSIGN__CHOOSE_FIRST : SOFTASSIGN__CHOOSE_NEXT;
+        softassign__gl_run(g, program, to, (width + k - 1) / k, h, g->texture[from], g->texture[*seats],
+                           g->texture[*owners], width, h);
+        from = to;
+        to = to == SOFTASSIGN__ACROSS ? SOFTASSIGN__ACROSS_2 : SOFTASSIGN__ACROSS;
+        width = (width + k - 1) / k;
+    } while (width > 1);
+    softassign__gl_run(g, SOFTASSIGN__GRANT, next_owners, w, 1, g->texture[*owners], g->texture[*seats],
+                       g->texture[from], w, h);
+    softassign__gl_run(g, SOFTASSIGN__SEAT, next_seats, 1, h, g->texture[*seats], g->texture[next_owners],
+                       g->texture[from], 1, h);
+    *owners = next_owners;
+    *seats = next_seats;
+}
+
+/* Turns until every row sits; as long as there are free columns that it may get, the first row without a seat gets one
+   in each. */
+static sat_result softassign__gl_seat_all(softassign_gl *g, int *seats)
+{
+    int owners = SOFTASSIGN__V, turn;
+    float left = (float)g->rows, before = left + 1;
+    sat_result result = SAT_OK;
+    softassign__gl_turn(g, SOFTASSIGN__S, &owners, seats);
+    while (result == SAT_OK && left > 0 && left < before) {
+        before = left;
+        for (turn = 0; turn < 8; turn++) softassign__gl_turn(g, SOFTASSIGN__D, &owners, seats);
+        softassign__gl_run(g, SOFTASSIGN__COUNT, SOFTASSIGN__OUTLIERS_2, 1, 1, g->texture[*seats], 0, 0, 1, g->rows);
+        result = softassign__gl_texel(g, SOFTASSIGN__OUTLIERS_2, &left);
+    }
+    return result == SAT_OK && left > 0 ? SAT_ERR_LIMIT : result;
+}
+
+SOFTASSIGN_DEF sat_result softassign_gl_assign(softassign_gl *gl, int *column_of_row)
+{
+    softassign_gl *g = gl;
+    sat__gl_state state;
+    sat_result result, read = SAT_OK;
+    int i, seats = SOFTASSIGN__SEATS;
+    if (!g || !g->has_soft) return SAT_ERR_ARGUMENT;
+    sat__gl_begin(&g->gl, &state, 3);
+    for (i = 0; i < g->columns || i < g->rows; i++) g->scratch[i] = -1;
+    sat__gl_upload(&g->gl, g->texture[SOFTASSIGN__V], SAT__GL_R32F, g->columns, 1, g->scratch);
+    sat__gl_upload(&g->gl, g->texture[SOFTASSIGN__SEATS], SAT__GL_R32F, 1, g->rows, g->scratch);
+    result = softassign__gl_seat_all(g, &seats);
+    if (seats != SOFTASSIGN__SEATS) /* the texture whose name is told */
+        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__SEATS, 1, g->rows, g->texture[seats], 0, 0, 1, g->rows);
+    if (column_of_row) read = sat__gl_read(&g->gl, g->scratch, g->texture[SOFTASSIGN__SEATS], SAT__GL_R32F, 1, g->rows);
+    for (i = 0; column_of_row && read == SAT_OK && i < g->rows; i++) column_of_row[i] = (int)g->scratch[i];
+    if (result == SAT_OK) result = read;
+    if (result == SAT_OK) result = sat__gl_check(&g->gl, "OpenGL refused a pass");
+    sat__gl_end(&g->gl, &state);
+    return result;
+}
+
+SOFTASSIGN_DEF unsigned softassign_gl_columns(const softassign_gl *gl)
+{
+    return gl ? gl->texture[SOFTASSIGN__SEATS] : 0;
 }
 
 /* ---- entropic sweeps */
