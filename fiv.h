@@ -35,8 +35,11 @@
    - Suns and lamps, up to 32, leave the cube as directional lights with their direction, power and angular size. Each
      occluder has a depth map along each of them; the light's disc past it is the penumbra, a ray answers where the map
      of a sharp sun is not sure.
-   - Near contact no interpolation is right: there receivers draw masks of their own, and what rests on a floor does not
-     leak. Receivers in a row, such as pixels, share them. fiv_irradiance only; OpenGL and self-shadows interpolate.
+   - Near contact no interpolation is right, nor on the mesh itself: there 384 depth maps of the mesh along fixed
+     directions ("views") say how much of the light around each is covered. Neither light nor rotation enters them;
+     they are made once. Parallel to the faces of a cube, they are looked up by a column, a row and a depth.
+   - Occluders of few triangles (own_triangles) draw a mask for such a receiver instead, which is right to its texels;
+     receivers in a row, such as pixels, share them.
    - Overlapping occluders: the union of their masks (FIV_MASK), or discs of their true solid angle; never below 0.
    Deviations from the text: sums carry the solid angle of their texels, which eq 6 to 10 leave out; a sample's position
    is the occluder's centre minus the receiver; the first shell is free (0.3 R halves the error of the inner tangent
@@ -44,7 +47,10 @@
 
    WHAT IT DOES NOT
    Receivers are diffuse; light comes from infinitely far away; light reflected between objects is not there; nothing
-   within a mesh is transparent. Meshes are not loaded. Occluders that deform need new masks (lazy: only those in use).
+   within a mesh is transparent. Meshes are not loaded. Occluders that deform need new masks (lazy: only those in use)
+   and have no views: they leak at contact, but for own masks.
+   OpenGL has FIV_SCALED with views, depth maps of suns and self-shadows; not FIV_MASK, own masks, rays where a sharp
+   sun's map is not sure, cutoff and statistics. Vectors, masks and maps are made on the CPU.
 
    OPTIONS (macros)
      FIV_IMPLEMENTATION  the implementation, in one file     FIV_STATIC, FIV_DEF   linkage, everywhere
@@ -53,11 +59,11 @@
      FIV_NO_SELF         no self-shadows (eq 13)             FIV_NO_DELTA          no split-off lights
 
    MEMORY, THREADS, ERRORS
-   An environment is one block; an occluder has one each for tables, mesh and masks (keep_masks). Only create, share and
-   load allocate; X_explain says in a sentence what was refused. Functions take sat_threads in their options; different
-   objects may be used at once, and any number of threads may call fiv_irradiance on the same ones. All arguments are
-   checked in every build. No function takes more than 32 KB of stack; at most 256 workers take part in one
-   fiv_irradiance.
+   An environment is one block; an occluder has one each for tables and maps, mesh and masks (keep_masks). Only create,
+   share and load allocate; X_explain says in a sentence what was refused. Functions take sat_threads in their options;
+   different objects may be used at once, and any number of threads may call fiv_irradiance on the same ones. All
+   arguments are checked in every build. No function takes more than 32 KB of stack; at most 256 workers take part in
+   one fiv_irradiance.
 
    ROWS, LIGHT, FAILURES
    Light is linear radiance (decode sRGB first), and so are the results. The stride of the picture is in bytes: 0
@@ -75,7 +81,7 @@
      a split-off light 4e-5 (beside the poles of the image up to 2 % of it stays in the cube). Masks equal rays through
      the texel centres but for rays that graze an edge (2e-6 of the texels set).
    - OpenGL: half floats, filtered by the hardware: within 2e-3 of the largest irradiance of fiv_irradiance and
-     fiv_self_irradiance with cutoff, own_masks and rays 0, 1e-4 rms (measured 1e-4 and 2e-5, in software).
+     fiv_self_irradiance with cutoff, own_masks and rays 0, 1e-4 rms (measured 5e-5 and 8e-6, in software).
    - Of neighbours that share a mask each is within own_tolerance of its own, as far as the masks of both ends say.
    - I_tot: within 6e-4 of its largest value of the sum over all texels. Turned vectors: 1.7 % rms of the same vectors
      computed from a turned mesh.
@@ -115,9 +121,9 @@
    >> meshes         clusters, bounding ball
    >> masks          cones on rows of bits, rays, spans
    >> samples        shells, grids, cells
-   >> occluders      creation, support function, all masks
-   >> lighting       depth maps of the lights, vectors
-   >> lookups        one occluder above one receiver: vectors, own masks, lights
+   >> occluders      creation, support function, depth maps, views, all masks
+   >> lighting       depth maps of the lights, light around the views, vectors
+   >> lookups        one occluder above one receiver: vectors, views, own masks, lights
    >> receivers      several occluders, tiles, self-shadows, lazy samples
    >> saves          saving and loading
    >> shaders        GLSL
@@ -326,7 +332,7 @@ typedef struct fiv_irradiance_options {
     int own_masks;         /* 64; 0..64; of each 64 receivers so many may get masks of their own, from FIV_SCALED on:
                               those in a cell with a sample inside the mesh, or from which it may cover 2 sr: half the
                               error of the depth maps at 100 times their time; 0: none */
-    int own_triangles;     /* 20000; 0..2147483647; an occluder of more gets none: a mask takes 50 ns a triangle */
+    int own_triangles;     /* 500; 0..2147483647; an occluder of more gets none: a mask takes 50 ns a triangle */
     float own_tolerance;   /* 0.01; 0..1; of up to 16 receivers in a row, within R / 16, those between two whose masks
                               take the same to this part of I_tot get what lies between; 0: each its own */
     int rays;              /* 1; 0..1; 0: where a sharp sun's depth map is not sure, its texels say, not a ray */
@@ -390,7 +396,7 @@ FIV_DEF int fiv_version(void);
 #endif /* FIV_H */
 
 /* ------------------------------------------------------------------------------------------------
-   OpenGL: the receiver pass (FIV_SCALED, with self-shadows). Masks and vectors stay the CPU's work.
+   OpenGL: the receiver pass (FIV_SCALED with views, suns and self-shadows). Masks and vectors stay the CPU's work.
    ------------------------------------------------------------------------------------------------ */
 
 #if defined(FIV_GL) && !defined(FIV__GL_API)
@@ -599,7 +605,7 @@ static const sat__field fiv__irradiance_fields[] = {
     SAT__FIELD(fiv_irradiance_options, 'f', cutoff, 0.001, 0, 1, ' '),
     SAT__FIELD(fiv_irradiance_options, 'i', contact, 1, 0, 1, ' '),
     SAT__FIELD(fiv_irradiance_options, 'i', own_masks, FIV__TILE, 0, FIV__TILE, ' '),
-    SAT__FIELD(fiv_irradiance_options, 'i', own_triangles, 20000, 0, 2147483647, ' '),
+    SAT__FIELD(fiv_irradiance_options, 'i', own_triangles, 500, 0, 2147483647, ' '),
     SAT__FIELD(fiv_irradiance_options, 'f', own_tolerance, 0.01, 0, 1, ' '),
     SAT__FIELD(fiv_irradiance_options, 'i', rays, 1, 0, 1, ' '),
     SAT__FIELD(fiv_irradiance_options, 'f', penumbra, 1, 0, 100, ' '),
@@ -3173,8 +3179,9 @@ typedef struct fiv__around {
 
 /* A receiver as the views of a face see it. */
 typedef struct fiv__facing {
-    int column[FIV__VIEWS], beyond; /* texels; bytes above it stand between the receiver and the light */
+    int side, column[FIV__VIEWS], beyond; /* texels; bytes above it stand between the receiver and the light */
     float part[FIV__VIEWS], up[FIV__VIEWS];
+    const float *normal;
 } fiv__facing;
 
 /* 0..1: bilinear between the comparisons at four texels. */
@@ -3203,19 +3210,19 @@ static inline void fiv__add_channel(float all[FIV__VIEWS], float taken[FIV__VIEW
 }
 
 /* A row of views. `row`: the texels around the receiver's height; light: the first view's. */
-static void fiv__add_views(fiv__around *sum, const fiv__facing *f, const uint8_t *row, int side, float down,
-                           float height, const float *light, const float normal[3])
+static void fiv__add_views(fiv__around *sum, const fiv__facing *f, const uint8_t *row, float down, float height,
+                           const float *light)
 {
     float covered[FIV__VIEWS], over[FIV__VIEWS];
     int x, c;
     for (x = 0; x < FIV__VIEWS; x++) {
         over[x] = height + f->up[x] > 0 ? 1.0f : 0.0f;
-        covered[x] = over[x] > 0 ? fiv__view_covered(row + x * side + f->column[x], FIV__VIEWS * side, f->beyond,
+        covered[x] = over[x] > 0 ? fiv__view_covered(row + x * f->side + f->column[x], FIV__VIEWS * f->side, f->beyond,
                                                      f->part[x], down)
                                  : 0;
     }
     for (c = 0; c < 3; c++)
-        fiv__add_channel(sum->all[c], sum->taken[c], light + 3 * c * FIV__ALL_VIEWS, normal, over, covered);
+        fiv__add_channel(sum->all[c], sum->taken[c], light + 3 * c * FIV__ALL_VIEWS, f->normal, over, covered);
     for (x = 0; x < FIV__VIEWS; x++) sum->angle[x] += light[9 * FIV__ALL_VIEWS + x] * covered[x];
 }
 
@@ -3230,6 +3237,8 @@ static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o
     fiv__around sum;
     fiv__facing f;
     memset(&sum, 0, sizeof sum);
+    f.side = side;
+    f.normal = normal;
     for (face = 0; face < 6; face++) {
         fiv__axes ax = fiv__face_axes(face);
         float depth = -offset[ax.w] * ax.sign, ahead = normal[ax.w] * ax.sign, reach = 1 + (depth + least + 1) * 127;
@@ -3245,8 +3254,8 @@ static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o
             float height = ahead + normal[ax.v] * tangent[y];
             float down = fiv__view_texel(&line, (-offset[ax.v] - depth * tangent[y]) * scale[y] + shift, side);
             if (height + wide <= 0) continue;
-            fiv__add_views(&sum, &f, o->contact + (size_t)(row * side + line) * (size_t)(FIV__VIEWS * side), side, down,
-                           height, o->contact_light + row * FIV__VIEWS, normal);
+            fiv__add_views(&sum, &f, o->contact + (size_t)(row * side + line) * (size_t)(FIV__VIEWS * side), down,
+                           height, o->contact_light + row * FIV__VIEWS);
         }
     }
     *angle = 0;

@@ -271,9 +271,8 @@ static inline int pipeline_shadows(pipeline *p)
     PIPELINE_ON_GL(p, pipeline_shadows_gl(p));
     fo.threads = p->options.threads;
     memset(&p->shadow_stats, 0, sizeof p->shadow_stats);
-    if (!pipeline_shadows_on(p, SCENE_GROUND, &fo)) return 0;
-    fo.accuracy = FIV_MASK; /* on the sculptures themselves interpolated vectors show seams */
-    return pipeline_shadows_on(p, SCENE_FIRST, &fo) && pipeline_shadows_on(p, SCENE_SECOND, &fo);
+    return pipeline_shadows_on(p, SCENE_GROUND, &fo) && pipeline_shadows_on(p, SCENE_FIRST, &fo) &&
+           pipeline_shadows_on(p, SCENE_SECOND, &fo);
 }
 
 /* ---- ambient occlusion ---- */

@@ -541,6 +541,7 @@ static void test_resting(const reference_mesh *m, float low, float gap, float su
     reference_add(&scene, m->positions, m->indices, m->triangles, NULL, origin, 1);
     reference_build(&scene);
     io.penumbra = 0; /* as the rays have it */
+    io.own_triangles = 20000;
     test_plane(points, normals, SIDE, width, low);
     for (big = 0; big < 2; big++) {
         fiv_occluder_options options = fiv_occluder_defaults();
@@ -825,9 +826,10 @@ TEST(receivers_in_a_row_share_masks)
         points[3 * i] = 0.003f * (float)i - 0.96f, points[3 * i + 1] = -0.001f, points[3 * i + 2] = 0.42f;
         normals[3 * i] = 0.03f * sinf(0.2f * (float)i), normals[3 * i + 1] = 1, normals[3 * i + 2] = 0;
     }
+    io.own_triangles = 20000;
     io.own_tolerance = 0;
     EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, ALONG, e, &instance, 1, &io, &each), SAT_OK);
-    io = fiv_irradiance_defaults();
+    io.own_tolerance = fiv_irradiance_defaults().own_tolerance;
     EXPECT_EQ(fiv_irradiance(rgb[1], points, normals, ALONG, e, &instance, 1, &io, &shared), SAT_OK);
     io.threads = support_threads(3);
     EXPECT_EQ(fiv_irradiance(rgb[2], points, normals, ALONG, e, &instance, 1, &io, &three), SAT_OK);
@@ -1355,11 +1357,14 @@ static void test_resting_same(const fiv_occluder *a, const fiv_occluder *b, cons
     fiv_instance instance = test_instance(a, 0, 0, 0);
     io.penumbra = 0;
     test_plane(points, normals, SIDE, 3, -0.66f);
-    EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, COUNT, e, &instance, 1, &io, &stats), SAT_OK);
-    EXPECT(stats.own_masks > 0 && stats.rays > 0);
-    instance.occluder = b;
-    EXPECT_EQ(fiv_irradiance(rgb[1], points, normals, COUNT, e, &instance, 1, &io, NULL), SAT_OK);
-    EXPECT(memcmp(rgb[0], rgb[1], sizeof rgb[0]) == 0);
+    for (io.own_triangles = 0; io.own_triangles <= 20000; io.own_triangles += 20000) {
+        instance.occluder = a;
+        EXPECT_EQ(fiv_irradiance(rgb[0], points, normals, COUNT, e, &instance, 1, &io, &stats), SAT_OK);
+        EXPECT((io.own_triangles ? stats.own_masks : stats.contacts) > 0 && stats.rays > 0);
+        instance.occluder = b;
+        EXPECT_EQ(fiv_irradiance(rgb[1], points, normals, COUNT, e, &instance, 1, &io, NULL), SAT_OK);
+        EXPECT(memcmp(rgb[0], rgb[1], sizeof rgb[0]) == 0);
+    }
 }
 
 TEST(save_and_load)
@@ -1384,7 +1389,8 @@ TEST(save_and_load)
         EXPECT_EQ(fiv_occluder_light(back, e, NULL), SAT_OK);
         if (storage) EXPECT(memcmp(o->half_table + 1, back->half_table + 1, o->stats.samples * FIV__TERMS * 2) == 0);
         else EXPECT(memcmp(o->table, back->table, o->stats.samples * FIV__TERMS * 4) == 0);
-        EXPECT(o->light_count == 1 && memcmp(o->map, back->map, o->stats.map_bytes) == 0);
+        EXPECT(o->light_count == 1 && memcmp(o->map, back->map, 512 * 512 * sizeof *o->map) == 0);
+        EXPECT(memcmp(o->contact, back->contact, o->stats.map_bytes - 512 * 512 * sizeof *o->map) == 0);
         EXPECT(memcmp(&o->stats.centre, &back->stats.centre, sizeof o->stats.centre) == 0);
         test_resting_same(o, back, e);
         fiv_occluder_destroy(back);
@@ -2092,7 +2098,7 @@ TEST(defaults_are_the_stated_ones)
     EXPECT_NEAR(o.last_shell, 6, 0);
     EXPECT(i.accuracy == FIV_SCALED && i.partial == 1 && i.overlap == 1);
     EXPECT_NEAR(i.cutoff, 0.001f, 0);
-    EXPECT(i.own_masks == 64 && i.own_triangles == 20000 && i.rays == 1);
+    EXPECT(i.own_masks == 64 && i.own_triangles == 500 && i.rays == 1);
     EXPECT_NEAR(i.own_tolerance, 0.01f, 0);
     EXPECT_EQ(i.contact, 1);
     EXPECT_NEAR(i.penumbra, 1, 0);

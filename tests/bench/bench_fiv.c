@@ -687,6 +687,7 @@ static void resting_row(bench *b, const char *light, int big, double gap)
     error[0] = error_of(&r, 3, &seconds[0]);
     r.options = fiv_irradiance_defaults();
     r.options.penumbra = 0;
+    r.options.own_triangles = 20000;
     seconds[1] = median_time(run_once, &r, bench_rounds(3));
     light_points(&r, &stats);
     error[1] = reference_nrmse(b->truth, b->rgb, (size_t)points);
@@ -728,6 +729,80 @@ static void resting(int side)
                 for (big = 0; big < (bench_quick() ? 1 : 2); big++)
                     resting_row(&b, environment_names[lights[l]], big, gaps[g]);
             }
+        reference_free(&b.scene);
+        reference_mesh_free(&b.mesh);
+        fiv_environment_destroy(b.environment);
+        free(b.points), free(b.covered), free(b.directions), free(b.powers);
+    }
+}
+
+/* ---- self-shadows: receivers a hair above the middles of triangles ---- */
+
+static void self_receivers(bench *b, const fiv_occluder *o)
+{
+    size_t p, n = (size_t)(b->side * b->side);
+    int j, k;
+    for (p = 0; p < n; p++) {
+        const unsigned *index = b->mesh.indices + 3 * (p * b->mesh.triangles / n);
+        float corner[3][3], e[2][3], *normal = b->normals + 3 * p;
+        for (j = 0; j < 3; j++)
+            for (k = 0; k < 3; k++)
+                corner[j][k] = (b->mesh.positions[3 * index[j] + (unsigned)k] - b->stats.centre[k]) / b->stats.radius;
+        for (k = 0; k < 3; k++) e[0][k] = corner[1][k] - corner[0][k], e[1][k] = corner[2][k] - corner[0][k];
+        for (k = 0; k < 3; k++)
+            normal[k] = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
+        fiv__normalise(normal, normal);
+        for (k = 0; k < 3; k++) {
+            normal[k] *= o->mesh.turn;
+            b->points[3 * p + (size_t)k] = (corner[0][k] + corner[1][k] + corner[2][k]) / 3 + 1e-4f * normal[k];
+        }
+    }
+}
+
+static void self_shadows(int side)
+{
+    static const char *const names[3] = {"mesh/bunny_small.ply", "mesh/queen.ply", "mesh/dragon_res4.ply"};
+    static const int lights[2] = {0, 3};
+    int i, l, contact;
+    bench_table("Self-shadows: on the mesh itself, interpolated (eq 13, cut at the horizon) and by views",
+                "mesh\tenvironment\tnrmse_interpolated\tnrmse\tpoint_us_interpolated\tpoint_us");
+    for (i = 0; i < (bench_smoke() ? 1 : 3); i++) {
+        bench b;
+        double made;
+        fiv_occluder *o;
+        fiv_instance instance;
+        memset(&b, 0, sizeof b);
+        b.mesh = load(names[i], &b.mesh_name);
+        open_plane(&b, side);
+        o = make(&b, 32, 17, 15, FIV_STORAGE_FLOAT, &made, NULL);
+        instance = instance_of(&b, o);
+        self_receivers(&b, o);
+        for (l = 0; l < 2; l++) {
+            double error[2], seconds[2];
+            size_t p, n = (size_t)(side * side);
+            if (!open_environment(&b, lights[l])) continue;
+            check(fiv_occluder_light(o, b.environment, NULL), "light");
+            for (p = 0; p < n; p++) {
+                double sum[3];
+                int k;
+                reference_irradiance(sum, &b.scene, b.directions, b.powers, b.lights, b.points + 3 * p,
+                                     b.normals + 3 * p);
+                for (k = 0; k < 3; k++) b.truth[3 * p + (size_t)k] = (float)sum[k];
+            }
+            for (contact = 0; contact < 2; contact++) {
+                fiv_irradiance_options io = fiv_irradiance_defaults();
+                io.contact = contact;
+                io.penumbra = 0;
+                seconds[contact] = -seconds_used();
+                check(fiv_self_irradiance(b.rgb, b.points, b.normals, n, b.environment, &instance, NULL, 0, &io, NULL),
+                      "self");
+                seconds[contact] += seconds_used();
+                error[contact] = reference_nrmse(b.truth, b.rgb, n);
+            }
+            bench_row("%s\t%s\t%.4f\t%.4f\t%.2f\t%.2f", b.mesh_name, environment_names[lights[l]], error[0], error[1],
+                      1e6 * seconds[0] / (double)n, 1e6 * seconds[1] / (double)n);
+        }
+        fiv_occluder_destroy(o);
         reference_free(&b.scene);
         reference_mesh_free(&b.mesh);
         fiv_environment_destroy(b.environment);
@@ -858,6 +933,7 @@ static void suns_row(bench *b, const fiv_occluder *o, const char *light, double 
     error[1] = reference_nrmse(b->truth, b->rgb, (size_t)points);
     if (shown) error_picture(b, "fiv_vectors", "interpolated vectors alone", 1);
     r.options = fiv_irradiance_defaults();
+    r.options.own_triangles = 20000;
     seconds[2] = median_time(run_once, &r, bench_rounds(3));
     light_points(&r, &stats);
     error[2] = reference_nrmse(b->truth, b->rgb, (size_t)points);
@@ -944,6 +1020,7 @@ static void pixels(bench *b, int side)
         double square = 0, largest = 0;
         r.options = fiv_irradiance_defaults();
         r.options.own_tolerance = tolerances[t];
+        r.options.own_triangles = 20000;
         seconds = median_time(run_once, &r, bench_rounds(3));
         light_points(&r, &stats);
         if (!t) memcpy(each, b->rgb, (size_t)(side * side) * 3 * sizeof(float)), first = seconds;
@@ -990,6 +1067,7 @@ int main(void)
     table_4();
     resting(bench_smoke() ? 12 : bench_quick() ? 28 : 96);
     suns(bench_smoke() ? 12 : bench_quick() ? 28 : 80);
+    self_shadows(bench_smoke() ? 6 : bench_quick() ? 12 : 24);
     pixels(&b, bench_smoke() ? 12 : bench_quick() ? 28 : MAX_SIDE);
     b.side = bench_smoke() ? 8 : bench_quick() ? 20 : 40; /* the first rows of the plane would be a strip: start anew */
     reference_free(&b.scene);
