@@ -48,7 +48,7 @@ plot() {
     local rows=$1 x y log style title families
     title=${2%%;*} x=$(value x "$2") y=$(value y "$2") log=$(value log "$2") style=$(value style "$2")
     [ "$(awk -F '\t' -v by="$(value by "$2")" 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == by) c = i } NR > 1 && c && !seen[$c]++ { ++n } END { print n + 0 }' "$1")" -le 14 ] || families=1
-    awk -F '\t' -v x="$x" -v y="$y" -v xw="$(words "$x")" -v yw="$(words "$y")" -v by="$(value by "$2")" -v where="$(value where "$2")" -v style="${style:-points}" -v log_axes="$log" -v id="$plot_id" -v families="$families" '
+    awk -F '\t' -v x="$x" -v y="$y" -v xw="$(words "$x")" -v yw="$(words "$y")" -v by="$(value by "$2")" -v where="$(value where "$2")" -v style="${style:-points}" -v log_axes="$log" -v id="$plot_id" -v families="$families" -v titled="$titled" '
         function number(v) { return v ~ /^ *[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)? *$/ }
         # room around the points; on a logarithmic axis of less than two decades more than the powers of ten get marks
         function range(axis, low, high,    room, power, i, k, mark, marks) {
@@ -89,7 +89,7 @@ plot() {
             # names below, in as many columns as they leave room for
             for (i = 0; i < n; ++i) if (length(names[i]) > longest) longest = length(names[i])
             columns = longest < 14 ? 3 : longest < 27 ? 2 : 1; lines = int((n + (ring != "") + columns - 1) / columns)
-            printf "set terminal svg size 520,%d dynamic font \"sans-serif,14\" background rgb \"white\" name \"%s\"\n", 335 + 18 * lines, id
+            printf "set terminal svg size 520,%d dynamic font \"sans-serif,14\" background rgb \"white\" name \"%s\"\n", (titled ? 375 : 335) + 18 * lines, id
             printf "set key outside center bottom horizontal maxcols %d noenhanced reverse Left samplen 1 spacing 1 font \",13\"\n", columns
             range("x", left, right); range("y", bottom, top)
             for (i = 0; i < n; ++i) printf "$series%d << end\n%send\n", i, points[names[i]]
