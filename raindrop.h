@@ -30,15 +30,16 @@
      statistics of what was left out.
    - Primary and secondary rainbow, by geometrical optics or Airy's theory with its supernumerary arcs; the veil of the
      rain beyond the drops that are drawn, and the bows in it by the depth of what stands there.
-   - OpenGL 3.3 / ES 3.0: all of that on quads or sprites but for the order; rain falls by transform feedback.
+   - Lamps of the scene, all around or in cones, seen in each drop by the mirrored ray, order 0 and the bow's two; drops
+     that oscillate by their first two modes, so that streaks speckle.
+   - OpenGL 3.3 / ES 3.0, see OPENGL: rain falls by transform feedback.
 
    WHAT IT DOES NOT
 
    - Drops do not see the scene or each other, only the environment; they do not collide, merge, splash or run down.
    - A drop that reaches the near plane, or that the eye is in, is left out (and counted).
-   - Sprites (MAP, SPRITE) are still and in focus. Flattened drops have order 0 only. Drops do not oscillate, and lamps
-     light them only as part of the environment.
-   - OpenGL draws unsorted, as published, or in slices of depth.
+   - Sprites (MAP, SPRITE) are still spheres in focus, without lamps. Flattened and swinging drops have order 0 only,
+     and lamps' glints as spheres do. Lamps cast no shadows and have no halo in the veil.
    - It starts no thread, opens no window, creates no OpenGL context, keeps no global state.
 
    OPTIONS (macros)
@@ -69,6 +70,13 @@
    from the CPU's, and the drops are drawn over your framebuffer: a float texture that you sample or read by
    glReadPixels.
 
+   OPENGL
+
+   It has all looks, streaks, depth of field, flattened drops, orders, exit factors, lamps, oscillation, the veil and
+   its bows, rain of any dt, wind, and tests against any depth buffer; into textures, layers, framebuffers and parts of
+   them. Instead of the order: none, or slices of depth. It has not: RAINDROP_FILTER_SAT, statistics, drops left out
+   behind the scene's depth before they are drawn, doubles in the step. The environment is made on the CPU.
+
    NUMERICS
 
    - raindrop_trace: 3e-7 from a ray traced in long double, eye distance 1.01 to 1025 radii, index 1 and 1.33; 3e-6 for
@@ -85,26 +93,34 @@
      CPU and GPU; of sharp drops below 1.4 pixels exactly. Sprites, as published, are at least a pixel wide.
    - The veil: within 1 % of the drops that it stands for, drawn. Airy's bows: the angles of the maxima within .1
      degrees, their light within .5 % of geometrical optics'.
-   - Unsorted drops, RMSE from sorted ones: below 1e-5 in rain of 50 mm/h, .0008 for 1e5 drops of 2 mm in the published
-     box, .008 for 1e6. Slices, in rain a hundred times as dense as the heaviest: 1 .0038, 4 .0028, 16 .0013, 64 .00004.
+   - RMSE from sorted drops (bench_raindrop, "The order of drops"): in rain of 50 mm/h unsorted ones 1e-5; 1e5 drops
+     of 2 mm in the published box unsorted .0067, 4 slices .0004, 16 slices 3e-6; 1e6 of them .022, .0065, .0025.
+     Weighted blending (McGuire and Bavoil 2013) errs 4e-5, .001 to .003 and .008 there: more than four slices
+     everywhere, and in natural rain more than no order at all. It is left out.
+   - Lamps: a glint's light within 5 % of traced rays (8 % half a degree beside the bow), its place within a pixel of a
+     drop 160 wide; lamps all around sum to a white sky within .5 %. Swinging drops keep the mean light of their streaks
+     within .2 %; a still one is the spheroid of the moment.
    - Environment: NaN counts as 0, infinity as the largest finite value, negative light as 0; all are counted. One texel
      of 1e8 stays what it is: mips and footprints spread it, or `max_radiance` cuts it.
-   - The same bits for any number of workers; SIMD differs from plain C in the last digits. The GPU's picture is within
-     an RMSE of 5e-4 of the CPU's (tone-mapped luminance, quads, both unsorted; llvmpipe: 4e-5, with the longest streaks
-     2e-4), its drops within 3e-4 m over tens of steps.
+   - The same bits for any number of workers, and of pictures with SSE2, NEON or plain C (raindrop_trace_n: but for the
+     last count % lanes rays, whose last digits differ). The GPU's picture is within an RMSE of 5e-4 of the CPU's
+     (tone-mapped luminance, quads, both unsorted; llvmpipe: 4e-5, with the longest streaks 2e-4), its drops within 3e-4
+     m over tens of steps.
 
    COST (one core, SSE2; ratios from tests/bench/bench_raindrop.c, forest environment)
 
    - Vectors of a fragment, closed form on arrays: SSE2 3.5 ns, AVX2 1.5 ns with gcc and clang alike. The trilinear map
      (base 512, in the cache) takes 4.7 and 7 times as long with gcc, 13 and 21 times with clang; 44.7 MB against none.
-   - One drop of 256 pixels 33 degrees off axis, RMSE over its pixels: map .205, sprite .205, ray .014. In the middle:
-     .069, .068, .021 (.015 with four rays at the rim).
-   - 1e5 drops of 2 mm in the published box at 512 x 512, time over the map's and RMSE: map 1 .0586, sprite .94 .0498,
-     ray .71 .0311, auto .72 .0312 (far drops below 1.5 px, the default; 3 px .0331); no rain at all .0556: far drops of
-     at least a pixel, as published, are worse than none. 1e6 drops: map 1, ray .54, auto .49.
+   - One drop of 256 pixels 33 degrees off axis, RMSE over its pixels: map .192, sprite .192, ray .013. In the middle:
+     .069, .068, .015.
+   - 1e5 drops of 2 mm in the published box at 512 x 512, time over the map's and RMSE: map 1 .0586, sprite 1.0 .0498,
+     ray .76 .0311, auto .77 .0312 (far drops below 1.5 px, the default; 3 px .0331); no rain at all .0556: far drops of
+     at least a pixel, as published, are worse than none. 1e6 drops: map 1 .140, ray .62 .0767, auto .59 .0772.
+   - Lamps, rain of 25 mm/h with streaks: each a fifth of the frame; oscillation twice the frame, and each lamp then
+     two thirds of it. Both off: the time without them.
    - Lookups in mips: a texel of the octahedral picture 256..2048 wide costs the same; 1024 is as good as 2048 (.0221,
      .0208). Boxes of a table: 20 to 150 times as long, better for small drops only (12 pixels: .036 against .049).
-   - Streaks: RMSE .0004 to .0014 from 64 still moments, 35 to 70 times faster.
+   - Streaks: RMSE .0004 to .0014 from 64 still moments, 40 to 75 times faster.
    - Sorting is 2 % of a frame.
    - OpenGL, auto, 50000 drops of 2 mm at 512 x 512 on llvmpipe (tests/bench/gpu_raindrop.c), over round, sharp and
      still drops without internal reflections: orders 1.1, flattened drops 1.1, a lens 1.4, a shutter 1.5.
@@ -1122,8 +1138,10 @@ typedef struct raindrop__rays {
 /* GCC at -O2 leaves a function of this size and its vectors in memory: 1.4 to 1.8 times as long. */
 #if defined(__GNUC__)
 #define RAINDROP__INLINE static inline __attribute__((always_inline))
+#define RAINDROP__APART static __attribute__((noinline)) /* options that are off must not crowd the loops of the usual */
 #else
 #define RAINDROP__INLINE static inline
+#define RAINDROP__APART static inline
 #endif
 
 /* a x + b y */
@@ -2310,6 +2328,8 @@ enum { RAINDROP__TURN = 0x2545f491 }; /* from one crossing of the box to the nex
 enum { RAINDROP__CHUNK = 4096 }; /* drops that are culled together; fixes the order of everything, whatever the
                                     workers */
 
+static inline int raindrop__chunk_count(int drops) { return drops / RAINDROP__CHUNK + (drops % RAINDROP__CHUNK != 0); }
+
 /* A drop in the picture. `rows`: first row and row behind the last, packed, of those it may touch. */
 typedef struct raindrop__visible {
     float x, y, radius, depth; /* pixels; radius of the circle of the projected area; depth along the axis in metres */
@@ -2658,8 +2678,6 @@ static void raindrop__advance_range(int begin, int end, int worker, void *contex
         rain->unsettled[chunk] = moving;
     }
 }
-
-static inline int raindrop__chunk_count(int drops) { return drops / RAINDROP__CHUNK + (drops % RAINDROP__CHUNK != 0); }
 
 RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt)
 {
@@ -3034,8 +3052,8 @@ static inline int raindrop__glint_of(raindrop__glint *out, const raindrop__lit *
 }
 
 /* Adds the lamps' light to that of a far drop, the mean over its disc. */
-static inline void raindrop__far_lamps(float colour[3], const raindrop_render_options *o, const raindrop_drop *drop,
-                                       const float d[3], const raindrop__water *water)
+RAINDROP__APART void raindrop__far_lamps(float colour[3], const raindrop_render_options *o, const raindrop_drop *drop,
+                                         const float d[3], const raindrop__water *water)
 {
     raindrop__lit lit;
     raindrop__way way;
@@ -3105,7 +3123,7 @@ typedef struct raindrop__frame {
    of a ball that holds the drop, however it swings. */
 typedef struct raindrop__placed { float x, y, z, radius, distance2, flatness, reach; } raindrop__placed;
 
-static inline void raindrop__swing_drop(raindrop__placed *placed, const raindrop__frame *frame, uint32_t index)
+RAINDROP__APART void raindrop__swing_drop(raindrop__placed *placed, const raindrop__frame *frame, uint32_t index)
 {
     const raindrop_drop *drop = &frame->rain->drops[index];
     const raindrop__swing swing = raindrop__swing_of(frame->rain, index, frame->options.oscillation);
@@ -3409,7 +3427,7 @@ static void raindrop__cull_range(int begin, int end, int worker, void *context)
 
 static inline int raindrop__gather_pairs(const raindrop_rain *rain)
 {
-    int chunk, i, n = 0, chunks = rain->count / RAINDROP__CHUNK + (rain->count % RAINDROP__CHUNK != 0);
+    int chunk, i, n = 0, chunks = raindrop__chunk_count(rain->count);
     for (chunk = 0; chunk < chunks; chunk++) {
         for (i = 0; i < rain->chunks[chunk].visible; i++, n++) {
             uint32_t at = (uint32_t)(chunk * RAINDROP__CHUNK + i);
@@ -4140,7 +4158,7 @@ static inline int raindrop__glint_seen(raindrop__visible *out, float normal[3], 
     return 1;
 }
 
-static inline void raindrop__draw_glints(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
+RAINDROP__APART void raindrop__draw_glints(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
 {
     const raindrop__frame *frame = batch->frame;
     const uint32_t index = v->drop & ~RAINDROP__FAR_BIT;
@@ -4178,7 +4196,7 @@ static inline void raindrop__draw_glints(raindrop__batch *batch, const raindrop_
 
 /* A far drop that swings: the environment's light by what its prefilter knows of it, the transverse mode's curvature
    swings 10/4 times as much; then each lamp's. */
-static inline void raindrop__draw_flickering(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
+RAINDROP__APART void raindrop__draw_flickering(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
 {
     const raindrop__frame *frame = batch->frame;
     const uint32_t index = v->drop & ~RAINDROP__FAR_BIT;
@@ -4409,11 +4427,25 @@ static inline void raindrop__set_frame(raindrop__frame *frame)
     frame->side_y = sqrtf(frame->focal * frame->focal + frame->half_height * frame->half_height);
 }
 
+/* A picture of the CPU, not checked yet. */
+static inline raindrop__frame raindrop__frame_of(float *rgb, ptrdiff_t stride, int width, int height,
+                                                 const raindrop_camera *camera)
+{
+    raindrop__frame frame;
+    memset(&frame, 0, sizeof frame);
+    frame.camera = camera ? *camera : raindrop_camera_defaults();
+    frame.rgb = (unsigned char *)rgb;
+    frame.stride = stride;
+    frame.width = width;
+    frame.height = height;
+    return frame;
+}
+
 static inline void raindrop__sum_stats(raindrop_render_stats *stats, const raindrop__frame *frame, int workers)
 {
     const raindrop_rain *rain = frame->rain;
     size_t fates[RAINDROP__FATES];
-    int i, k, chunks = rain->count / RAINDROP__CHUNK + (rain->count % RAINDROP__CHUNK != 0);
+    int i, k, chunks = raindrop__chunk_count(rain->count);
     memset(stats, 0, sizeof *stats);
     memset(fates, 0, sizeof fates);
     for (i = 0; i < chunks; i++) {
@@ -4441,20 +4473,14 @@ RAINDROP_DEF sat_result raindrop_render(float *rgb, ptrdiff_t stride, int width,
                                         const raindrop_environment *environment, const raindrop_render_options *options,
                                         raindrop_render_stats *stats)
 {
-    raindrop__frame frame;
+    raindrop__frame frame = raindrop__frame_of(rgb, stride, width, height, camera);
     const sat_threads *threads;
     sat__text ignored = sat__text_begin(NULL, 0);
     int workers;
-    memset(&frame, 0, sizeof frame);
-    frame.camera = camera ? *camera : raindrop_camera_defaults();
     frame.options = options ? *options : raindrop_render_defaults();
     frame.rain = rain;
     frame.environment = environment;
     frame.depth = depth;
-    frame.rgb = (unsigned char *)rgb;
-    frame.stride = stride;
-    frame.width = width;
-    frame.height = height;
     if (!rain || !environment || !raindrop__frame_is_valid(&frame) ||
         !raindrop__render_is_valid(&ignored, &frame.options) ||
         (frame.options.look == RAINDROP_LOOK_MAP && !frame.options.map))
@@ -4463,8 +4489,7 @@ RAINDROP_DEF sat_result raindrop_render(float *rgb, ptrdiff_t stride, int width,
     threads = &rain->options.threads;
     workers = sat__worker_count(threads);
     memset(rain->tally, 0, (size_t)workers * sizeof *rain->tally);
-    sat__parallel_for(threads, rain->count / RAINDROP__CHUNK + (rain->count % RAINDROP__CHUNK != 0),
-                      raindrop__cull_range, &frame);
+    sat__parallel_for(threads, raindrop__chunk_count(rain->count), raindrop__cull_range, &frame);
     frame.visible = raindrop__gather_pairs(rain);
     frame.order = raindrop__sort(rain, frame.visible, frame.options.sort);
     sat__parallel_for(threads, (height + RAINDROP__BAND - 1) / RAINDROP__BAND, raindrop__draw_bands, &frame);
@@ -4493,14 +4518,8 @@ RAINDROP_DEF sat_result raindrop_environment_render(float *rgb, ptrdiff_t stride
                                                     const raindrop_camera *camera,
                                                     const raindrop_environment *environment, const sat_threads *threads)
 {
-    raindrop__frame frame;
-    memset(&frame, 0, sizeof frame);
-    frame.camera = camera ? *camera : raindrop_camera_defaults();
+    raindrop__frame frame = raindrop__frame_of(rgb, stride, width, height, camera);
     frame.environment = environment;
-    frame.rgb = (unsigned char *)rgb;
-    frame.stride = stride;
-    frame.width = width;
-    frame.height = height;
     if (!environment || !raindrop__frame_is_valid(&frame)) return SAT_ERR_ARGUMENT;
     if (threads && !sat__threads_are_valid(threads)) return SAT_ERR_ARGUMENT;
     raindrop__set_frame(&frame);
@@ -4542,16 +4561,10 @@ RAINDROP_DEF sat_result raindrop_veil(float *rgb, ptrdiff_t stride, int width, i
                                       const raindrop_camera *camera, const raindrop_environment *environment,
                                       const raindrop_veil_options *options)
 {
-    raindrop__frame frame;
+    raindrop__frame frame = raindrop__frame_of(rgb, stride, width, height, camera);
     raindrop__veil_job job;
-    memset(&frame, 0, sizeof frame);
-    frame.camera = camera ? *camera : raindrop_camera_defaults();
     frame.environment = environment;
     frame.depth = depth;
-    frame.rgb = (unsigned char *)rgb;
-    frame.stride = stride;
-    frame.width = width;
-    frame.height = height;
     job.frame = &frame;
     job.options = options ? *options : raindrop_veil_defaults();
     if (!environment || !raindrop__frame_is_valid(&frame)) return SAT_ERR_ARGUMENT;
@@ -5453,10 +5466,50 @@ enum {
     RAINDROP__GL_GLINT, RAINDROP__GL_VEIL, RAINDROP__GL_BOWS, RAINDROP__GL_ADVANCE, RAINDROP__GL_PROGRAMS
 };
 
+/* What a program is made for: bits in the order of the names. */
+enum {
+    RAINDROP__IF_MAP = 1, RAINDROP__IF_SPRITES = 2, RAINDROP__IF_MOTION = 4, RAINDROP__IF_OBLATE = 8,
+    RAINDROP__IF_ORDERS = 16, RAINDROP__IF_VEIL = 32, RAINDROP__IF_SWING = 64, RAINDROP__IF_LAMPS = 128
+};
+static const char *const raindrop__gl_needs[8] = {"map", "sprites", "motion", "oblate", "orders", "veil", "oscillation",
+                                                  "lamps"};
+
+/* As sat__gl_program, with vertices of several texts. */
+typedef struct raindrop__program {
+    int when;
+    const char *defines, *vertex[6], *fragment[8];
+} raindrop__program;
+
+#define RAINDROP__DROPS {raindrop__glsl_draw_vertex, raindrop__glsl_draw_place}
+#define RAINDROP__SPRITES {SAT__GL_PIXEL, raindrop__glsl_shade, raindrop__glsl_draw_sprite}
+#define RAINDROP__RAYS                                                                                                 \
+    {SAT__GL_PIXEL, raindrop__glsl_shade, raindrop__glsl_orders, raindrop__glsl_flat, raindrop__glsl_draw_trace,       \
+     raindrop__glsl_draw_soft, raindrop__glsl_draw_ray}
+#define RAINDROP__SWINGS "#define LOOK 3\n#define SOFT 1\n#define FLAT 1\n#define SWING 1\n"
+
+static const raindrop__program raindrop__programs[RAINDROP__GL_PROGRAMS] = {
+    {RAINDROP__IF_MAP, "#define LOOK 0\n#define FLAT 1\n", RAINDROP__DROPS, RAINDROP__SPRITES},
+    {RAINDROP__IF_SPRITES, "#define LOOK 1\n#define FLAT 1\n", RAINDROP__DROPS, RAINDROP__SPRITES},
+    {0, "#define LOOK 3\n", RAINDROP__DROPS, RAINDROP__RAYS},
+    {RAINDROP__IF_MOTION, "#define LOOK 3\n#define SOFT 1\n", RAINDROP__DROPS, RAINDROP__RAYS},
+    {RAINDROP__IF_OBLATE, "#define LOOK 3\n#define FLAT 1\n", RAINDROP__DROPS, RAINDROP__RAYS},
+    {RAINDROP__IF_MOTION | RAINDROP__IF_OBLATE, "#define LOOK 3\n#define SOFT 1\n#define FLAT 1\n", RAINDROP__DROPS,
+     RAINDROP__RAYS},
+    {RAINDROP__IF_SWING, RAINDROP__SWINGS,
+     {raindrop__glsl_random, raindrop__glsl_draw_vertex, raindrop__glsl_draw_place}, RAINDROP__RAYS},
+    {RAINDROP__IF_LAMPS, RAINDROP__SWINGS "#define GLINT 1\n",
+     {raindrop__glsl_random, raindrop__glsl_draw_vertex, raindrop__glsl_lamp, raindrop__glsl_glint,
+      raindrop__glsl_draw_place}, RAINDROP__RAYS},
+    {RAINDROP__IF_VEIL, "", {NULL}, {SAT__GL_PIXEL, raindrop__glsl_veil}},
+    {RAINDROP__IF_VEIL, "#define BOW 1\n", {NULL}, {SAT__GL_PIXEL, raindrop__glsl_veil}},
+    {0, "", {raindrop__glsl_random, raindrop__glsl_step, raindrop__glsl_advance}, {NULL}},
+};
+
 struct raindrop_gl {
     sat__gl gl;
     raindrop_gl_options options;
-    unsigned programs[RAINDROP__GL_PROGRAMS]; /* 0: not among those that options ask for */
+    unsigned programs[RAINDROP__GL_PROGRAMS]; /* 0: not among those that create's options ask for */
+    int made;                         /* RAINDROP__IF_... of create */
     unsigned environment, far_drops, bow, map[2];
     float sun_direction[3], sun_irradiance[3];
     unsigned drops[2], arrays[2];     /* ping-pong buffers and their vertex arrays */
@@ -5503,117 +5556,40 @@ RAINDROP_DEF const char *raindrop_gl_message(const raindrop_gl *gl)
     return gl ? gl->gl.message : "there is no object";
 }
 
-/* Whether the options ask for a program. */
-static inline int raindrop__gl_wants(const raindrop_gl_options *o, int program)
+/* What options ask for. */
+static inline int raindrop__gl_given(const raindrop_gl_options *o)
 {
-    switch (program) {
-    case RAINDROP__GL_MAP: return o->map != NULL;
-    case RAINDROP__GL_SPRITE: return o->sprites;
-    case RAINDROP__GL_SWING: return o->oscillation;
-    case RAINDROP__GL_GLINT: return o->lamps;
-    case RAINDROP__GL_VEIL:
-    case RAINDROP__GL_BOWS: return o->veil;
-    case RAINDROP__GL_ADVANCE: return 1;
-    default:
-        if (((program - RAINDROP__GL_RAYS) & RAINDROP__GL_SOFT) && !o->motion) return 0;
-        return !((program - RAINDROP__GL_RAYS) & RAINDROP__GL_FLAT) || o->oblate;
-    }
-}
-
-/* What a program of the drops knows. */
-static inline void raindrop__gl_define(raindrop_gl *g, int program)
-{
-    const int rays = program >= RAINDROP__GL_RAYS, swings = program >= RAINDROP__GL_SWING,
-              kind = rays ? program - RAINDROP__GL_RAYS : RAINDROP__GL_FLAT;
-    sat__gl_define(&g->gl, "LOOK", rays ? RAINDROP_LOOK_AUTO : program);
-    if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
-    if (swings || (kind & RAINDROP__GL_SOFT)) sat__gl_define(&g->gl, "SOFT", 1);
-    if (swings || (kind & RAINDROP__GL_FLAT)) sat__gl_define(&g->gl, "FLAT", 1);
-    if (rays && g->options.orders) sat__gl_define(&g->gl, "ORDERS", 1);
-    if (swings) sat__gl_define(&g->gl, "SWING", 1);
-    if (program == RAINDROP__GL_GLINT) sat__gl_define(&g->gl, "GLINT", 1);
-}
-
-static inline sat_result raindrop__gl_build_draw(raindrop_gl *g, int program)
-{
-    const char *library[4], *vertex[7], *fragment[8], **v = vertex, **f = fragment;
-    sat__gl_shaders shaders;
-    memset(&shaders, 0, sizeof shaders);
-    library[0] = raindrop_gl_glsl();
-    library[1] = raindrop__glsl_constants;
-    library[2] = raindrop__glsl_environment;
-    library[3] = NULL;
-    if (program >= RAINDROP__GL_SWING) *v++ = raindrop__glsl_random;
-    *v++ = raindrop__glsl_draw_vertex;
-    if (program == RAINDROP__GL_GLINT) {
-        *v++ = raindrop__glsl_lamp;
-        *v++ = raindrop__glsl_glint;
-    }
-    *v++ = raindrop__glsl_draw_place;
-    *v = NULL;
-    *f++ = sat__gl_pixel();
-    *f++ = raindrop__glsl_shade;
-    if (program < RAINDROP__GL_RAYS) *f++ = raindrop__glsl_draw_sprite;
-    else {
-        *f++ = raindrop__glsl_orders;
-        *f++ = raindrop__glsl_flat;
-        *f++ = raindrop__glsl_draw_trace;
-        *f++ = raindrop__glsl_draw_soft;
-        *f++ = raindrop__glsl_draw_ray;
-    }
-    *f = NULL;
-    shaders.name = "raindrop: drops";
-    shaders.library = library;
-    shaders.vertex = vertex;
-    shaders.fragment = fragment;
-    raindrop__gl_define(g, program);
-    return sat__gl_build(&g->gl, &g->programs[program], &shaders);
-}
-
-/* One for environments with bows and one for those without. */
-static inline sat_result raindrop__gl_build_veil(raindrop_gl *g, int program)
-{
-    const char *library[3], *fragment[3];
-    sat__gl_shaders shaders;
-    memset(&shaders, 0, sizeof shaders);
-    library[0] = raindrop__glsl_constants;
-    library[1] = raindrop__glsl_environment;
-    fragment[0] = sat__gl_pixel();
-    fragment[1] = raindrop__glsl_veil;
-    library[2] = fragment[2] = NULL;
-    shaders.name = "raindrop: veil";
-    shaders.library = library;
-    shaders.fragment = fragment;
-    if (program == RAINDROP__GL_BOWS) sat__gl_define(&g->gl, "BOW", 1);
-    return sat__gl_build(&g->gl, &g->programs[program], &shaders);
-}
-
-static inline sat_result raindrop__gl_build_advance(raindrop_gl *g)
-{
-    static const char *const varyings[] = {"next_drop", "next_motion", NULL};
-    const char *vertex[5];
-    sat__gl_shaders shaders;
-    memset(&shaders, 0, sizeof shaders);
-    vertex[0] = raindrop__glsl_constants;
-    vertex[1] = raindrop__glsl_random;
-    vertex[2] = raindrop__glsl_step;
-    vertex[3] = raindrop__glsl_advance;
-    vertex[4] = NULL;
-    shaders.name = "raindrop: advance";
-    shaders.vertex = vertex;
-    shaders.varyings = varyings;
-    return sat__gl_build(&g->gl, &g->programs[RAINDROP__GL_ADVANCE], &shaders);
+    return (o->map ? RAINDROP__IF_MAP : 0) | (o->sprites ? RAINDROP__IF_SPRITES : 0) |
+           (o->motion ? RAINDROP__IF_MOTION : 0) | (o->oblate ? RAINDROP__IF_OBLATE : 0) |
+           (o->orders ? RAINDROP__IF_ORDERS : 0) | (o->veil ? RAINDROP__IF_VEIL : 0) |
+           (o->oscillation ? RAINDROP__IF_SWING : 0) | (o->lamps ? RAINDROP__IF_LAMPS : 0);
 }
 
 static inline sat_result raindrop__gl_programs(raindrop_gl *g)
 {
+    static const char *const varyings[] = {"next_drop", "next_motion", NULL};
+    const char *const library[4] = {raindrop_gl_glsl(), raindrop__glsl_constants, raindrop__glsl_environment, NULL};
     sat_result result = SAT_OK;
     int i;
+    g->made = raindrop__gl_given(&g->options);
     for (i = 0; i < RAINDROP__GL_PROGRAMS && result == SAT_OK; i++) {
-        if (!raindrop__gl_wants(&g->options, i)) continue;
-        if (i == RAINDROP__GL_ADVANCE) result = raindrop__gl_build_advance(g);
-        else if (i == RAINDROP__GL_VEIL || i == RAINDROP__GL_BOWS) result = raindrop__gl_build_veil(g, i);
-        else result = raindrop__gl_build_draw(g, i);
+        const raindrop__program *row = &raindrop__programs[i];
+        sat__gl_shaders shaders;
+        size_t used;
+        if ((row->when & g->made) != row->when) continue;
+        memset(&shaders, 0, sizeof shaders);
+        shaders.name = i == RAINDROP__GL_ADVANCE ? "raindrop: advance"
+                       : row->vertex[0]          ? "raindrop: drops"
+                                                 : "raindrop: veil";
+        shaders.library = library;
+        if (row->vertex[0]) shaders.vertex = row->vertex;
+        if (row->fragment[0]) shaders.fragment = row->fragment;
+        else shaders.varyings = varyings;
+        if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
+        if (g->options.orders) sat__gl_define(&g->gl, "ORDERS", 1);
+        used = strlen(g->gl.defines);
+        snprintf(g->gl.defines + used, sizeof g->gl.defines - used, "%s", row->defines);
+        result = sat__gl_build(&g->gl, &g->programs[i], &shaders);
     }
     return result;
 }
@@ -5717,21 +5693,21 @@ RAINDROP_DEF sat_result raindrop_gl_set_options(raindrop_gl *g, const raindrop_g
 {
     raindrop_gl_options o = options ? *options : raindrop_gl_defaults();
     sat__text t;
-    int i, same;
+    int i;
     if (!g || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
     t = sat__text_begin(g->gl.message, sizeof g->gl.message);
     if (!raindrop__fields_are_valid(&t, &o, raindrop__gl_fields, SAT__COUNT(raindrop__gl_fields)))
         return SAT_ERR_ARGUMENT;
-    same = o.map == g->options.map && o.half_map == g->options.half_map && o.quads == g->options.quads;
-    if (!same) raindrop__say(&t, "map, half_map and quads are made at create");
-    for (i = 0; i < RAINDROP__GL_PROGRAMS && same; i++) {
-        same = !raindrop__gl_wants(&o, i) || g->programs[i];
-        if (!same)
-            raindrop__say(&t, "sprites, motion, oblate, veil, oscillation or lamps is 1 and was 0: made at create");
+    if (o.map != g->options.map || o.half_map != g->options.half_map || o.quads != g->options.quads) {
+        raindrop__say(&t, "map, half_map and quads are made at create");
+        return SAT_ERR_MISMATCH;
     }
-    if (same && o.orders > g->options.orders) same = raindrop__say(&t, "orders is 1 and was 0: made at create");
-    if (!same) return SAT_ERR_MISMATCH;
-    o.orders = g->options.orders; /* compiled in */
+    for (i = 0; i < 8; i++)
+        if (raindrop__gl_given(&o) & ~g->made & 1 << i) {
+            raindrop__say(&t, raindrop__gl_needs[i]);
+            raindrop__say(&t, " is 1 and was 0: it is made at create");
+            return SAT_ERR_MISMATCH;
+        }
     o.allocator = g->options.allocator;
     g->options = o;
     return SAT_OK;
@@ -6127,11 +6103,8 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, const sat_gl_target *
     sat_result result;
     unsigned program;
     float depth[2];
-    memset(&frame, 0, sizeof frame);
-    frame.camera = camera ? *camera : raindrop_camera_defaults();
+    frame = raindrop__frame_of(NULL, 0, width, height, camera);
     frame.options = options ? *options : raindrop_render_defaults();
-    frame.width = width;
-    frame.height = height;
     if (!g || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
     if (!raindrop__gl_frame_is_valid(g, &frame)) return SAT_ERR_ARGUMENT;
     if (!sat__gl_target_is_valid(to)) return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "the target is none", NULL);
@@ -6217,10 +6190,7 @@ RAINDROP_DEF sat_result raindrop_gl_veil(raindrop_gl *g, const sat_gl_target *to
     sat_result result;
     unsigned program;
     if (!g || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
-    memset(&frame, 0, sizeof frame);
-    frame.camera = camera ? *camera : raindrop_camera_defaults();
-    frame.width = width;
-    frame.height = height;
+    frame = raindrop__frame_of(NULL, 0, width, height, camera);
     if (!raindrop__gl_veil_is_valid(g, &frame, &o)) return SAT_ERR_ARGUMENT;
     if (!sat__gl_target_is_valid(to)) return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "the target is none", NULL);
     if (!raindrop__gl_depth(planes, &frame.camera, projection))

@@ -3,6 +3,8 @@
 #define LIGHTSCAN_IMPLEMENTATION
 #ifdef SAME_BITS_TONEMAP
 #include "tonemap.h"
+#elif defined(SAME_BITS_RAINDROP)
+#include "raindrop.h"
 #elif defined(SAME_BITS_FIV)
 #include "fiv.h"
 #else
@@ -22,7 +24,7 @@ static void add(const void *p, size_t size)
     for (; size > 0; size--) hash = (hash ^ *c++) * 1099511628211u;
 }
 
-#if !defined(SAME_BITS_TONEMAP) && !defined(SAME_BITS_FIV)
+#if !defined(SAME_BITS_TONEMAP) && !defined(SAME_BITS_FIV) && !defined(SAME_BITS_RAINDROP)
 /* NaN counts as NaN: its bits are the processor's. */
 static void add_floats(sat__f32x4 v)
 {
@@ -79,6 +81,47 @@ int main(void)
     int i;
     for (i = 0; i < 100000; i++) all_lanes();
     printf("lanes %016llx\n", (unsigned long long)hash);
+    return 0;
+}
+
+#elif defined(SAME_BITS_RAINDROP)
+enum { WIDE = 97, HIGH = 61 };
+
+static float draw_unit(void) { return (float)(draw() >> 8) / 16777216.0f; }
+
+int main(void)
+{
+    static float sky[3 * 64 * 32], rgb[3 * WIDE * HIGH];
+    sat_image image = sat_image_f32(sky, 64, 32, 3);
+    raindrop_environment_options eo = raindrop_environment_defaults();
+    raindrop_environment *e = NULL;
+    raindrop_lamp lamp = raindrop_lamp_defaults();
+    int i, variant;
+    for (i = 0; i < 3 * 64 * 32; i++)
+        sky[i] = draw() % 499 ? draw_unit() * (draw() % 97 ? 1.0f : 300.0f) : sat__float_from_bits(draw());
+    lamp.position[1] = 2;
+    eo.far_samples = 64, eo.far_swing = 1, eo.max_radiance = 1000;
+    if (raindrop_environment_create(&e, &image, &eo, NULL) != SAT_OK) return 1;
+    for (variant = 0; variant < 32; variant++) {
+        raindrop_rain_options o = raindrop_rain_defaults();
+        raindrop_render_options r = raindrop_render_defaults();
+        raindrop_camera camera = raindrop_camera_defaults();
+        raindrop_rain *rain = NULL;
+        o.count = 1500, o.oblate = variant & 1;
+        o.box_size[0] = o.box_size[1] = o.box_size[2] = 0.6f;
+        camera.exposure = variant & 2 ? 0.003f : 0, camera.aperture = variant & 4 ? 0.01f : 0;
+        r.look = variant & 8 ? RAINDROP_LOOK_SPRITE : RAINDROP_LOOK_AUTO;
+        r.oscillation = variant & 16 ? 0.1f : 0, r.lamps = &lamp, r.lamp_count = variant >> 4;
+        if (raindrop_rain_create(&rain, &o) != SAT_OK) return 1;
+        raindrop_rain_advance(rain, 0.1);
+        raindrop_environment_render(rgb, 0, WIDE, HIGH, &camera, e, NULL);
+        raindrop_veil(rgb, 0, WIDE, HIGH, NULL, &camera, e, NULL);
+        raindrop_render(rgb, 0, WIDE, HIGH, NULL, &camera, rain, e, &r, NULL);
+        add(rgb, sizeof rgb);
+        raindrop_rain_destroy(rain);
+    }
+    raindrop_environment_destroy(e);
+    printf("raindrop %016llx\n", (unsigned long long)hash);
     return 0;
 }
 

@@ -624,16 +624,18 @@ TEST(raindrop_gl_restores_the_state)
 /* The veil before hills of several depths, with the bows and without. */
 TEST(raindrop_gl_veils_as_the_cpu)
 {
-    static float sky[3 * 64 * 32], depth[RG_W * RG_H], window[RG_W * RG_H];
+    static float sky[3 * 64 * 32], depth[RG_W * RG_H], window[2][RG_W * RG_H];
+    static const float reversed[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, -1, 0, 0, 0.1f, 0}; /* and infinite */
     sat_image image = sat_image_f32(sky, 64, 32, 3);
     raindrop_environment_options e = raindrop_environment_defaults();
     raindrop_environment *environment = NULL;
     raindrop_veil_options o = raindrop_veil_defaults();
     raindrop_gl *g = NULL;
     sat__gl_state state;
-    unsigned texture = 0, target = 0;
+    unsigned textures[2] = {0, 0}, texture, target = 0;
+    sat_gl_target to;
     rg_scene s;
-    int bow, x, y, c;
+    int bow, kind, x, y, c;
     if (!rg_open(&s)) return;
     reference_sky(sky, 64, 32);
     s.camera.depth_near = 0.1f;
@@ -642,18 +644,25 @@ TEST(raindrop_gl_veils_as_the_cpu)
         double z = x % 7 == 0 ? 0 : 0.5 * pow(1.0005, x % 17000), far = 5000, near = (double)s.camera.depth_near;
         depth[x] = (float)z;
         y = RG_H - 1 - x / RG_W;
-        window[y * RG_W + x % RG_W] =
+        window[1][y * RG_W + x % RG_W] = z > 0 ? (float)(0.1 / z) : 0;
+        window[0][y * RG_W + x % RG_W] =
             z > 0 ? (float)(((far + near) - 2 * far * near / z) / (far - near) * 0.5 + 0.5) : 1;
     }
     EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
     EXPECT_EQ(raindrop_gl_veil(g, NULL, RG_W, RG_H, 0, NULL, NULL, NULL), SAT_ERR_ARGUMENT); /* no environment */
     sat__gl_begin(&s.gl, &state, 1);
-    EXPECT_EQ(sat__gl_texture(&s.gl, &texture, SAT__GL_DEPTH_COMPONENT32F, RG_W, RG_H, window), SAT_OK);
+    for (kind = 0; kind < 2; kind++)
+        EXPECT_EQ(sat__gl_texture(&s.gl, &textures[kind], SAT__GL_DEPTH_COMPONENT32F, RG_W, RG_H, window[kind]),
+                  SAT_OK);
     EXPECT_EQ(sat__gl_framebuffer(&s.gl, &target, &s.texture, 1, 0), SAT_OK);
     sat__gl_end(&s.gl, &state);
-    for (bow = 0; bow < 2; bow++) {
+    to = sat_gl_to_texture(s.texture);
+    for (bow = 0; bow < 4; bow++) { /* by the usual depth over what is bound, by reversed depth over a target */
         double error, worst = 0;
-        e.bow_by_depth = bow;
+        kind = bow >> 1;
+        texture = textures[kind];
+        o.clip_zero_to_one = kind;
+        e.bow_by_depth = bow & 1;
         e.sun_direction[1] = 0.3f;
         e.sun_direction[2] = sqrtf(1 - 0.3f * 0.3f);
         e.far_samples = 16;
@@ -669,8 +678,9 @@ TEST(raindrop_gl_veils_as_the_cpu)
         sat__gl_begin(&s.gl, &state, 1);
         sat__gl_upload(&s.gl, s.texture, SAT__GL_RGBA32F, RG_W, RG_H, s.gpu);
         sat__gl_end(&s.gl, &state);
-        s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, target);
-        EXPECT_EQ(raindrop_gl_veil(g, NULL, RG_W, RG_H, texture, &s.camera, NULL, &o), SAT_OK);
+        s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, kind ? 0 : target);
+        EXPECT_EQ(raindrop_gl_veil(g, kind ? &to : NULL, RG_W, RG_H, texture, &s.camera, kind ? reversed : NULL, &o),
+                  SAT_OK);
         sat__gl_begin(&s.gl, &state, 1);
         EXPECT_EQ(sat__gl_read(&s.gl, s.gpu, s.texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
         sat__gl_end(&s.gl, &state);
@@ -682,9 +692,10 @@ TEST(raindrop_gl_veils_as_the_cpu)
                     if (error > worst) worst = error;
                 }
         EXPECT(worst < 2e-3);
-        REPORT(bow ? "veil with bows, largest difference" : "veil, largest difference", worst, "from the CPU");
+        REPORT(bow & 1 ? "veil with bows, largest difference" : "veil, largest difference", worst, "from the CPU");
         raindrop_environment_destroy(environment);
     }
+    texture = textures[0];
     o.reach = -1;
     EXPECT_EQ(raindrop_gl_veil(g, NULL, RG_W, RG_H, texture, &s.camera, NULL, &o), SAT_ERR_ARGUMENT);
     EXPECT(strcmp(raindrop_gl_message(g), "reach is -1; 0..1e18") == 0);
@@ -693,7 +704,7 @@ TEST(raindrop_gl_veils_as_the_cpu)
     EXPECT(strcmp(raindrop_gl_message(g), "depth needs a projection or a depth_far") == 0);
     s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, 0);
     s.gl.DeleteFramebuffers(1, &target);
-    s.gl.DeleteTextures(1, &texture);
+    s.gl.DeleteTextures(2, textures);
     raindrop_gl_destroy(g);
     rg_close(&s);
 }
