@@ -548,7 +548,10 @@ SAT_DEF const char *sat_explain_gl(char *text, size_t size, const sat_gl_options
 
 /* Belongs to the context that is current in create: it must be current in every call. Textures are made by the
    first build of a size, unless options.width and height name it. Every call leaves the OpenGL state as it was (but for
-   pending errors, which are lost). */
+   pending errors, which are lost).
+   The CPU alone has doubles and 64-bit integers, updates of a part, streams, covariance, borders other than clipping,
+   radii of each pixel, bounds and plans (they hold here for the kinds of the same name). Here alone are two-float sums,
+   and the mean that stays on the GPU. */
 typedef struct sat_gl sat_gl;
 
 /* On an OpenGL error *out only answers sat_gl_message, and is to be destroyed; on the others it is NULL. */
@@ -1663,7 +1666,7 @@ typedef struct sat__gl {
     int max_size;               /* largest width and height of a texture */
     unsigned vertex_array;      /* without any attribute: what full-screen passes draw with */
     unsigned framebuffer;       /* for sat__gl_read and sat__gl_attach */
-    char defines[1024];         /* #define lines for the next sat__gl_build */
+    char defines[2048];         /* #define lines for the next sat__gl_build */
     char message[8192];         /* one sentence; for shaders the log and the numbered source follow. Never NULL */
 } sat__gl;
 

@@ -86,7 +86,7 @@
      TONEMAP_METERING_LOG_AVERAGE; 7.5 ns a pixel on an idle core) is 1. The default is 1.14: the guided filter itself
      0.94, metering by percentiles 0.04, estimated white 0.04, colours beyond the display 0.15 where 20 % of the pixels
      are such. Times the default: global 0.6, local with soft scales 1.2, + local mesopic 1.2, + uniform 1.1, Ashikhmin
-     1.6, Neutral 1.2, Hable 1.3, ACES 1.8, AgX 2.2, dithering 1.25, other primaries 1.1; SAT_NO_SIMD 2.6 (gcc -O2);
+     1.6, Neutral 1.2, Hable 1.3, ACES 1.8, AgX 2.2, dithering 1.25, other primaries 1.1; SAT_NO_SIMD 2.2 (gcc -O2);
      OpenCV's global Drago operator 3.5, pfstmo_reinhard02 -s 22.
      Halos beside steps of 10, 100 and 1000:1: guided 3, 4 and 4 codes, the search 12, 27 and 18. SSIM of the search
      against the operator with exact Gaussians 0.987 to 0.998. Under 0.5 % of noise single pixels move by less than 1
@@ -317,7 +317,8 @@ extern "C" {
    adaptation stay there. All options but threads work. Metering by percentiles (the default), an estimated key or
    white, and Ashikhmin's range take a histogram: by compute shaders where there is GL 4.3, else by one point a pixel,
    which on ES asks for EXT_float_blend; TONEMAP_METERING_LOG_AVERAGE with a white above 0 does without.
-   What the CPU has and OpenGL has not: statistics, and floats beside bytes (draw into a float texture). */
+   The CPU alone has statistics, pictures of one channel, and keeps alpha, which is 1 here. Floats come by a target that
+   is a float texture, with any encoding. All else is on both. */
 typedef struct tonemap_gl tonemap_gl;
 
 /* On an OpenGL error *out only answers tonemap_gl_message, and is to be destroyed; on the others it is NULL. */
@@ -2713,7 +2714,7 @@ static const char tonemap__glsl_squares[] =
                 uint bits = floatBitsToUint(y);
                 if (!(y > 0.0) || bits >= 0x71800000u) continue;
                 uint weight = TONEMAP_MASK == 1 ? uint(texelFetch(mask, p, 0).x) : 1u;
-                atomicAdd(bins[(bits - 0x0d800000u) >> 19], weight);
+                atomicAdd(bins[(bits - uint(TONEMAP_LOWEST)) >> 19], weight);
             }
             barrier();
             for (int i = lane; i < TONEMAP_BINS; i += 256)
@@ -2735,7 +2736,7 @@ static const char tonemap__glsl_scatter[] =
             weight = TONEMAP_MASK == 1 ? texelFetch(mask, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x : 1.0;
             float y = texelFetch(luminance, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x;
             uint bits = floatBitsToUint(y);
-            int bin = int((bits - 0x0d800000u) >> 19);
+            int bin = int((bits - uint(TONEMAP_LOWEST)) >> 19);
             gl_PointSize = 1.0;
             gl_Position = vec4((vec2(bin % 64, bin / 64) + 0.5) / vec2(32.0, float(TONEMAP_BINS) / 128.0) - 1.0, 0.0,
                 1.0);
@@ -2915,7 +2916,8 @@ static const char tonemap__glsl_steps[] =
             ivec2 p = ivec2(gl_FragCoord.xy);
             float y = tonemap_next(p, -1, -1);
             if (y < 0.0) y = tonemap_next(p, 1, textureSize(luminance, 0).x);
-            value = (log2(clamp(y * tonemap_scale(), 1.0 / 1024.0, 256.0)) + 10.0) * 64.0;
+            y = clamp(y * tonemap_scale(), exp2(-TONEMAP_OCTAVES), TONEMAP_LOCAL_CAP);
+            value = (log2(y) + TONEMAP_OCTAVES) * TONEMAP_OCTAVE;
         });
 
 static const char tonemap__glsl_along[] =
@@ -2932,16 +2934,17 @@ static const char tonemap__glsl_along[] =
         out uvec2 value;
         void main() {
             ivec2 p = ivec2(gl_FragCoord.xy);
-            int end = min(p.x + 11, textureSize(source, 0).x);
+            int end = min(p.x + TONEMAP_RADIUS + 1, textureSize(source, 0).x);
             value = uvec2(0u);
-            for (int x = max(p.x - 10, 0); x < end; x++) value += tonemap_read(ivec2(x, p.y));
+            for (int x = max(p.x - TONEMAP_RADIUS, 0); x < end; x++) value += tonemap_read(ivec2(x, p.y));
         });
 
 /* The sums of 21 rows of such sums, as means. */
 static const char tonemap__glsl_down[] =
     SAT__GLSL(
         vec2 tonemap_mean(highp usampler2D sums, ivec2 p) {
-            ivec2 size = textureSize(sums, 0), low = max(p - 10, 0), high = min(p + 11, size);
+            ivec2 size = textureSize(sums, 0), low = max(p - TONEMAP_RADIUS, 0);
+            ivec2 high = min(p + TONEMAP_RADIUS + 1, size);
             uvec2 sum = uvec2(0u);
             for (int y = low.y; y < high.y; y++) sum += texelFetch(sums, ivec2(p.x, y), 0).xy;
             return vec2(sum) / float((high.x - low.x) * (high.y - low.y));
@@ -2972,7 +2975,8 @@ static const char tonemap__glsl_search[] =
         uniform sampler2D steps;
         float tonemap_find(ivec2 p, float own, float key) {
             vec2 m = tonemap_mean(table, p);
-            return exp2((m.x / 1048576.0 * texelFetch(steps, p, 0).x + m.y / 1024.0) / 64.0 - 10.0);
+            float q = m.x / 1048576.0 * texelFetch(steps, p, 0).x + m.y / 1024.0;
+            return exp2(q / TONEMAP_OCTAVE - TONEMAP_OCTAVES);
         })
     "#elif TONEMAP_OPERATOR == 2\n"
     SAT__GLSL(
@@ -2989,7 +2993,7 @@ static const char tonemap__glsl_search[] =
     SAT__GLSL(
         float tonemap_find(ivec2 p, float own, float key) {
             const int reach[8] = int[8](0, 1, 2, 3, 5, 8, 13, 20);
-            float c = min(own, 256.0), taken = c, weight = 1.0;
+            float c = min(own, TONEMAP_LOCAL_CAP), taken = c, weight = 1.0;
             for (int k = 1; k < TONEMAP_SCALES; k++) {
                 float side = float(2 * reach[k - 1] + 1), v = tonemap_box(p, reach[k]);
                 float limit = TONEMAP_EPSILON * c + TONEMAP_PHI_TERM * key / (side * side);
@@ -3262,6 +3266,11 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define(gl, "TONEMAP_ENCODING", (int)o->encoding);
     sat__gl_define(gl, "TONEMAP_DITHER", o->dither);
     sat__gl_define(gl, "TONEMAP_BINS", TONEMAP__BIN_ROWS * 64);
+    sat__gl_define(gl, "TONEMAP_LOWEST", (int)TONEMAP__DARKEST_BITS);
+    sat__gl_define(gl, "TONEMAP_RADIUS", TONEMAP__RADIUS);
+    sat__gl_define_float(gl, "TONEMAP_OCTAVES", TONEMAP__OCTAVES);
+    sat__gl_define_float(gl, "TONEMAP_OCTAVE", TONEMAP__STEPS); /* in steps */
+    sat__gl_define_float(gl, "TONEMAP_LOCAL_CAP", TONEMAP__LOCAL_CAP);
     sat__gl_define_text(gl, "TONEMAP_COUNTS", g->given & TONEMAP__IF_COUNTED ? "usampler2D" : "sampler2D");
     sat__gl_define(gl, "TONEMAP_BURN",
                    !tonemap__is_infinite(o->white) && (o->white > 0 || o->operation != TONEMAP_LINEAR));
