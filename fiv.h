@@ -93,19 +93,23 @@
      32x17x15     0.014 (0.023)   0.011   0.002 (0.1)      1.3 s       6 to 10 ms   0.33 MB  1.2 MB   default
      64x33x30     0.006 (0.008)                            10 s        30 ms        2.5 MB   8.9 MB
    - A receiver costs 0.17 to 0.45 us an occluder (the more the wider its lights), 300 to 800 times less than its rays;
-     FIV_MASK 1 to 2 us where masks are needed. Depth maps take 0.5 MB an occluder.
-   - Standing on a floor 3 R wide, forest, gap 0 and 0.002 R; interpolated -> with own masks (default), and the same at
-     64x33x30: box 0.087 -> 0.004 (0.003), queen 0.065 -> 0.005 (0.0024), fandisk 0.031 -> 0.007 (0.0036), bunny 0.032
-     -> 0.005 (0.0023), dragon of 11k triangles 0.006 (0.0032). The box ends at 0.003: where a row of the cube's texels
-     goes behind an edge at once the light itself is a step (0.007, 0.0034, 0.002 with 16, 32, 64 texels).
-   - An own mask takes 0.01 ms (box) to 0.5 ms (queen, 10k triangles) for 10 to 40 % of those receivers. In a picture
-     few pixels stand so near and share: demo, 1280 x 720 x 4, two sculptures: 3.2 % of the ground's pixels, 3.0 us a
-     pixel in place of 0.6; 7.1 unshared, 1.7 with own_tolerance 0.03.
+     FIV_MASK 1 to 2 us where masks are needed. Depth maps of lights take 0.5 MB an occluder, views 1.6 MB.
+   - Standing on a floor 3 R wide, forest, gap 0 and 0.002 R; interpolated -> views -> own masks: box (default: own
+     masks) 0.089 -> 0.041 -> 0.004, queen 0.063 -> 0.010 -> 0.0045, fandisk 0.032 -> 0.010 -> 0.005, bunny 0.032 ->
+     0.006 -> 0.004, dragon of 11k triangles 0.053 -> 0.010 -> 0.0044. At 64x33x30 views stay (their 384 directions and
+     their texels of R / 32 are what is left: contact_map 128 gives the box 0.024), own masks come to 0.002 to 0.004.
+     The box ends at 0.003: where a row of the cube's texels goes behind an edge at once the light itself is a step
+     (0.007, 0.0034, 0.002 with 16, 32, 64 texels).
+   - On the mesh itself; interpolated -> views: bunny forest 0.023 -> 0.009, night 0.029 -> 0.014; queen 0.10 -> 0.045,
+     0.055 -> 0.042; dragon 0.077 -> 0.041, 0.054 -> 0.036.
+   - Views take 2 to 4 us for each such receiver, and 50 to 160 ms once. An own mask takes 0.01 ms (box) to 0.5 ms
+     (queen, 10k triangles) for 10 to 40 % of those receivers; in a picture few pixels stand so near, and they share.
    - Suns, floor 4 R wide below the bunny: a bare sun has the error 0 of rays at 0.2 us (rays for 0.5 % of receivers;
-     maps alone 0.025). Beside 128 of Embree's rays to lights drawn by power and cosine: resting, forest 0.004 to their
-     0.016, city 0.006 to 0.013, night 0.003 to 0.017, at 1.1 to 1.2 times their time, all but 0.03 of it own masks;
-     0.5 R above, 0.010 to 0.035, 0.012 to 0.022, 0.011 to 0.078, at 1/50 of it. Twenty lamps: 0.0005, with 8 lights
-     0.04. A disc's penumbra: 0.008, as of a point 0.07.
+     maps alone 0.025). Beside 128 of Embree's rays to lights drawn by power and cosine, penumbra 0: resting, forest
+     0.006 to their 0.016, city 0.004 to 0.013, night 0.004 to 0.017, at 1/20 to 1/26 of their time; with own masks
+     0.002 to 0.005 at 1.0 to 1.3 times it; 0.5 R above, 0.011 to 0.034, 0.004 to 0.021, 0.011 to 0.075, at 1/50. Twenty
+     lamps: 0.0005, with 8 lights 0.04; more lights than 2 to 8 change nothing in city, forest and night. A disc's
+     penumbra: 0.008, as of a point 0.07.
    - Shared masks, pixels R / 300 apart at the bunny's foot: a fifth of the time, 0.010 rms of the largest off.
    - A mask costs 0.94 times Embree's eight-wide rays at 3.7k triangles, 1.3 to 1.75 times at 11k to 48k.
    - Two occluders, 64x33x30: NRMSE 0.034 with eq 14-15, 0.0105 FIV_SCALED, 0.007 FIV_MASK.
@@ -3676,7 +3680,8 @@ static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], fiv__re
             inside = o->state[cell.index[0]] != FIV__STALE;
             r->stats->missing += !inside;
         }
-        if (o->contact_side && r->options->contact && !own) contact = inside ? 1 : fiv__contact_part(o, &cell, v[9]);
+        if (o->contact_side && r->options->contact && !own && r->diffuse[0] + r->diffuse[1] + r->diffuse[2] > 0)
+            contact = inside ? 1 : fiv__contact_part(o, &cell, v[9]);
     }
     if (own) {
         fiv__find_own(v, r, instance, normal);
