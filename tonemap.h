@@ -18,17 +18,20 @@
    WHAT IT DOES
 
      guided         the default: the photographic curve (Reinhard 2002 as in Slomp 2012, appendix A: eq A.1 to A.4),
-   with La from a self-guided filter of log luminance (He 2013), which leaks over no edge photographic   La as in the
-   thesis: the largest even neighbourhood around the pixel (eq A.5 to A.9), or the pixel itself (eq A.3). Burn-out above
-   a white; key and white estimated (Reinhard 2003) curves         Khronos PBR Neutral, AgX, ACES (Hill's fit), Hable:
-   each with its source beside it mesopic        reds fade in dim light, by the whole picture or by each neighbourhood
-   (eq A.10 to A.14) Ashikhmin      threshold against intensity, local and global (Michael 2010, section 4.3) colours
-   those beyond the display come back along their hue, dimmed and faded (gamut); primaries of Rec. 709, P3 and Rec. 2020
-   on both sides; white balance displays       sRGB bytes, dithered if wanted; floats up to a peak above white paper,
-   linear, PQ or HLG metering       as a camera: between percentiles, in steps, within limits, for the highlights,
-   through a mask; or eq A.1's log-average; or a fixed exposure adaptation     the metered light, key, white and range
-   approach those of the picture with a time constant in seconds, one for brighter and one for darker; what wavers by
-   less than 1/64 octave moves nothing leaving out    searches away from edges (selective; Michael 2010, section 4.4)
+                    with La from a self-guided filter of log luminance (He 2013), which leaks over no edge
+     photographic   La as in the thesis: the largest even neighbourhood around the pixel (eq A.5 to A.9), or the pixel
+                    itself (eq A.3). Burn-out above a white; key and white estimated (Reinhard 2003)
+     curves         Khronos PBR Neutral, AgX, ACES (Hill's fit), Hable: each with its source beside it
+     mesopic        reds fade in dim light, by the whole picture or by each neighbourhood (eq A.10 to A.14)
+     Ashikhmin      threshold against intensity, local and global (Michael 2010, section 4.3)
+     colours        those beyond the display come back along their hue, dimmed and faded (gamut); primaries of Rec. 709,
+                    P3 and Rec. 2020 on both sides; white balance
+     displays       sRGB bytes, dithered if wanted; floats up to a peak above white paper, linear, PQ or HLG
+     metering       as a camera: between percentiles, in steps, within limits, for the highlights, through a mask; or eq
+                    A.1's log-average; or a fixed exposure
+     adaptation     the metered light, key, white and range approach those of the picture with a time constant in
+                    seconds, one for brighter and one for darker; what wavers by less than 1/64 octave moves nothing
+     leaving out    searches away from edges (selective; Michael 2010, section 4.4)
 
    WHAT IT DOES NOT
 
@@ -73,12 +76,13 @@
      NaN or negative luminance (ringing beside lamps) shows the mean of what the usable ones around it show, up to 3
      pixels away. A negative component of a positive luminance is kept until the display cuts it. Output lies in [0, 1],
      linear floats in [0, peak], for any input bits. PQ is within 3e-4. Black pictures stay black and leave the
-   adaptation alone; constant ones get the key (to half of the meter's step of 1/64 octave). Deviations from the
-   sources: eq A.1 averages positive luminances only and has no delta, which would depend on the unit; s in eq A.5 is
-   the length in pixels; eq A.7 takes the centre of the first step that fails; the Lab of eq A.12 has the pixel's own
-   luminance as white, so that the filter does not depend on exposure; Ashikhmin's range is between the 0.05 % and 99.95
-   % quantiles, and his capacity is made continuous; the gradient of selective mapping is that of the scaled luminance;
-   what adapts over time is the whole picture's light, not each pixel's La.
+     adaptation alone; constant ones get the key (to half of the meter's step of 1/64 octave).
+
+     Deviations from the sources: eq A.1 averages positive luminances only and has no delta, which would depend on the
+     unit; s in eq A.5 is the length in pixels; eq A.7 takes the centre of the first step that fails; the Lab of eq
+     A.12 has the pixel's own luminance as white, so that the filter does not depend on exposure; Ashikhmin's range is
+     between the 0.05 % and 99.95 % quantiles, and his capacity is made continuous; the gradient of selective mapping
+     is that of the scaled luminance; what adapts over time is the whole picture's light, not each pixel's La.
 
    COST (tests/bench/bench_tonemap.cpp; one core, SSE2, 2 megapixels of float RGB to 8 bits)
 
