@@ -289,8 +289,8 @@ answer ssao_sat "Ambient occlusion from a depth buffer. Error: against rays, thr
 answer fiv "Soft shadows of rigid things under a whole sky. Error: against rays to every texel of the light." \
     "A plane below" "environment:forest" nrmse point_us "accuracy:published" "" \
     "$(v=$(pick "$(rows fiv "A plane below")" "environment:forest;default:1" brute_ratio); [ -z "$v" ] || echo "Rays take $v times the time."
-       f=$(rows fiv Suns) v=$(pick "$f" "environment:forest;gap_R:0.002" nrmse)
-       [ -z "$v" ] || echo "On the floor it errs by $v, 128 rays a point by $(pick "$f" "environment:forest;gap_R:0.002" nrmse_128_rays), in $(pick "$f" "environment:forest;gap_R:0.002" time_over_rays | awk '{ printf "%.2g", $1 }') times their time.")"
+       f=$(rows fiv Suns) v=$(pick "$f" "environment:forest;gap_R:0.002" nrmse_views)
+       [ -z "$v" ] || echo "On the floor it errs by $v, 128 rays a point by $(pick "$f" "environment:forest;gap_R:0.002" nrmse_128_rays), in $(pick "$f" "environment:forest;gap_R:0.002" views_over_rays | awk '{ printf "%.2g", $1 }') times their time.")"
 answer raindrop "Rain of refracting drops. Error: against rays through every drop, 100000 drops." \
     "Rain: 100000" "" rmse time_ratio "method:map, unsorted (as published)" "" \
     "$(v=$(pick "$(rows raindrop "Rain: 100000")" default:1 reference_over_this_ratio); [ -z "$v" ] || echo "Rays take $v times the time.")" "sprites, sorted"

@@ -940,10 +940,11 @@ static void suns_row(bench *b, const fiv_occluder *o, const char *light, double 
     r.options.penumbra = 0;
     light_points(&r, &stats);
     error[3] = reference_nrmse(b->truth, b->rgb, (size_t)points);
-    if (shown) error_picture(b, "fiv_default", "the default, penumbra 0 as the reference has it", 1);
+    if (shown) error_picture(b, "fiv_masks", "own masks, as for meshes of few triangles", 1);
     r.options.own_masks = 0;
     seconds[3] = median_time(run_once, &r, bench_rounds(5));
     error[4] = reference_nrmse(b->truth, b->rgb, (size_t)points);
+    if (shown) error_picture(b, "fiv_default", "views, the default here (penumbra 0, as the reference)", 1);
     free(s.sums);
     bench_row("%s\t%.3f\t%d\t%.4f\t%.4f\t%.4f\t%.4f\t%.4f\t%.2f\t%.4f\t%.4f\t%.4f\t%.1f\t%.1f", light, gap,
               fiv_environment_get_stats(b->environment).lights, error[0], error[1], error[4], error[2], error[3],
