@@ -99,13 +99,13 @@
      without the time of their matrix:           900 x 8192 (six photos)           2048 x 8192 (three photos)
        EXACT                                     0.09 to 0.17; LAPJV 0.11 to 0.31   0.06, 0.07; LAPJV 0.09, 0.10
        FAST, gap 0.1 %                           0.05 to 0.12; LAPJV 0.09 to 0.22   0.05, 0.06; LAPJV 0.08, 0.09
-     A picture whose cells hardly compete (stream) is easy for all: EXACT 0.54 and 0.21, FAST 0.37 and 0.16 of scipy,
-     which needs 0.14 s; there a plain LAPJV wins at 900 x 8192, if its matrix is free. 100 x 100, dense: 0.9 of LAPJV,
-     checks and bound included. 8192 x 65536: the optimum in a minute on two cores, 4 % of the distances. Video, 30 x 30
-     of 8192, an eighth of a cell a frame: 0.07 of LAPJV from prices; a switching bonus of 0.05 changes 39 % of the
-     tiles (74 % without) at +0.9 % cost. Beside the optimum the published methods cost, 100x100 to 400x1500: greedy +3
-     to 10 %, greedy and 2-opt +0.4 to 0.7 %, annealing 0 to +0.2 %, softassign as printed +1.5 to 7 % (its outlier and
-     alpha decide), ants +2 to 3 %.
+     A picture whose cells hardly compete (stream) is easy for all: EXACT 0.31 and 0.25, FAST 0.37 and 0.16 of scipy,
+     which needs 0.14 s; there a plain LAPJV is about as fast at 900 x 8192, if its matrix is free. 100 x 100, dense:
+     0.9 of LAPJV, checks and bound included. 8192 x 65536: the optimum in a minute on two cores, 4 % of the distances.
+     Video, 30 x 30 of 8192, an eighth of a cell a frame: 0.07 of LAPJV from prices; a switching bonus of 0.05 changes
+     39 % of the tiles (74 % without) at +0.9 % cost. Beside the optimum the published methods cost, 100x100 to
+     400x1500: greedy +3 to 10 %, greedy and 2-opt +0.4 to 0.7 %, annealing 0 to +0.2 %, softassign as printed +1.5 to 7
+     % (its outlier and alpha decide), ants +2 to 3 %.
 */
 
 /*
@@ -307,8 +307,8 @@ typedef struct softassign_options {
                                   columns. cost_ij - u_i - v_j bounds what forcing the pair would add. Not with
                                   minimum_use */
     double *row_margin;        /* NULL; AUTO, EXACT: receive what the best assignment without the row's pair is
-                                  worse by; infinite where there is none. One more path a row. Not with minimum_use,
-                                  min_distance */
+                                  worse by, to 1e-15 of the largest cost that is not infinite; infinite where there is
+                                  none. One more path a row. Not with minimum_use, min_distance */
     float *soft;               /* NULL; ENTROPIC, PUBLISHED: receives the soft matrix, rows x columns */
     ptrdiff_t soft_stride;     /* in floats; 0: packed */
     sat_allocator allocator;   /* malloc */
@@ -767,7 +767,7 @@ struct softassign {
     int easy;              /* a sample of the rows hardly competes: short lists, and no prices first */
     int *row_result;       /* checks: a row's sat_result; the memory of list_length, which comes later */
     double *row_largest;   /* checks: its largest finite |cost|, where `wide`; the memory of row_distance */
-    double scale;          /* the largest of those, 0 where not `wide` */
+    double scale;          /* the largest of those and of unassigned_cost, 0 where not `wide` */
     float *pheromone;      /* ants: of the columns in the lists; the memory of list_value, which they do not read */
     int *order;            /* ants: rows; the memory of `closed` of the paths */
     int *holders;          /* rows that hold a slot in an assignment beside the solver's; the memory of `touched` */
@@ -815,21 +815,14 @@ static inline void softassign__set_price(softassign *s, int slot, double price)
    cost: two roundings of it would let a path search go round in circles. */
 static float softassign__distance(const float *a, const float *b, int n)
 {
-    float lanes[4] = {0, 0, 0, 0};
+    float lanes[4];
     int k = 0;
-#ifdef SAT__VECTOR
     sat__f32x4 sum = sat__f32x4_set1(0);
     for (; k + 4 <= n; k += 4) {
         sat__f32x4 d = sat__f32x4_sub(sat__f32x4_load(a + k), sat__f32x4_load(b + k));
         sum = sat__f32x4_add(sum, sat__f32x4_mul(d, d));
     }
     sat__f32x4_store(lanes, sum);
-#else
-    for (; k + 4 <= n; k += 4) {
-        int l;
-        for (l = 0; l < 4; l++) lanes[l] += (a[k + l] - b[k + l]) * (a[k + l] - b[k + l]);
-    }
-#endif
     for (; k < n; k++) lanes[k & 3] += (a[k] - b[k]) * (a[k] - b[k]);
     return sqrtf((lanes[0] + lanes[1]) + (lanes[2] + lanes[3]));
 }
@@ -918,7 +911,6 @@ static void softassign__project_keys(const softassign *s, int row, softassign__s
     int b, k, l, dims = s->dims;
     for (b = 0; b < s->padded; b += SOFTASSIGN__BLOCK) {
         float *keys = w->keys + b;
-#ifdef SAT__VECTOR
         sat__f32x4 a0 = sat__f32x4_set1(0), a1 = a0, a2 = a0, a3 = a0, least;
         sat__f32x4 acc[4];
         for (k = 0; k < dims; k++, c += SOFTASSIGN__BLOCK) {
@@ -950,17 +942,6 @@ static void softassign__project_keys(const softassign *s, int row, softassign__s
             m[2] = m[3] < m[2] ? m[3] : m[2];
             w->block_min[b / SOFTASSIGN__BLOCK] = m[2] < m[0] ? m[2] : m[0];
         }
-#else
-        float least = SOFTASSIGN__INFINITY, acc[SOFTASSIGN__BLOCK] = {0};
-        for (k = 0; k < dims; k++, c += SOFTASSIGN__BLOCK)
-            for (l = 0; l < SOFTASSIGN__BLOCK; l++) acc[l] += (p[k] - c[l]) * (p[k] - c[l]);
-        for (l = 0; l < SOFTASSIGN__BLOCK; l++) {
-            float bound = sqrtf(acc[l]) * s->shrink, price = s->price_f[b + l];
-            keys[l] = bound - price - (bound + fabsf(price)) * 3e-7f - s->slack;
-            least = keys[l] < least ? keys[l] : least;
-        }
-        w->block_min[b / SOFTASSIGN__BLOCK] = least;
-#endif
     }
 }
 
@@ -1359,7 +1340,6 @@ static inline float softassign__exp(float x)
     return p * sat__float_from_bits((uint32_t)((int32_t)k + 127) << 23);
 }
 
-#ifdef SAT__VECTOR
 static inline sat__f32x4 softassign__exp4(sat__f32x4 x)
 {
     sat__f32x4 z, k, r, p, magic = sat__f32x4_set1(12582912.0f);
@@ -1378,7 +1358,6 @@ static inline sat__f32x4 softassign__exp4(sat__f32x4 x)
     k = sat__f32x4_mul(sat__f32x4_add(k, sat__f32x4_set1(127.0f)), sat__f32x4_set1(8388608.0f));
     return sat__f32x4_mul(p, sat__f32x4_from_bits(sat__f32x4_truncate(k)));
 }
-#endif
 
 /* 1 / eps, finite, so that 0 / eps is 0. */
 static inline float softassign__inverse(float eps) { return eps > 1e-37f ? 1 / eps : 1e37f; }
@@ -1386,9 +1365,8 @@ static inline float softassign__inverse(float eps) { return eps > 1e-37f ? 1 / e
 /* e[q] = exp((least - e[q]) / eps); returns the sum. */
 static float softassign__weights(float *e, int n, float least, float inverse)
 {
-    float lanes[4] = {0, 0, 0, 0};
+    float lanes[4];
     int q = 0;
-#ifdef SAT__VECTOR
     sat__f32x4 sum = sat__f32x4_set1(0), top = sat__f32x4_set1(least), factor = sat__f32x4_set1(inverse);
     for (; q + 4 <= n; q += 4) {
         sat__f32x4 x = softassign__exp4(sat__f32x4_mul(sat__f32x4_sub(top, sat__f32x4_load(e + q)), factor));
@@ -1396,7 +1374,6 @@ static float softassign__weights(float *e, int n, float least, float inverse)
         sum = sat__f32x4_add(sum, x);
     }
     sat__f32x4_store(lanes, sum);
-#endif
     for (; q < n; q++) {
         e[q] = softassign__exp((least - e[q]) * inverse);
         lanes[q & 3] += e[q];
@@ -3180,10 +3157,8 @@ typedef struct softassign__sweep {
 /* e[j] = c - v and their minimum. */
 static float softassign__reduced_row(const float *cost, const float *price, float *e, int n)
 {
-    float least;
+    float least, m[4];
     int j = 0;
-#ifdef SAT__VECTOR
-    float m[4];
     sat__f32x4 lanes = sat__f32x4_set1(SOFTASSIGN__INFINITY);
     for (; j + 4 <= n; j += 4) {
         sat__f32x4 x = sat__f32x4_sub(sat__f32x4_load(cost + j), sat__f32x4_load(price + j));
@@ -3194,9 +3169,6 @@ static float softassign__reduced_row(const float *cost, const float *price, floa
     least = m[0] < m[1] ? m[0] : m[1];
     least = m[2] < least ? m[2] : least;
     least = m[3] < least ? m[3] : least;
-#else
-    least = SOFTASSIGN__INFINITY;
-#endif
     for (; j < n; j++) {
         e[j] = cost[j] - price[j];
         least = e[j] < least ? e[j] : least;
@@ -3208,11 +3180,9 @@ static float softassign__reduced_row(const float *cost, const float *price, floa
 static void softassign__accumulate(float *sum, const float *e, float factor, int n)
 {
     int j = 0;
-#ifdef SAT__VECTOR
     sat__f32x4 f = sat__f32x4_set1(factor);
     for (; j + 4 <= n; j += 4)
         sat__f32x4_store(sum + j, sat__f32x4_add(sat__f32x4_load(sum + j), sat__f32x4_mul(sat__f32x4_load(e + j), f)));
-#endif
     for (; j < n; j++) sum[j] += e[j] * factor;
 }
 
@@ -3894,6 +3864,17 @@ static float softassign__switching_bonus(const softassign *s)
     return count ? (float)(s->options.switching * softassign__total(&sum) / count) : 0;
 }
 
+/* Prices of another frame end with digits of their own, below those of these costs, and sums of both would round.
+   Multiples of a coarse power of 2 leave the sums exact. */
+static void softassign__round_prices(softassign *s)
+{
+    double unit;
+    int exponent, j;
+    (void)frexp(s->scale, &exponent);
+    unit = ldexp(1, exponent - 24);
+    for (j = 0; j < s->max_slots; j++) softassign__set_price(s, j, floor(s->price[j] / unit) * unit);
+}
+
 /* Checks a problem and makes everything that does not depend on prices. */
 static sat_result softassign__start(softassign *s, const softassign_problem *problem)
 {
@@ -3915,10 +3896,12 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     s->in_place = s->dense && softassign__stays(problem, &s->options);
     result = softassign__check_costs(s);
     if (result != SAT_OK) return result;
-    for (s->scale = j = 0; s->wide && j < s->rows; j++)
+    s->scale = s->wide ? (double)problem->unassigned_cost : 0;
+    for (j = 0; s->wide && j < s->rows; j++)
         if (s->row_largest[j] > s->scale) s->scale = s->row_largest[j];
-    if (s->wide && !(s->scale < before * 1024 && before < s->scale * 1024))
+    if (s->wide && !(s->scale < before * 4 && before < s->scale * 4))
         s->prices_known = known = 0; /* they would drown these costs */
+    if (s->wide && known) softassign__round_prices(s);
     for (j = 0; j < s->max_slots; j++) s->top[j] = 0;
     s->dims = 0;
     if (s->projected) softassign__start_bound(s);

@@ -1950,8 +1950,12 @@ static void state_costs(softassign_problem *p, kinds_of_cost *c, const brute *b,
 
 static void check_margins(brute *b, const int *x, const double *margin)
 {
-    long double best = b->best, magnitude = b->magnitude;
+    long double best = b->best, used = b->magnitude, magnitude = used;
     int i;
+    for (i = 0; i < BRUTE_ROWS * BRUTE_COLUMNS; i++) /* prices are of the size of the largest cost */
+        if (i / BRUTE_COLUMNS < b->rows && i % BRUTE_COLUMNS < b->columns && !brute_is_forbidden(b->wide[i]) &&
+            fabsl((long double)b->wide[i]) > magnitude)
+            magnitude = fabsl((long double)b->wide[i]);
     for (i = 0; i < b->rows; i++) {
         double *cell = &b->wide[i * BRUTE_COLUMNS + x[i]], kept = *cell;
         *cell = (double)SOFTASSIGN__INFINITY;
@@ -1964,7 +1968,7 @@ static void check_margins(brute *b, const int *x, const double *margin)
     }
     b->found = 1;
     b->best = best;
-    b->magnitude = magnitude;
+    b->magnitude = used;
 }
 
 /* The sum as doubles hold it, to the last bit but those of adding up. */
