@@ -272,7 +272,7 @@ report:
 	@mv $(REPORT)/index.html.part $(REPORT)/index.html
 	@echo $(REPORT)/index.html
 	@failed=; for b in $(BENCHES); do [ -s $(OUT)/$$b.tsv ] || failed="$$failed $$b"; done; \
-	 [ -z "$$failed" ] || { echo "failed:$$failed (not built, or ended with an error: see above)" >&2; exit 1; }
+	 [ -z "$$failed" ] || { echo "failed:$$failed (not built, or ended with an error: see above)$(if $(HAVE_CXX),,; sat and tonemap need a C++ compiler: apt-get install g++)" >&2; exit 1; }
 
 # ---- the rest --------------------------------------------------------------------------------------------------
 
