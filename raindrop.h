@@ -123,8 +123,8 @@
    - Streaks: RMSE .0004 to .0014 from 64 still moments, 40 to 75 times faster.
    - Sorting is 2 % of a frame.
    - OpenGL, auto, 50000 drops of 2 mm at 512 x 512 on llvmpipe (tests/bench/gpu_raindrop.c), over round, sharp and
-     still drops without internal reflections: orders 1.0, flattened drops 1.1, a lens 1.4, a shutter 2, oscillation 1.8,
-     each lamp 6 more: its four paths' vertices.
+     still drops without internal reflections: orders 1.0, flattened drops 1.1, a lens 1.4, a shutter 2, oscillation
+     1.8, each lamp 6 more: its four paths' vertices.
 */
 
 /* What stands where; each name stands once more, with its arrows, where its section begins.
