@@ -32,9 +32,9 @@
    - An error bound and an expected error for every table, and a plan that picks the cheapest kind for a wanted error.
    - k-ary scans by recursive doubling and by balanced trees, with the work they do counted (Slomp 2012, chapter 4), for
      any type and operation.
-   - OpenGL 3.3 / ES 3.0 passes that build the tiles from textures, 1 to 4 channels at once, integers and quanta bit for
-     bit those of the CPU, without an extension; box filters and variances there, and GLSL functions that look boxes up.
-     The passes of Slomp 2012 (trees and recursive doubling, any k) over flat tables, too.
+   - OpenGL 3.3 / ES 3.0 passes that build the tiles from textures, 1 to 4 channels at once, bit for bit the CPU's table
+     with its spikes, giants, 64-bit tiles and strips, without an extension; box filters and variances there, and GLSL
+     functions that look boxes up. The passes of Slomp 2012 (trees and recursive doubling, any k) over flat tables, too.
 
    WHAT IT DOES NOT
 
@@ -82,8 +82,8 @@
 
    - Input: any float. NaN counts as 0 and infinity as the largest value the kind can sum; both are counted, and in
      TILED and FIXED tables a bad pixel changes no box without it. TILED keeps at most 64 pixels a tile row beyond 1e20;
-     further ones are clamped to the largest other pixel of their tile and counted. FLOAT clamps pixels to
-     1.6e29, so that no sum overflows. SAT_NON_FINITE_REFUSE returns an error instead.
+     further ones are clamped to the largest other pixel of their tile (65504 where there is none) and counted. FLOAT
+     clamps pixels to 1.6e29, so that no sum overflows. SAT_NON_FINITE_REFUSE returns an error instead.
    - The same bits for any number of workers, for SSE2, AVX2, NEON and plain C, with and without contraction into fused
      multiply-adds, also under -ffast-math and -Ofast, which the
      implementation switches off for itself (gcc, clang, MSVC); only subnormals may then count as 0, as the program
@@ -135,7 +135,8 @@
    >> summing moments         about the mean of each tile
    >> streams                 images a row at a time
    >> shaders                 flat tables in GLSL
-   >> shaders of tiles        the same for tiles
+   >> shaders of tiles        lookups in tiles
+   >> shaders that build tiles  gauges, quanta, giants, integers, 64-bit cells, strips
    >> passes                  the object, programs, builds on the GPU
    >> passes of flat tables   the published algorithms, means, creation
 */
@@ -518,7 +519,7 @@ typedef enum sat_gl_format {
     SAT_GL_TWO_FLOAT, /* RG32F: the sum of two floats, about 48 bits */
     SAT_GL_FLOAT,     /* R32F: as SAT_KIND_FLOAT, only for large boxes or small images */
     SAT_GL_FIXED32,   /* R32UI: the same integers as SAT_KIND_FIXED32, for any algorithm and k */
-    SAT_GL_TILED      /* as SAT_KIND_TILED with its default tile, cells and quanta bit for bit; for HDR */
+    SAT_GL_TILED      /* as SAT_KIND_TILED with its default tile, bit for bit; for HDR */
 } sat_gl_format;
 
 typedef struct sat_gl_options {
@@ -583,9 +584,9 @@ SAT_DEF sat_result sat_gl_mean(sat_gl *gl, float *mean, unsigned texture, int wi
 SAT_DEF unsigned sat_gl_mean_texture(const sat_gl *gl);
 
 /* SAT_GL_TILED: the textures of the last build. cells: 32-bit integers, a component a channel; tiles: an array of four
-   layers (quanta, spikes), strips: sums of whole tiles. All have the size of the build, so that lookups clip to it. As
-   on the CPU, up to 8 pixels that hold most of a tile are kept apart; there is no list of giants, so that infinity and
-   pixels beyond 1e20 count as the largest other pixel of their tile, and there are no 64-bit tiles. */
+   layers (quanta, spikes); strips: sums of whole tiles, giants and 64-bit tiles, one behind the other. cells has the
+   size of the build, so that lookups clip to it. All of it is what sat_build makes of the same max_value, bit for bit,
+   but for tiles whose sum is below 2^-95. */
 typedef struct sat_gl_tiles {
     unsigned cells, tiles, strips; /* usampler2D, usampler2DArray, usampler2D */
 } sat_gl_tiles;
@@ -601,7 +602,7 @@ SAT_DEF sat_result sat_gl_variance(sat_gl *gl, unsigned texture, int radius);
 
        float sat_sum(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high)
        float sat_mean(...)                                                  the same arguments */
-SAT_DEF const char *sat_gl_glsl_tiles(void);
+SAT_DEF const char *sat_gl_glsl_tiles(int part); /* 0 and 1, one behind the other; NULL for others */
 
 /* GLSL (3.30 or ES 3.00) to put behind the #version line of a shader, once or more. Boxes are half-open and clipped:
 
@@ -2990,7 +2991,7 @@ SAT_DEF const char *sat_explain_image(char *text, size_t size, const sat_image *
 
      spikes    up to 8 pixels that hold most of the tile's sum, added to the boxes that contain them
      giants    infinity and pixels beyond 1e20, in a list a tile row; one that finds it full is clamped to the largest
-               of its tile's other pixels, and counted
+               of its tile's other pixels, 65504 where there is none, and counted
      wide      a tile that mixes two ranges for good has 64-bit cells beside it, from a pool of about one a tile column
                for every super tile row
 
@@ -3948,7 +3949,7 @@ static void sat__take_giants(const sat_table *t, float *p, int n, int left, sat_
             if (fabsf(p[i]) > largest) largest = fabsf(p[i]);
         }
     }
-    full = ordinary ? largest : giant;
+    full = ordinary ? largest : 65504; /* the largest half float: strips keep the ground's digits beside a sky */
     for (i = 0; i < n; i++) {
         if (!(fabsf(p[i]) > giant)) continue;
         if (tally->giants < t->giant_room) {
@@ -4050,7 +4051,7 @@ static float sat__giant_limit(const sat_table *t) { return t->limit < 1e20 ? (fl
 /* Quantum and wishes, once spikes and giants are out. */
 static void sat__settle_tile(const sat_table *t, sat__tile *tile, const sat__source *from, int rows, sat__extent e)
 {
-    float threshold = e.sum / ((float)(rows << t->shift) * 1024);
+    float threshold = e.sum / ((float)(1 << 2 * t->shift) * 1024); /* 2^-12 of such a pixel is lost */
     int y, count = 0;
     tile->slot = 0;
     tile->quantum = sat__tile_quantum((double)e.sum, 31);
@@ -6218,7 +6219,100 @@ static const char sat__glsl_mean[] =
    moments x - m or its square.
 
    Lookups: the sum of the parts in at most 3 x 3 tiles, or four corners in each super tile of 32 x 32 tiles. `strips`
-   is a row-major array in a texture: left, above and whole of the CPU table, one after the other. */
+   is a row-major array in a texture, whose parts sat_at finds: left, above and whole of the CPU table, as the bits
+   of doubles; the slot of each tile in the pool; the giants of each tile row, behind their number; their number in a
+   super tile row; the pool of 64-bit tiles. */
+
+static const char sat__glsl_tile_numbers[] =
+    "#ifndef SAT_GLSL_NUMBERS\n"
+    "#define SAT_GLSL_NUMBERS\n"
+    SAT__GLSL(
+        uvec2 sat_left64(uvec2 v, int n) {
+            return n == 0 ? v : n > 31 ? uvec2(0u, v.x << (n - 32)) : uvec2(v.x << n, v.y << n | v.x >> (32 - n));
+        }
+        uvec2 sat_right64(uvec2 v, int n) {
+            uvec2 r = n == 0 ? v : n > 63 ? uvec2(0u) : n > 31 ? uvec2(v.y >> (n - 32), 0u)
+                      : uvec2(v.x >> n | v.y << (32 - n), v.y >> n);
+            if (n > 63 ? v != uvec2(0u) : sat_left64(r, n) != v) r.x |= 1u;
+            return r;
+        }
+        uvec2 sat_add64(uvec2 a, uvec2 b) {
+            uint low = a.x + b.x;
+            return uvec2(low, a.y + b.y + (low < a.x ? 1u : 0u));
+        }
+        uvec2 sat_negate64(uvec2 v) { return sat_add64(~v, uvec2(1u, 0u)); })
+    SAT__GLSL(
+        uvec2 sat_to_double(uint negative, int exponent, uvec2 m) {
+            if (m == uvec2(0u)) return m;
+            int top = m.y > 0u ? 63 : 31;
+            uint word = m.y > 0u ? m.y : m.x;
+            if (word < 65536u) word <<= 16, top -= 16;
+            if (word < 16777216u) word <<= 8, top -= 8;
+            while (word < 2147483648u) word <<= 1, top--;
+            m = top > 55 ? sat_right64(m, top - 55) : sat_left64(m, 55 - top);
+            exponent += top - 52;
+            uint rest = m.x & 7u;
+            m = uvec2(m.x >> 3 | m.y << 29, m.y >> 3);
+            if (rest > 4u || (rest == 4u && (m.x & 1u) > 0u)) m = sat_add64(m, uvec2(1u, 0u));
+            return uvec2(m.x, (m.y + (uint(exponent + 1074) << 20)) | negative << 31);
+        })
+    SAT__GLSL(
+        float sat_power(int k) { return k < -126 ? 0.0 : uintBitsToFloat(uint(min(k, 127) + 127) << 23); }
+        vec2 sat_floats(uvec2 d) {
+            int k = int(d.y >> 20 & 2047u) - 1046;
+            uint high = ((d.y & 1048575u) | 1048576u) << 3 | d.x >> 29;
+            vec2 v = vec2(float(high) * sat_power(k), float(d.x & 536870911u) * sat_power(k - 29));
+            return k == -1046 ? vec2(0.0) : d.y > 2147483647u ? -v : v;
+        })
+    SAT__GLSL(
+        int sat_at(int which, ivec2 size, int planes) {
+            ivec2 n = (size + 31) / 32;
+            int supers = (n.y + 31) / 32 * planes, bands = n.y * planes, at = 0;
+            if (which > 0) at += n.x * planes * size.y;
+            if (which > 1) at += size.x * bands;
+            if (which > 2) at += n.x * bands;
+            if (which > 3) at += n.x * bands;
+            if (which > 4) at += (1 + clamp(size.x, 8, 64)) * bands;
+            if (which > 5) at += supers;
+            if (which > 6) at += (n.x + 2) * supers * min(size.x, 32) * 32;
+            return at;
+        }
+        uvec2 sat_cell(usampler2D strips, ivec2 size, int index) {
+            return texelFetch(strips, ivec2(index % size.x, index / size.x), 0).xy;
+        }
+        int sat_wide_exponent(uint quantum) { return max(int(quantum >> 23) - 158, -149); })
+    SAT__GLSL(
+        vec2 sat_wide_part(usampler2D strips, ivec2 size, int base, uint quantum, ivec2 a, ivec2 b) {
+            int stride = min(size.x, 32), low = base + (b.y - 1) * stride - 1, top = low - (b.y - a.y) * stride;
+            uvec2 d = sat_cell(strips, size, low + b.x), less = uvec2(0u);
+            if (a.x > 0) less = sat_cell(strips, size, low + a.x);
+            if (a.y > 0) less = sat_add64(less, sat_cell(strips, size, top + b.x));
+            if (a.x > 0 && a.y > 0) d = sat_add64(d, sat_cell(strips, size, top + a.x));
+            d = sat_add64(d, sat_negate64(less));
+            uint negative = d.y >> 31;
+            if (negative > 0u) d = sat_negate64(d);
+            return sat_floats(sat_to_double(negative, sat_wide_exponent(quantum), d));
+        })
+    SAT__GLSL(
+        vec2 sat_giants(usampler2D strips, ivec2 size, int planes, int plane, ivec2 a, ivec2 b, float one) {
+            int room = clamp(size.x, 8, 64), supers = sat_at(5, size, planes), list = sat_at(4, size, planes);
+            vec2 sum = vec2(0.0);
+            for (int band = a.y >> 5; band <= (b.y - 1) >> 5; band++) {
+                if (sat_cell(strips, size, supers + (band >> 5) * planes + plane).x == 0u) {
+                    band |= 31;
+                    continue;
+                }
+                int at = list + (band * planes + plane) * (1 + room), count = int(sat_cell(strips, size, at).x);
+                for (int i = 1; i <= count; i++) {
+                    uvec2 g = sat_cell(strips, size, at + i);
+                    ivec2 p = ivec2(int(g.x & 67108863u), band * 32 + int(g.x >> 26));
+                    if (all(greaterThanEqual(p, a)) && all(lessThan(p, b)))
+                        sum = sat_add(sum, vec2(uintBitsToFloat(g.y), 0.0), one);
+                }
+            }
+            return sum;
+        })
+    "#endif\n";
 
 static const char sat__glsl_tile_lookups[] =
     "#ifndef SAT_GLSL_TILES\n"
@@ -6227,84 +6321,96 @@ static const char sat__glsl_tile_lookups[] =
     SAT__GLSL(precision highp usampler2DArray;)
     "#endif\n"
     SAT__GLSL(
-        vec2 sat_tile_part(usampler2D cells, usampler2DArray tiles, int plane, ivec2 tile, ivec2 a,
-          ivec2 b, float one) {
-         ivec2 first = tile * 32;
-         uint d = texelFetch(cells, b - 1, 0)[plane];
-         if (a.x > first.x) d -= texelFetch(cells, ivec2(a.x, b.y) - 1, 0)[plane];
-         if (a.y > first.y) d -= texelFetch(cells, ivec2(b.x, a.y) - 1, 0)[plane];
-         if (a.x > first.x && a.y > first.y) d += texelFetch(cells, a - 1, 0)[plane];
-         ivec2 at = ivec2(tile.x + plane * ((textureSize(cells, 0).x + 31) / 32), tile.y);
-         uvec4 record = texelFetch(tiles, ivec3(at, 0), 0);
-         float quantum = uintBitsToFloat(record.x);
-         int n = int(d), low = n & 4095;
-         vec2 sum = sat_add(vec2(float(n - low) * quantum, 0.0), vec2(float(low) * quantum, 0.0), one);
-         int count = int(record.z & 15u);
-         for (int i = 0; i < count; i++) {
-          uint word = texelFetch(tiles, ivec3(at, 1), 0)[i / 2] >> (14 * (i & 1));
-          ivec2 p = first + ivec2(int(word & 127u), int(word >> 7 & 127u));
-          if (all(greaterThanEqual(p, a)) && all(lessThan(p, b)))
-           sum = sat_add(sum, vec2(uintBitsToFloat(texelFetch(tiles, ivec3(at, 2 + i / 4), 0)[i & 3]), 0.0), one);
-         }
-         return sum;
+        vec2 sat_tile_part(usampler2D cells, usampler2DArray tiles, usampler2D strips, int plane, ivec2 tile, ivec2 a,
+                           ivec2 b, float one) {
+            ivec2 first = tile * 32, size = textureSize(cells, 0);
+            int across = (size.x + 31) / 32, planes = textureSize(tiles, 0).x / across;
+            ivec2 at = ivec2(tile.x + plane * across, tile.y);
+            uvec4 record = texelFetch(tiles, ivec3(at, 0), 0);
+            float quantum = uintBitsToFloat(record.x);
+            int count = int(record.z & 15u), slot = 0;
+            vec2 sum;
+            if (record.z >> 30 > 0u)
+                slot = int(sat_cell(strips, size, sat_at(3, size, planes) + (tile.y * planes + plane) * across
+                                                  + tile.x).x);
+            if (slot > 0)
+                sum = sat_wide_part(strips, size, sat_at(6, size, planes) + (slot - 1) * min(size.x, 32) * 32,
+                                    record.x, a - first, b - first);
+            else {
+                uint d = texelFetch(cells, b - 1, 0)[plane];
+                if (a.x > first.x) d -= texelFetch(cells, ivec2(a.x, b.y) - 1, 0)[plane];
+                if (a.y > first.y) d -= texelFetch(cells, ivec2(b.x, a.y) - 1, 0)[plane];
+                if (a.x > first.x && a.y > first.y) d += texelFetch(cells, a - 1, 0)[plane];
+                int n = int(d), low = n & 4095;
+                sum = sat_add(vec2(float(n - low) * quantum, 0.0), vec2(float(low) * quantum, 0.0), one);
+            }
+            for (int i = 0; i < count; i++) {
+                uint word = texelFetch(tiles, ivec3(at, 1), 0)[i / 2] >> (14 * (i & 1));
+                ivec2 p = first + ivec2(int(word & 127u), int(word >> 7 & 127u));
+                if (all(greaterThanEqual(p, a)) && all(lessThan(p, b)))
+                    sum = sat_add(sum, vec2(uintBitsToFloat(texelFetch(tiles, ivec3(at, 2 + i / 4), 0)[i & 3]), 0.0),
+                                  one);
+            }
+            return sum;
         })
     SAT__GLSL(
-        vec2 sat_strip(usampler2D strips, int width, int index) {
-         uvec2 v = texelFetch(strips, ivec2(index % width, index / width), 0).xy;
-         return vec2(uintBitsToFloat(v.x), uintBitsToFloat(v.y));
-        })
-    SAT__GLSL(
-        vec2 sat_super_corner(usampler2D cells, usampler2DArray tiles, usampler2D strips, int plane, ivec2 first,
-          ivec2 p,
-             float one) {
-         ivec2 size = textureSize(cells, 0), t = p >> 5, inside = p & 31;
-         int across = (size.x + 31) / 32, planes = textureSize(tiles, 0).x / across;
-         int above = across * planes * size.y, whole = above + size.x * planes * textureSize(tiles, 0).y;
-         bool x = t.x > first.x, y = t.y > first.y;
-         vec2 sum = vec2(0.0);
-         if (x && y) sum = sat_strip(strips, size.x, whole + ((t.y - 1) * planes + plane) * across + t.x - 1);
-         if (y && inside.x > 0)
-          sum = sat_add(sum, sat_strip(strips, size.x, above + ((t.y - 1) * planes + plane) * size.x + p.x - 1), one);
-         if (x && inside.y > 0)
-          sum = sat_add(sum, sat_strip(strips, size.x, ((p.y - 1) * planes + plane) * across + t.x - 1), one);
-         if (inside.x > 0 && inside.y > 0)
-          sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 32, p, one), one);
-         return sum;
+        vec2 sat_corner(usampler2D cells, usampler2DArray tiles, usampler2D strips, int plane, ivec2 first,
+                              ivec2 p, float one) {
+            ivec2 size = textureSize(cells, 0), t = p >> 5, inside = p & 31;
+            int across = (size.x + 31) / 32, planes = textureSize(tiles, 0).x / across;
+            int row = (t.y - 1) * planes + plane;
+            int above = sat_at(1, size, planes), whole = sat_at(2, size, planes);
+            bool x = t.x > first.x, y = t.y > first.y;
+            vec2 sum = vec2(0.0);
+            if (x && y) sum = sat_floats(sat_cell(strips, size, whole + row * across + t.x - 1));
+            if (y && inside.x > 0)
+                sum = sat_add(sum, sat_floats(sat_cell(strips, size, above + row * size.x + p.x - 1)), one);
+            if (x && inside.y > 0)
+                sum = sat_add(sum, sat_floats(sat_cell(strips, size, ((p.y - 1) * planes + plane) * across
+                                                                         + t.x - 1)), one);
+            if (inside.x > 0 && inside.y > 0)
+                sum = sat_add(sum, sat_tile_part(cells, tiles, strips, plane, t, t * 32, p, one), one);
+            return sum;
         })
     SAT__GLSL(
         float sat_sum(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high) {
-         ivec2 size = textureSize(cells, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size), p, q;
-         float one = size.x > 0 ? 1.0 : 0.0;
-         if (any(lessThanEqual(b, a))) return 0.0;
-         ivec2 s = a >> 5, e = (b - 1) >> 5;
-         vec2 sum = vec2(0.0);
-         if (all(lessThan(e - s, ivec2(3)))) {
-          for (int y = s.y; y <= e.y; y++)
-           for (int x = s.x; x <= e.x; x++)
-            sum = sat_add(sum, sat_tile_part(cells, tiles, channel, ivec2(x, y), max(a, ivec2(x, y) * 32),
-                min(b, ivec2(x + 1, y + 1) * 32), one),
-            one);
-          return sum.x + sum.y;
-         }
-         for (p.y = a.y; p.y < b.y; p.y = q.y) {
-          q.y = min(b.y, (p.y | 1023) + 1);
-          for (p.x = a.x; p.x < b.x; p.x = q.x) {
-           q.x = min(b.x, (p.x | 1023) + 1);
-           ivec2 f = (p >> 10) << 5;
-           vec2 v = sat_super_corner(cells, tiles, strips, channel, f, q, one);
-           v = sat_add(v, -sat_super_corner(cells, tiles, strips, channel, f, ivec2(p.x, q.y), one), one);
-           vec2 u = sat_super_corner(cells, tiles, strips, channel, f, ivec2(q.x, p.y), one);
-           u = sat_add(u, -sat_super_corner(cells, tiles, strips, channel, f, p, one), one);
-           sum = sat_add(sum, sat_add(v, -u, one), one);
-          }
-         }
-         return sum.x + sum.y;
+            ivec2 size = textureSize(cells, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size), p, q;
+            float one = size.x > 0 ? 1.0 : 0.0;
+            if (any(lessThanEqual(b, a))) return 0.0;
+            ivec2 s = a >> 5, e = (b - 1) >> 5;
+            vec2 sum = vec2(0.0);
+            vec2 giants = sat_giants(strips, size, textureSize(tiles, 0).x / ((size.x + 31) / 32), channel, a, b, one);
+            if (all(lessThan(e - s, ivec2(3)))) {
+                for (int y = s.y; y <= e.y; y++)
+                    for (int x = s.x; x <= e.x; x++)
+                        sum = sat_add(sum, sat_tile_part(cells, tiles, strips, channel, ivec2(x, y),
+                                                         max(a, ivec2(x, y) * 32), min(b, ivec2(x + 1, y + 1) * 32),
+                                                         one), one);
+                sum = sat_add(sum, giants, one);
+                return sum.x + sum.y;
+            }
+            for (p.y = a.y; p.y < b.y; p.y = q.y) {
+                q.y = min(b.y, (p.y | 1023) + 1);
+                for (p.x = a.x; p.x < b.x; p.x = q.x) {
+                    q.x = min(b.x, (p.x | 1023) + 1);
+                    ivec2 f = (p >> 10) << 5;
+                    vec2 v = sat_corner(cells, tiles, strips, channel, f, q, one);
+                    v = sat_add(v, -sat_corner(cells, tiles, strips, channel, f, ivec2(p.x, q.y), one), one);
+                    vec2 u = sat_corner(cells, tiles, strips, channel, f, ivec2(q.x, p.y), one);
+                    u = sat_add(u, -sat_corner(cells, tiles, strips, channel, f, p, one), one);
+                    sum = sat_add(sum, sat_add(v, -u, one), one);
+                }
+            }
+            sum = sat_add(sum, giants, one);
+            return sum.x + sum.y;
         })
     SAT__GLSL(
         float sat_mean(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high) {
          return sat_sum(cells, tiles, strips, channel, low, high) / sat_area(textureSize(cells, 0), low, high);
         })
     "#endif\n";
+
+/* ---- >> shaders that build tiles */
 
 static const char sat__glsl_tile_values[] =
     SAT__GLSL(
@@ -6313,7 +6419,8 @@ static const char sat__glsl_tile_values[] =
         uniform usampler2DArray tiles;
         uniform ivec2 size;
         uniform float limit;
-        int across() { return (size.x + 31) / 32; })
+        int across() { return (size.x + 31) / 32; }
+        int room() { return MOMENTS > 0 ? 0 : clamp(size.x, 8, 64); })
     SAT__GLSL(
         float pixel(ivec2 p, int plane, out int kind) {
             float v = texelFetch(source, p, 0)[CHANNEL + plane % CHANNELS];
@@ -6354,7 +6461,8 @@ static const char sat__glsl_tile_means[] =
             result = uvec4(floatBitsToUint(count > 0.0 ? sum / count : 0.0), 0u, 0u, 0u);
         });
 
-/* A row of a tile: sums and the largest of |value|, pixels beyond 1e20, and how many were replaced. */
+/* A row of a tile: sums of |value|, the largest and the smallest that is not 0, pixels beyond 1e20, and how many were
+   replaced. */
 static const char sat__glsl_gauge[] =
     SAT__GLSL(
         layout(location = 0) out uvec4 sums;
@@ -6363,7 +6471,7 @@ static const char sat__glsl_gauge[] =
             ivec2 at = ivec2(gl_FragCoord.xy);
             int plane = at.x / across(), first = at.x % across() * 32, kind, giants = 0;
             ivec3 counts = ivec3(0);
-            float largest = 0.0;
+            float largest = 0.0, smallest = 3e38;
             vec4 lanes = vec4(0.0);
             for (int i = 0; i < 32; i += 4)
                 for (int j = 0; j < 4; j++) {
@@ -6372,28 +6480,32 @@ static const char sat__glsl_gauge[] =
                     if (kind > 0) counts[kind - 1]++;
                     if (v > 1e20) {
                         giants++;
-                        if (kind == 0) counts[2]++;
                         continue;
                     }
                     lanes[j] += v;
                     largest = max(largest, v);
+                    if (v > 0.0) smallest = min(smallest, v);
                 }
             sums = floatBitsToUint(lanes);
-            fact = uvec4(floatBitsToUint(largest), uint(giants), uint(counts.x | counts.y << 8 | counts.z << 16), 0u);
+            fact = uvec4(floatBitsToUint(largest), uint(giants), uint(counts.x | counts.y << 8 | counts.z << 16),
+                         floatBitsToUint(smallest));
         });
 
-/* sat__take_spikes and sat__tile_quantum of the CPU; 8386931 is where sum * 1.0001 reaches the next power of two. */
+/* sat__take_giants, sat__take_spikes and sat__tile_quantum of the CPU; 8386931 is where sum * 1.0001 reaches the next
+   power of two. A record: the quantum; what giants beyond the list become; spikes, NaN, infinities and whether 64-bit
+   cells would help; clamped pixels, giants in the list, and the pixel from which on they are clamped. */
 static const char sat__glsl_settle[] =
     SAT__GLSL(
         layout(location = 0) out uvec4 record;
         layout(location = 1) out uvec4 places;
         layout(location = 2) out uvec4 low_values;
         layout(location = 3) out uvec4 high_values;
-        int count, rows, plane;
+        int count, rows, plane, cut;
         ivec2 at, first;
         float full;
         ivec2 place[8];
         float held[8];
+        uvec4 fact(int y) { return texelFetch(facts, ivec2(at.x, first.y + y), 0); }
         bool is_spike(ivec2 p) {
             for (int i = 0; i < count; i++)
                 if (place[i] == p) return true;
@@ -6404,18 +6516,20 @@ static const char sat__glsl_settle[] =
             int kind;
             if (p.x >= size.x || is_spike(p)) return 0.0;
             float v = value(p, plane, kind);
-            return abs(v) > 1e20 ? sign(v) * full : v;
-        })
+            if (abs(v) > 1e20) return (p.y - first.y) * 32 + p.x - first.x < cut ? 0.0 : v > 0.0 ? full : -full;
+            return v;
+        }
+        bool clamps(int y) { return (y + 1) * 32 > cut && fact(y).y > 0u; })
     SAT__GLSL(
-        vec2 extent(float giants) {
+        vec2 extent() {
             vec4 lanes = vec4(0.0);
-            float largest = giants > 0.0 ? full : 0.0;
+            float largest = 0.0;
             for (int y = 0; y < rows; y++) {
-                bool fresh = false;
+                bool fresh = clamps(y);
                 for (int i = 0; i < count; i++) fresh = fresh || place[i].y == first.y + y;
                 if (!fresh) {
                     lanes += uintBitsToFloat(texelFetch(gauges, ivec2(at.x, first.y + y), 0));
-                    largest = max(largest, uintBitsToFloat(texelFetch(facts, ivec2(at.x, first.y + y), 0).x));
+                    largest = max(largest, uintBitsToFloat(fact(y).x));
                     continue;
                 }
                 vec4 row = vec4(0.0);
@@ -6427,7 +6541,72 @@ static const char sat__glsl_settle[] =
                     }
                 lanes += row;
             }
-            return vec2(((lanes.x + lanes.y) + lanes.z) + lanes.w + giants * full, largest);
+            return vec2(((lanes.x + lanes.y) + lanes.z) + lanes.w, largest);
+        })
+    SAT__GLSL(
+        int list_giants(int giants) {
+            int before = 0, listed, y, x, kind;
+            for (x = plane * across(); x < at.x && before < room(); x++)
+                for (y = 0; y < rows; y++) before += int(texelFetch(facts, ivec2(x, first.y + y), 0).y);
+            listed = clamp(room() - before, 0, giants);
+            if (listed == giants) return listed;
+            cut = 0;
+            before = listed;
+            for (y = 0; y < rows; y++) {
+                int n = int(fact(y).y);
+                if (n <= before) {
+                    before -= n;
+                    cut = 32 * y + 32;
+                    continue;
+                }
+                for (x = 0; before > 0; x++)
+                    if (abs(value(first + ivec2(x, y), plane, kind)) > 1e20) {
+                        before--;
+                        cut = 32 * y + x + 1;
+                    }
+                break;
+            }
+            return listed;
+        })
+    SAT__GLSL(
+        void take_spikes(inout vec2 e) {
+            while (e.y > e.x * 0.0625 && count < 8) {
+                int found = 0, left = 8 - count;
+                ivec2 p;
+                for (p.y = first.y; p.y < first.y + rows && found <= left; p.y++) {
+                    int y = p.y - first.y;
+                    if (!(max(uintBitsToFloat(fact(y).x), clamps(y) ? full : 0.0) > e.x * 0.0625)) continue;
+                    for (p.x = first.x; p.x < min(first.x + 32, size.x) && found <= left; p.x++) {
+                        float v = rest(p);
+                        if (!(abs(v) > e.x * 0.0625)) continue;
+                        if (found < left) {
+                            place[count + found] = p;
+                            held[count + found] = v;
+                        }
+                        found++;
+                    }
+                }
+                if (found > left) break;
+                count += found;
+                vec2 less = extent();
+                if (less.x > e.x * 0.25) {
+                    count -= found;
+                    break;
+                }
+                e = less;
+            }
+        })
+    SAT__GLSL(
+        uint wants_wide(float threshold) {
+            int found = 0;
+            for (int y = 0; y < rows && found < 8; y++) {
+                if (!(uintBitsToFloat(fact(y).w) < threshold)) continue;
+                for (int x = 0; x < 32; x++) {
+                    float v = abs(rest(first + ivec2(x, y)));
+                    if (v > 0.0 && v < threshold) found++;
+                }
+            }
+            return found < 8 ? 0u : 1u;
         })
     SAT__GLSL(
         void main() {
@@ -6436,44 +6615,24 @@ static const char sat__glsl_settle[] =
             first = ivec2(at.x % across(), at.y) * 32;
             rows = min(32, size.y - first.y);
             count = 0;
+            cut = 1024;
             full = 0.0;
-            int giants = 0;
+            int giants = 0, listed = 0;
             ivec3 counts = ivec3(0);
             for (int y = 0; y < rows; y++) {
-                uvec4 f = texelFetch(facts, ivec2(at.x, first.y + y), 0);
+                uvec4 f = fact(y);
                 full = max(full, uintBitsToFloat(f.x));
                 giants += int(f.y);
                 counts += ivec3(int(f.z & 255u), int(f.z >> 8 & 255u), int(f.z >> 16));
             }
-            if (!(full > 0.0)) full = 1e20;
-            vec2 e = extent(float(giants));
-            while (giants == 0 && e.y > e.x * 0.0625 && count < 8) {
-                int found = 0, room = 8 - count;
-                ivec2 p;
-                for (p.y = first.y; p.y < first.y + rows && found <= room; p.y++) {
-                    if (!(uintBitsToFloat(texelFetch(facts, ivec2(at.x, p.y), 0).x) > e.x * 0.0625)) continue;
-                    for (p.x = first.x; p.x < min(first.x + 32, size.x) && found <= room; p.x++) {
-                        float v = rest(p);
-                        if (!(abs(v) > e.x * 0.0625)) continue;
-                        if (found < room) {
-                            place[count + found] = p;
-                            held[count + found] = v;
-                        }
-                        found++;
-                    }
-                }
-                if (found > room) break;
-                count += found;
-                vec2 less = extent(0.0);
-                if (less.x > e.x * 0.25) {
-                    count -= found;
-                    break;
-                }
-                e = less;
-            }
+            if (!(full > 0.0)) full = 65504.0;
+            if (giants > 0) listed = list_giants(giants);
+            vec2 e = extent();
+            take_spikes(e);
             uint bits = floatBitsToUint(e.x), exponent = (bits >> 23) + ((bits & 0x7fffffu) >= 8386931u ? 1u : 0u);
             record = uvec4(e.x > 0.0 ? max(exponent, 31u) - 30u << 23 : 0u, floatBitsToUint(full),
-                           uint(count | counts.x << 4 | counts.y << 17), uint(counts.z));
+                           uint(count | counts.x << 4 | counts.y << 17) | wants_wide(e.x / 1048576.0) << 30,
+                           uint(counts.z + giants - listed | listed << 12) | uint(cut) << 20);
             uvec4 words = uvec4(0u), low = uvec4(0u), high = uvec4(0u);
             for (int i = 0; i < count; i++) {
                 ivec2 p = place[i] - first;
@@ -6486,29 +6645,36 @@ static const char sat__glsl_settle[] =
             high_values = high;
         });
 
-static const char sat__glsl_tile_scan[] =
+/* What the cells of a tile sum: no spikes, no giants. */
+static const char sat__glsl_tile_kept[] =
     SAT__GLSL(
         layout(location = 0) out uvec4 result;
-        uniform ivec2 axis;)
-    "#if INPUT\n"
-    SAT__GLSL(
-        uint integer(ivec2 p, int plane) {
+        float kept(ivec2 p, int plane, out uint quantum) {
             ivec3 at = ivec3(p.x / 32 + plane * across(), p.y / 32, 0);
             uvec4 record = texelFetch(tiles, at, 0);
             int kind, count = int(record.z & 15u);
             float v = value(p, plane, kind), full = uintBitsToFloat(record.y);
-            if (record.x == 0u) return 0u;
-            if (abs(v) > 1e20) v = sign(v) * full;
+            quantum = record.x;
+            if (quantum == 0u) return 0.0;
+            if (abs(v) > 1e20) v = p.y % 32 * 32 + p.x % 32 < int(record.w >> 20) ? 0.0 : v > 0.0 ? full : -full;
             for (int i = 0; i < count; i++) {
                 uint word = texelFetch(tiles, at + ivec3(0, 0, 1), 0)[i / 2] >> (14 * (i & 1));
-                if (ivec2(int(word & 127u), int(word >> 7 & 127u)) == p % 32) return 0u;
+                if (ivec2(int(word & 127u), int(word >> 7 & 127u)) == p % 32) return 0.0;
             }
-            return uint(int(roundEven(v * uintBitsToFloat((254u << 23) - record.x))));
-        })
+            return v;
+        });
+
+static const char sat__glsl_tile_scan[] =
+    SAT__GLSL(uniform ivec2 axis;)
+    "#if INPUT\n"
     SAT__GLSL(
         uvec4 load(ivec2 p) {
             uvec4 v = uvec4(0u);
-            for (int plane = 0; plane < PLANES; plane++) v[plane] = integer(p, plane);
+            for (int plane = 0; plane < PLANES; plane++) {
+                uint quantum;
+                float k = kept(p, plane, quantum);
+                if (quantum > 0u) v[plane] = uint(int(roundEven(k * uintBitsToFloat((254u << 23) - quantum))));
+            }
             return v;
         })
     "#else\n"
@@ -6524,37 +6690,188 @@ static const char sat__glsl_tile_scan[] =
             result = sum;
         });
 
+/* Slots go to the tiles that want one, in the order of the tile rows of a super tile row. */
+static const char sat__glsl_slots[] =
+    SAT__GLSL(
+        bool wants(int x, int y) { return texelFetch(tiles, ivec3(x, y, 0), 0).z >> 30 > 0u; }
+        void main() {
+            ivec2 at = ivec2(gl_FragCoord.xy);
+            int n = across(), plane = at.x / n, before = 0, supers = ((size.y + 31) / 32 + 31) / 32;
+            result = uvec4(0u);
+            if (!wants(at.x, at.y)) return;
+            for (int y = at.y & ~31; y <= at.y && before < n + 2; y++)
+                for (int x = plane * n; x < (y < at.y ? plane * n + n : at.x); x++) before += wants(x, y) ? 1 : 0;
+            if (before < n + 2) result.x = uint((plane * supers + at.y / 32) * (n + 2) + before + 1);
+        });
+
+/* The tile of each slot, from 1: its place in a row of tiles, and the row. */
+static const char sat__glsl_owners[] =
+    SAT__GLSL(
+        void main() {
+            ivec2 at = ivec2(gl_FragCoord.xy);
+            int n = across(), down = (size.y + 31) / 32, supers = (down + 31) / 32, plane = at.y / supers;
+            uint slot = uint(at.y * (n + 2) + at.x + 1);
+            result = uvec4(0u);
+            for (int y = at.y % supers * 32; y < min(down, at.y % supers * 32 + 32); y++)
+                for (int x = plane * n; x < plane * n + n; x++)
+                    if (texelFetch(cells, ivec2(x, y), 0).x == slot) result = uvec4(x + 1, y, 0, 0);
+        });
+
+/* A 64-bit cell: the sum of its tile up to it. */
+static const char sat__glsl_wide[] =
+    SAT__GLSL(
+        uvec2 integer(float v, int exponent) {
+            uint bits = floatBitsToUint(v), m = bits & 0x7fffffu, e = bits >> 23 & 255u;
+            if (e > 0u) m |= 0x800000u;
+            int shift = int(max(e, 1u)) - 150 - exponent;
+            uvec2 n = uvec2(m, 0u);
+            if (shift < -24) n.x = 0u;
+            else if (shift < 0) {
+                uint half_of = 1u << (-shift - 1), rest = m & (2u * half_of - 1u);
+                n.x = m >> -shift;
+                if (rest > half_of || (rest == half_of && (n.x & 1u) > 0u)) n.x++;
+            } else n = sat_left64(n, shift);
+            return bits > 0x7fffffffu ? sat_negate64(n) : n;
+        })
+    SAT__GLSL(
+        void main() {
+            int stride = min(size.x, 32), i = int(gl_FragCoord.y) * size.x + int(gl_FragCoord.x);
+            int slot = i / (stride * 32), n = across() + 2;
+            uvec2 sum = uvec2(0u), owner = texelFetch(cells, ivec2(slot % n, slot / n), 0).xy;
+            result = uvec4(0u);
+            if (slot / n >= textureSize(cells, 0).y || owner.x == 0u) return;
+            int plane = (int(owner.x) - 1) / across(), x, y;
+            ivec2 first = ivec2((int(owner.x) - 1) % across(), owner.y) * 32;
+            ivec2 last = ivec2(i % stride, i / stride % 32);
+            for (y = 0; y <= last.y; y++)
+                for (x = 0; x <= last.x; x++) {
+                    uint quantum;
+                    ivec2 p = first + ivec2(x, y);
+                    if (any(greaterThanEqual(p, size))) continue;
+                    float v = kept(p, plane, quantum);
+                    if (quantum > 0u) sum = sat_add64(sum, integer(v, sat_wide_exponent(quantum)));
+                }
+            result = uvec4(sum, 0u, 0u);
+        });
+
+/* The sums of doubles are those of the CPU, in its order: `gauges` are the slots, `facts` the 64-bit cells. */
+static const char sat__glsl_strip_sums[] =
+    SAT__GLSL(
+        uvec2 add(uvec2 a, uvec2 b) {
+            if ((a.y << 1 | a.x) == 0u) return b;
+            if ((b.y << 1 | b.x) == 0u) return a;
+            uint high = a.y & 0x7fffffffu, other = b.y & 0x7fffffffu;
+            if (high < other || (high == other && a.x < b.x)) {
+                uvec2 c = a;
+                a = b;
+                b = c;
+            }
+            int e = int(a.y >> 20 & 2047u), d = e - int(b.y >> 20 & 2047u);
+            uvec2 m = sat_left64(uvec2(a.x, (a.y & 0xfffffu) | 0x100000u), 3);
+            uvec2 n = sat_right64(sat_left64(uvec2(b.x, (b.y & 0xfffffu) | 0x100000u), 3), d);
+            m = sat_add64(m, (a.y ^ b.y) > 0x7fffffffu ? sat_negate64(n) : n);
+            return sat_to_double(a.y >> 31, e - 1078, m);
+        })
+    SAT__GLSL(
+        uvec2 of_float(uint bits) {
+            uint e = bits >> 23 & 255u;
+            return sat_to_double(bits >> 31, int(max(e, 1u)) - 150,
+                                 uvec2((bits & 0x7fffffu) | (e > 0u ? 0x800000u : 0u), 0u));
+        }
+        uvec2 cell(uvec4 record, int plane, ivec2 t, ivec2 p) {
+            int stride = min(size.x, 32), exponent = int(record.x >> 23) - 127;
+            uint slot = texelFetch(gauges, ivec2(t.x + plane * across(), t.y), 0).x, negative;
+            uvec2 d = uvec2(0u);
+            if (slot > 0u) {
+                int i = ((int(slot) - 1) * 32 + p.y % 32) * stride + p.x % 32;
+                d = texelFetch(facts, ivec2(i % size.x, i / size.x), 0).xy;
+                negative = d.y >> 31;
+                if (negative > 0u) d = sat_negate64(d);
+                exponent = sat_wide_exponent(record.x);
+            } else {
+                d.x = texelFetch(cells, p, 0)[plane];
+                negative = d.x >> 31;
+                if (negative > 0u) d.x = 0u - d.x;
+            }
+            return sat_to_double(negative, exponent, d);
+        })
+    SAT__GLSL(
+        uvec2 part(int plane, ivec2 t, ivec2 p, bool one_by_one) {
+            ivec2 at = ivec2(t.x + plane * across(), t.y);
+            uvec4 record = texelFetch(tiles, ivec3(at, 0), 0), words = texelFetch(tiles, ivec3(at, 1), 0);
+            uvec2 sum = cell(record, plane, t, p), spikes = uvec2(0u);
+            one_by_one = one_by_one && texelFetch(gauges, at, 0).x == 0u;
+            for (int i = 0; i < int(record.z & 15u); i++) {
+                uint word = words[i / 2] >> (14 * (i & 1));
+                if (int(word & 127u) > p.x % 32 || int(word >> 7 & 127u) > p.y % 32) continue;
+                uvec2 v = of_float(texelFetch(tiles, ivec3(at, 2 + i / 4), 0)[i & 3]);
+                if (one_by_one) sum = add(sum, v);
+                else spikes = add(spikes, v);
+            }
+            return add(sum, spikes);
+        });
+
 static const char sat__glsl_strips[] =
     SAT__GLSL(
-        layout(location = 0) out uvec4 result;
-        void main() {
-            int i = int(gl_FragCoord.y) * size.x + int(gl_FragCoord.x), n = across(),
-                down = (size.y + 31) / 32, x, y, plane;
-            int left = n * PLANES * size.y, above = size.x * PLANES * down, row, side;
-            float one = size.x > 0 ? 1.0 : 0.0;
-            ivec2 low, high;
-            if (i < left) {
-                side = n, row = i / n;
-                plane = row % PLANES, y = row / PLANES, x = i % n;
-                low = ivec2(x & ~31, y / 32), high = ivec2(min(size.x, (x + 1) * 32), y + 1);
-            } else if (i < left + above) {
-                i -= left;
-                row = i / size.x;
-                plane = row % PLANES, y = row / PLANES, x = i % size.x;
-                low = ivec2(x / 32, y & ~31), high = ivec2(x + 1, min(size.y, (y + 1) * 32));
-            } else {
-                i -= left + above;
-                row = i / n;
-                plane = row % PLANES, y = row / PLANES, x = i % n;
-                low = ivec2(x, y) & ~31, high = min(size, (ivec2(x, y) + 1) * 32);
+        uvec2 left(int plane, int x, int y) {
+            uvec2 run = uvec2(0u);
+            for (int t = x & ~31; t <= x; t++)
+                run = add(run, part(plane, ivec2(t, y / 32), ivec2(min(t * 32 + 31, size.x - 1), y), false));
+            return run;
+        }
+        uvec2 above(int plane, int x, int band) {
+            uvec2 sum = uvec2(0u);
+            for (int b = band & ~31; b <= band; b++)
+                sum = add(part(plane, ivec2(x / 32, b), ivec2(x, min(b * 32 + 31, size.y - 1)), true), sum);
+            return sum;
+        }
+        uvec2 whole(int plane, int x, int band) {
+            uvec2 sum = uvec2(0u);
+            for (int b = band & ~31; b <= band; b++) {
+                uvec2 run = uvec2(0u);
+                for (int t = x & ~31; t <= x; t++)
+                    run = add(run, part(plane, ivec2(t, b), min(ivec2(t, b) * 32 + 31, size - 1), true));
+                sum = add(sum, run);
             }
-            vec2 sum = vec2(0.0);
-            if (y < (size.y + 31) / 32 || i < left)
-                for (ivec2 t = low; t.y * 32 < high.y; t.y++)
-                    for (t.x = low.x; t.x * 32 < high.x; t.x++)
-                        sum = sat_add(sum, sat_tile_part(cells, tiles, plane, t, t * 32,
-                                            min(high, (t + 1) * 32), one), one);
-            result = uvec4(floatBitsToUint(sum), 0u, 0u);
+            return sum;
+        })
+    SAT__GLSL(
+        int listed(int x, int band) { return int(texelFetch(tiles, ivec3(x, band, 0), 0).w >> 12 & 255u); }
+        uvec2 giant(int plane, int band, int which) {
+            int n = across(), t, kind, before = 0;
+            for (t = 0; t < n && (which == 0 || before + listed(plane * n + t, band) < which); t++)
+                before += listed(plane * n + t, band);
+            if (which == 0) return uvec2(before, 0);
+            if (t == n) return uvec2(0u);
+            for (int y = band * 32; y < min(band * 32 + 32, size.y); y++)
+                for (int x = t * 32; x < min(t * 32 + 32, size.x); x++) {
+                    float v = value(ivec2(x, y), plane, kind);
+                    if (abs(v) > 1e20 && ++before == which)
+                        return uvec2(uint(x) | uint(y % 32) << 26, floatBitsToUint(v));
+                }
+            return uvec2(0u);
+        })
+    SAT__GLSL(
+        void main() {
+            int i = int(gl_FragCoord.y) * size.x + int(gl_FragCoord.x), n = across(), section = 0;
+            int counts[7] = int[7](n, size.x, n, n, 1 + clamp(size.x, 8, 64), 1, 1), row, plane, x, y;
+            while (section < 7 && i >= sat_at(section + 1, size, PLANES)) section++;
+            i -= sat_at(section, size, PLANES);
+            result = uvec4(0u);
+            if (section > 6) return;
+            row = i / counts[section];
+            x = i % counts[section];
+            y = row / PLANES;
+            plane = row % PLANES;
+            if (section == 0) result.xy = left(plane, x, y);
+            if (section == 1) result.xy = above(plane, x, y);
+            if (section == 2) result.xy = whole(plane, x, y);
+            if (section == 3) result.x = texelFetch(gauges, ivec2(x + plane * n, y), 0).x;
+            if (section == 4) result.xy = giant(plane, y, x);
+            if (section == 5)
+                for (int b = y * 32; b < min(y * 32 + 32, (size.y + 31) / 32); b++)
+                    result.x += giant(plane, b, 0).x;
+            if (section == 6) result = texelFetch(facts, ivec2(i % size.x, i / size.x), 0);
         });
 
 static const char sat__glsl_tile_filter[] =
@@ -6573,6 +6890,7 @@ static const char sat__glsl_tile_filter[] =
 static const char sat__glsl_tile_variance[] =
     SAT__GLSL(
         layout(location = 0) out vec4 result;
+        uniform usampler2D strips;
         uniform int radius;
         vec2 moments(int c, ivec2 a, ivec2 b, float one) {
             float n = 0.0, mean = 0.0, squares = 0.0;
@@ -6581,8 +6899,8 @@ static const char sat__glsl_tile_variance[] =
                 for (t.x = s.x; t.x <= e.x; t.x++) {
                     ivec2 low = max(a, t * 32), high = min(b, (t + 1) * 32);
                     float m = uintBitsToFloat(texelFetch(means, ivec2(t.x + across() * c, t.y), 0).x);
-                    vec2 d = sat_tile_part(cells, tiles, c, t, low, high, one),
-                         q = sat_tile_part(cells, tiles, CHANNELS + c, t, low, high, one);
+                    vec2 d = sat_tile_part(cells, tiles, strips, c, t, low, high, one),
+                         q = sat_tile_part(cells, tiles, strips, CHANNELS + c, t, low, high, one);
                     float k = float((high.x - low.x) * (high.y - low.y)), both = n + k, sum = d.x + d.y;
                     float here = max(0.0, (q.x + q.y) - sum * sum / k), delta = m + sum / k - mean;
                     squares += here + delta * delta * (n / both * k);
@@ -6599,7 +6917,10 @@ static const char sat__glsl_tile_variance[] =
             if (CHANNELS > 1) result.zw = moments(CHANNELS - 1, a, b, one);
         });
 
-SAT_DEF const char *sat_gl_glsl_tiles(void) { return sat__glsl_tile_lookups; }
+SAT_DEF const char *sat_gl_glsl_tiles(int part)
+{
+    return part == 0 ? sat__glsl_tile_numbers : part == 1 ? sat__glsl_tile_lookups : NULL;
+}
 
 /* ---- >> passes: the object */
 
@@ -6618,12 +6939,12 @@ typedef struct sat__gl_level {
 } sat__gl_level;
 
 /* SAT_GL_TILED: a program for each pass and what they draw into. */
-enum { SAT__GL_MEANS, SAT__GL_GAUGE, SAT__GL_SETTLE, SAT__GL_SCAN, SAT__GL_ADD = SAT__GL_SCAN + 2, SAT__GL_STRIPS,
-       SAT__GL_FILTER, SAT__GL_VARIANCE, SAT__GL_TILE_PASSES };
+enum { SAT__GL_MEANS, SAT__GL_GAUGE, SAT__GL_SETTLE, SAT__GL_SCAN, SAT__GL_ADD, SAT__GL_SLOTS, SAT__GL_OWNERS,
+       SAT__GL_WIDE, SAT__GL_STRIPS, SAT__GL_FILTER, SAT__GL_VARIANCE, SAT__GL_TILE_PASSES };
 
 typedef struct sat__gl_tiled {
     unsigned programs[SAT__GL_TILE_PASSES];
-    sat__gl_target cells, partial, strips, means;
+    sat__gl_target cells, partial, strips, means, pool, owners, wide;
     unsigned gauge[2], gauge_framebuffer, tiles, tiles_framebuffer;
     int width, height, planes; /* of the last build; 0: there was none */
 } sat__gl_tiled;
@@ -6751,63 +7072,44 @@ static sat_result sat__gl_make_kernel(sat_gl *g, sat__gl_kernel *kernel, const c
 
 /* ---- tiles: programs and passes */
 
-static sat_result sat__gl_make_tile_program(sat_gl *g, int pass, const char *name, const char *body, int input)
-{
-    sat__gl *gl = &g->gl;
-    const char *library[5], *text[2];
-    sat__gl_shaders shaders;
-    sat_result result;
-    unsigned program;
-    int channels = g->options.channels;
-    memset(&shaders, 0, sizeof shaders);
-    library[0] = sat_gl_glsl();
-    library[1] = sat_gl_glsl_tiles();
-    library[2] = sat__glsl_tile_values;
-    library[3] = NULL;
-    text[0] = body;
-    text[1] = NULL;
-    shaders.name = name;
-    shaders.library = library;
-    shaders.fragment = text;
-    sat__gl_define(gl, "CHANNEL", g->options.channel);
-    sat__gl_define(gl, "CHANNELS", channels);
-    sat__gl_define(gl, "PLANES", g->options.moments ? 2 * channels : channels);
-    sat__gl_define(gl, "MOMENTS", g->options.moments);
-    sat__gl_define(gl, "INPUT", input);
-    result = sat__gl_build(gl, &g->tiled.programs[pass], &shaders);
-    if (result != SAT_OK) return result;
-    program = g->tiled.programs[pass];
-    gl->UseProgram(program);
-    sat__gl_set_int(gl, program, "source", 0);
-    sat__gl_set_int(gl, program, "cells", 1);
-    sat__gl_set_int(gl, program, "tiles", 2);
-    sat__gl_set_int(gl, program, "gauges", 3);
-    sat__gl_set_int(gl, program, "strips", 3);
-    sat__gl_set_int(gl, program, "facts", 4);
-    sat__gl_set_int(gl, program, "means", 5);
-    return SAT_OK;
-}
+/* The programs of tiles; samplers stand in the order of their units. */
+#define SAT__GL_KEPT sat__glsl_tile_kept
+#define SAT__GL_TILE_UNITS "source cells tiles gauges facts means"
+#define SAT__GL_DRAW_UNITS "source cells tiles strips facts means"
+enum { SAT__GL_ALWAYS = 1, SAT__GL_OF_PIXELS = 2, SAT__GL_OF_MOMENTS = 4 };
+
+static const sat__gl_program sat__gl_tile_programs[SAT__GL_TILE_PASSES] = {
+    {"sat: means of tiles", SAT__GL_OF_MOMENTS, SAT__GL_TILE_UNITS, NULL, NULL, {sat__glsl_tile_means}},
+    {"sat: gauge", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL, {sat__glsl_gauge}},
+    {"sat: quanta and spikes", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL, {sat__glsl_settle}},
+    {"sat: integers", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, "#define INPUT 1\n", NULL,
+     {SAT__GL_KEPT, sat__glsl_tile_scan}},
+    {"sat: sums in tiles", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, "#define INPUT 0\n", NULL,
+     {SAT__GL_KEPT, sat__glsl_tile_scan}},
+    {"sat: slots", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL, {SAT__GL_KEPT, sat__glsl_slots}},
+    {"sat: owners of slots", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL, {SAT__GL_KEPT, sat__glsl_owners}},
+    {"sat: 64-bit tiles", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL, {SAT__GL_KEPT, sat__glsl_wide}},
+    {"sat: strips", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL,
+     {SAT__GL_KEPT, sat__glsl_strip_sums, sat__glsl_strips}},
+    {"sat: box filter", SAT__GL_OF_PIXELS, SAT__GL_DRAW_UNITS, NULL, NULL, {sat__glsl_tile_filter}},
+    {"sat: variance", SAT__GL_OF_MOMENTS, SAT__GL_DRAW_UNITS, NULL, NULL, {sat__glsl_tile_variance}},
+};
 
 static sat_result sat__gl_make_tile_programs(sat_gl *g)
 {
-    static const struct {
-        int pass;
-        const char *name, *body;
-        int input, moments; /* moments: -1 always, else where the option has this value */
-    } list[] = {{SAT__GL_MEANS, "sat: means of tiles", sat__glsl_tile_means, 1, 1},
-                {SAT__GL_GAUGE, "sat: gauge", sat__glsl_gauge, 1, -1},
-                {SAT__GL_SETTLE, "sat: quanta and spikes", sat__glsl_settle, 1, -1},
-                {SAT__GL_SCAN, "sat: integers", sat__glsl_tile_scan, 1, -1},
-                {SAT__GL_ADD, "sat: sums in tiles", sat__glsl_tile_scan, 0, -1},
-                {SAT__GL_STRIPS, "sat: strips", sat__glsl_strips, 0, -1},
-                {SAT__GL_FILTER, "sat: box filter", sat__glsl_tile_filter, 0, 0},
-                {SAT__GL_VARIANCE, "sat: variance", sat__glsl_tile_variance, 0, 1}};
-    sat_result result = SAT_OK;
-    int i;
-    for (i = 0; i < SAT__COUNT(list) && result == SAT_OK; i++)
-        if (list[i].moments < 0 || list[i].moments == g->options.moments)
-            result = sat__gl_make_tile_program(g, list[i].pass, list[i].name, list[i].body, list[i].input);
-    return result;
+    const char *library[5];
+    int channels = g->options.channels;
+    library[0] = sat_gl_glsl();
+    library[1] = sat_gl_glsl_tiles(0);
+    library[2] = sat_gl_glsl_tiles(1);
+    library[3] = sat__glsl_tile_values;
+    library[4] = NULL;
+    sat__gl_define(&g->gl, "CHANNEL", g->options.channel);
+    sat__gl_define(&g->gl, "CHANNELS", channels);
+    sat__gl_define(&g->gl, "PLANES", g->options.moments ? 2 * channels : channels);
+    sat__gl_define(&g->gl, "MOMENTS", g->options.moments);
+    return sat__gl_build_table(&g->gl, g->tiled.programs, sat__gl_tile_programs, SAT__GL_TILE_PASSES,
+                               SAT__GL_ALWAYS | (g->options.moments ? SAT__GL_OF_MOMENTS : SAT__GL_OF_PIXELS), library);
 }
 
 static void sat__gl_free_tiles(sat_gl *g)
@@ -6818,6 +7120,9 @@ static void sat__gl_free_tiles(sat_gl *g)
     sat__gl_free_target(gl, &t->partial);
     sat__gl_free_target(gl, &t->strips);
     sat__gl_free_target(gl, &t->means);
+    sat__gl_free_target(gl, &t->pool);
+    sat__gl_free_target(gl, &t->owners);
+    sat__gl_free_target(gl, &t->wide);
     if (t->gauge_framebuffer) gl->DeleteFramebuffers(1, &t->gauge_framebuffer);
     if (t->tiles_framebuffer) gl->DeleteFramebuffers(1, &t->tiles_framebuffer);
     if (t->gauge[0]) gl->DeleteTextures(1, &t->gauge[0]);
@@ -6852,28 +7157,47 @@ static sat_result sat__gl_make_layers(sat__gl *gl, unsigned *texture, unsigned *
     return sat__gl_check(gl, "OpenGL refused a texture array");
 }
 
+/* Texels of the strips, as sat_at of the shaders counts them; those of the pool alone. */
+static double sat__gl_strip_texels(int width, int height, int planes, double *pool)
+{
+    double n = (width - 1) / SAT__GL_TILE + 1, down = (height - 1) / SAT__GL_TILE + 1,
+           supers = (height - 1) / SAT__SUPER + 1;
+    *pool = (n + 2) * supers * planes * (double)(sat__min_int(width, SAT__GL_TILE) * SAT__GL_TILE);
+    return planes * (n * height + (width + 2 * n + 1 + sat__clamp_int(width, 8, 64)) * down + supers) + *pool;
+}
+
 static sat_result sat__gl_fit_tiles(sat_gl *g, int width, int height)
 {
     sat__gl_tiled *t = &g->tiled;
     sat__gl *gl = &g->gl;
     int planes = g->options.channels << g->options.moments, tiles_x = (width - 1) / SAT__GL_TILE + 1,
-        tiles_y = (height - 1) / SAT__GL_TILE + 1;
-    unsigned internal = planes == 1 ? SAT__GL_R32UI : planes == 2 ? SAT__GL_RG32UI : SAT__GL_RGBA32UI;
-    double strips = (double)tiles_x * planes * ((double)height + tiles_y) + (double)width * planes * tiles_y;
-    sat_result result;
+        tiles_y = (height - 1) / SAT__GL_TILE + 1, i;
+    unsigned cells = planes == 1 ? SAT__GL_R32UI : planes == 2 ? SAT__GL_RG32UI : SAT__GL_RGBA32UI;
+    double room, strips = sat__gl_strip_texels(width, height, planes, &room);
+    struct {
+        sat__gl_target *target;
+        unsigned internal;
+        int width, height;
+    } list[7];
+    sat_result result = SAT_OK;
     if (t->width == width && t->height == height) return SAT_OK;
     sat__gl_free_tiles(g);
-    result = sat__gl_make_target(gl, &t->cells, internal, width, height);
-    if (strips > 2e9) result = sat__gl_fail(gl, SAT_ERR_SIZE, "an index into the strips does not fit into int", NULL);
-    if (result == SAT_OK) result = sat__gl_make_target(gl, &t->partial, internal, width, height);
-    if (result == SAT_OK)
-        result = sat__gl_make_target(gl, &t->strips, SAT__GL_RG32UI, width, (int)((strips - 1) / width) + 1);
-    if (result == SAT_OK && g->options.moments)
-        result = sat__gl_make_target(gl, &t->means, SAT__GL_R32UI, tiles_x * g->options.channels, tiles_y);
-    if (result == SAT_OK)
-        result = sat__gl_texture(gl, &t->gauge[0], SAT__GL_RGBA32UI, tiles_x * planes, height, NULL);
-    if (result == SAT_OK)
-        result = sat__gl_texture(gl, &t->gauge[1], SAT__GL_RGBA32UI, tiles_x * planes, height, NULL);
+    if (strips > 2e9) return sat__gl_fail(gl, SAT_ERR_SIZE, "an index into the strips does not fit into int", NULL);
+    memset(list, 0, sizeof list);
+#define SAT__GL_ROW(i, where, format, w, h)                                                                            \
+    list[i].target = &t->where, list[i].internal = format, list[i].width = w, list[i].height = h
+    SAT__GL_ROW(0, cells, cells, width, height);
+    SAT__GL_ROW(1, partial, cells, width, height);
+    SAT__GL_ROW(2, strips, SAT__GL_RG32UI, width, (int)((strips - 1) / width) + 1);
+    SAT__GL_ROW(3, pool, SAT__GL_R32UI, tiles_x * planes, tiles_y);
+    SAT__GL_ROW(4, owners, SAT__GL_RG32UI, tiles_x + 2, ((height - 1) / SAT__SUPER + 1) * planes);
+    SAT__GL_ROW(5, wide, SAT__GL_RG32UI, width, (int)((room - 1) / width) + 1);
+    SAT__GL_ROW(6, means, SAT__GL_R32UI, tiles_x * g->options.channels, tiles_y);
+#undef SAT__GL_ROW
+    for (i = 0; i < 6 + g->options.moments && result == SAT_OK; i++)
+        result = sat__gl_make_target(gl, list[i].target, list[i].internal, list[i].width, list[i].height);
+    for (i = 0; i < 2 && result == SAT_OK; i++)
+        result = sat__gl_texture(gl, &t->gauge[i], SAT__GL_RGBA32UI, tiles_x * planes, height, NULL);
     if (result == SAT_OK) result = sat__gl_framebuffer(gl, &t->gauge_framebuffer, t->gauge, 2, 0);
     if (result == SAT_OK)
         result = sat__gl_make_layers(gl, &t->tiles, &t->tiles_framebuffer, tiles_x * planes, tiles_y);
@@ -6886,40 +7210,40 @@ static sat_result sat__gl_fit_tiles(sat_gl *g, int width, int height)
     return result;
 }
 
-/* Everything of a pass but what is special to it; `cells` is what unit 1 reads. */
-static unsigned sat__gl_tile_pass(sat_gl *g, int pass, unsigned framebuffer, int width, int height, unsigned cells)
+/* Everything of a pass but what is special to it: it reads `source`, and what `cells`, `third` and `fourth` name. What
+   is drawn to is not bound. */
+static unsigned sat__gl_tile_pass(sat_gl *g, int pass, unsigned framebuffer, int width, int height, unsigned source,
+                                  unsigned cells, unsigned third, unsigned fourth)
 {
     const sat__gl_tiled *t = &g->tiled;
     sat__gl *gl = &g->gl;
-    unsigned program = t->programs[pass], units[6];
-    int i, gauging = pass == SAT__GL_SETTLE;
-    units[0] = 0;
-    units[1] = cells;
-    units[2] = gauging ? 0 : t->tiles; /* what is drawn to is not bound */
-    units[3] = gauging ? t->gauge[0] : pass == SAT__GL_STRIPS ? 0 : t->strips.texture;
-    units[4] = gauging ? t->gauge[1] : 0;
-    units[5] = pass == SAT__GL_MEANS ? 0 : t->means.texture;
+    unsigned program = t->programs[pass];
     sat__gl_pass(gl, program, framebuffer, width, height);
-    for (i = 1; i < 6; i++) {
-        gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)i);
-        gl->BindTexture(i == 2 ? SAT__GL_TEXTURE_2D_ARRAY : SAT__GL_TEXTURE_2D, units[i]);
-        gl->BindSampler((unsigned)i, 0);
-    }
+    SAT__GL_INPUTS(gl, source, cells, 0, third, fourth, pass == SAT__GL_MEANS ? 0 : t->means.texture);
+    gl->ActiveTexture(SAT__GL_TEXTURE0 + 2u);
+    gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, pass <= SAT__GL_SETTLE ? 0 : t->tiles);
     sat__gl_set_int2(gl, program, "size", t->width, t->height);
     sat__gl_set_float(gl, program, "limit",
                       g->options.max_value < 3.4028234663852886e38 ? (float)g->options.max_value : 3.4028235e38f);
     return program;
 }
 
+static void sat__gl_tile_step(sat_gl *g, int pass, const sat__gl_target *to, unsigned source, unsigned cells,
+                              unsigned third, unsigned fourth)
+{
+    sat__gl_tile_pass(g, pass, to->framebuffer, to->width, to->height, source, cells, third, fourth);
+    sat__gl_draw(&g->gl);
+}
+
 /* The sums of a row and of a column by eights, twice each, from one texture to the other and back. */
-static void sat__gl_scan_tiles(sat_gl *g)
+static void sat__gl_scan_tiles(sat_gl *g, unsigned texture)
 {
     sat__gl_tiled *t = &g->tiled;
     int i;
     for (i = 0; i < 4; i++) {
         const sat__gl_target *from = i & 1 ? &t->partial : &t->cells, *to = i & 1 ? &t->cells : &t->partial;
         unsigned program = sat__gl_tile_pass(g, i ? SAT__GL_ADD : SAT__GL_SCAN, to->framebuffer, t->width, t->height,
-                                             i ? from->texture : 0);
+                                             texture, i ? from->texture : 0, 0, 0);
         int step = i & 1 ? 8 : 1;
         sat__gl_set_int2(&g->gl, program, "axis", i < 2 ? step : 0, i < 2 ? 0 : step);
         sat__gl_draw(&g->gl);
@@ -6936,22 +7260,17 @@ static sat_result sat__gl_build_tiles(sat_gl *g, unsigned texture, int width, in
     sat__gl_begin(gl, &state, 6);
     result = sat__gl_fit_tiles(g, width, height);
     if (result == SAT_OK) {
-        gl->ActiveTexture(SAT__GL_TEXTURE0);
-        gl->BindTexture(SAT__GL_TEXTURE_2D, texture);
-        gl->BindSampler(0, 0);
-        if (g->options.moments) {
-            sat__gl_tile_pass(g, SAT__GL_MEANS, t->means.framebuffer, tiles_x * g->options.channels, tiles_y, 0);
-            sat__gl_draw(gl);
-        }
-        sat__gl_tile_pass(g, SAT__GL_GAUGE, t->gauge_framebuffer, tiles_x * t->planes, height, 0);
+        if (g->options.moments) sat__gl_tile_step(g, SAT__GL_MEANS, &t->means, texture, 0, 0, 0);
+        sat__gl_tile_pass(g, SAT__GL_GAUGE, t->gauge_framebuffer, tiles_x * t->planes, height, texture, 0, 0, 0);
         sat__gl_draw(gl);
-        sat__gl_tile_pass(g, SAT__GL_SETTLE, t->tiles_framebuffer, tiles_x * t->planes, tiles_y, 0);
+        sat__gl_tile_pass(g, SAT__GL_SETTLE, t->tiles_framebuffer, tiles_x * t->planes, tiles_y, texture, 0,
+                          t->gauge[0], t->gauge[1]);
         sat__gl_draw(gl);
-        sat__gl_scan_tiles(g);
-        sat__gl_tile_pass(g, SAT__GL_STRIPS, t->strips.framebuffer, width,
-                          (tiles_x * t->planes * (height + tiles_y) + width * t->planes * tiles_y - 1) / width + 1,
-                          t->cells.texture);
-        sat__gl_draw(gl);
+        sat__gl_scan_tiles(g, texture);
+        sat__gl_tile_step(g, SAT__GL_SLOTS, &t->pool, 0, 0, 0, 0);
+        sat__gl_tile_step(g, SAT__GL_OWNERS, &t->owners, 0, t->pool.texture, 0, 0);
+        sat__gl_tile_step(g, SAT__GL_WIDE, &t->wide, texture, t->owners.texture, 0, 0);
+        sat__gl_tile_step(g, SAT__GL_STRIPS, &t->strips, texture, t->cells.texture, t->pool.texture, t->wide.texture);
     }
     sat__gl_end(gl, &state);
     return result;
@@ -6988,7 +7307,7 @@ SAT_DEF sat_result sat_gl_get_stats(sat_gl *gl, sat_stats *stats)
     for (i = 0; i < count; i++) {
         stats->nan += records[4 * i + 2] >> 4 & 8191;
         stats->infinite += records[4 * i + 2] >> 17 & 8191;
-        stats->clamped += records[4 * i + 3];
+        stats->clamped += records[4 * i + 3] & 4095;
     }
     sat__release(&gl->options.allocator, records, count * 16);
     return SAT_OK;
@@ -7003,8 +7322,8 @@ static sat_result sat__gl_filter_tiles(sat_gl *g, int pass, unsigned texture, in
     sat__gl_begin(&g->gl, &state, 6);
     result = sat__gl_attach(&g->gl, g->borrowed, &texture, 1, 0);
     if (result == SAT_OK) {
-        unsigned program = sat__gl_tile_pass(g, pass, g->borrowed, g->tiled.width, g->tiled.height,
-                                             g->tiled.cells.texture);
+        unsigned program = sat__gl_tile_pass(g, pass, g->borrowed, g->tiled.width, g->tiled.height, 0,
+                                             g->tiled.cells.texture, g->tiled.strips.texture, 0);
         sat__gl_set_int(&g->gl, program, "radius", radius);
         sat__gl_draw(&g->gl);
     }
