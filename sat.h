@@ -93,21 +93,22 @@
    COST
 
    A build writes each sum once and reads each pixel once (TILED: twice, the second time from the cache). Per pixel and
-   channel: 4.8 bytes (TILED; 18 in a column one pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE, FIXED64). A lookup reads
+   channel: 4.8 bytes (TILED; 21 in a column one pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE, FIXED64). A lookup reads
    4 sums (TILED: up to 4 a touched tile, at most 9 tiles; beyond, 16 for each super tile of 1024 pixels). Measured
-   ratios, one core of a busy machine, SSE2 (bench_sat):
+   ratios, one core of a busy machine, SSE2 (bench_sat, QUICK=1):
 
-     build, time over a memcpy of the same traffic     512^2        2048^2       4096^2
-       TILED                                           5.1 to 5.3   2.0 to 2.7   2.2 to 2.8
-       TILED, a spike in every tile                                 3.5
-       FLOAT, DOUBLE                                   2.5 to 3.2   1.3, 1.5
-       FIXED32, FIXED64                                3.5 to 5.6   1.4, 1.9
-     cv::integral over FLOAT, over DOUBLE              2.1, 1.7     1.8, 1.4
+     build, time over a memcpy of the same traffic     512^2        2048^2
+       TILED                                           5.1 to 7.9   2.4 to 3.4 (tile = 64: 2.0 to 2.9)
+       FLOAT, DOUBLE                                   2.9 to 3.6   1.0 to 1.4
+       FIXED32, FIXED64                                4.6 to 5.6   2.1 to 2.8
+     cv::integral over FLOAT, over DOUBLE              2.1, 1.5     1.6, 1.3
      box filter over cv::blur at radius 1, 5, 20, 100, 1024^2
-       TILED                                           1.0 1.0 1.2 1.4, with the build 1.7 1.5 to 2.1 1.4 to 2.2 1.7
-       FLOAT, DOUBLE, FIXED32                          0.6 to 0.9, 0.6 to 0.8, 0.5 to 0.6
-     lookup of random boxes, TILED over FLOAT: 1.5 to 2.3 at radius 1, 5 and 20, 6 to 7 at 100
-     lookup of FLOAT, sat_sums over sat_sum: 0.7
+       TILED                                           1.9 2.2 2.6 2.9, with the build 2.6 2.9 3.7 3.7
+       TILED, tile = 64                                1.3 1.4 1.4 1.9, with the build 1.9 2.1 2.1 2.3
+       FLOAT, DOUBLE, FIXED32                          1.0 to 1.3, 0.7 to 0.8, 0.6 to 0.7
+     random boxes in a table that the cache holds (2048^2), over four bare reads of floats, at radius 1, 5, 20, 100
+       TILED by sat_sums                               5 6 9 19 (tile = 64: 6 5 6 18)
+       FLOAT by sat_sum, by sat_sums                   2.4 to 2.9, 1.9 to 2.1
 */
 
 /*
@@ -311,8 +312,8 @@ typedef enum sat_non_finite {
 
 typedef struct sat_options {
     sat_kind kind;             /* SAT_KIND_TILED */
-    int tile;                  /* 32; 8..128; a power of two: tile side of SAT_KIND_TILED; 64 errs four times as much
-                                  and filters in half the time */
+    int tile;                  /* 32; 8..128; a power of two: tile side of SAT_KIND_TILED; 64 errs 4 to 100 times as
+                                  much and filters in 0.6 of the time */
     int subtract_mean;         /* 0; 0..1; 1 (FLOAT, DOUBLE): Hensley 2005. Good at low contrast; makes dark boxes of
                                   HDR images about 100 times worse */
     double quantum;            /* 0; 0..1e300; 0: the finest power of two that max_value and max_box_area allow; FIXED
