@@ -45,7 +45,7 @@
    - It sees what the depth buffer holds: occluders off the screen or behind others do not count. Nothing is assumed
      about thickness, so thin poles darken a little what lies behind them.
    - No temporal accumulation: there is no noise to accumulate away. No shading: the accessibility is yours to multiply.
-   - On the GPU no bent normals and no signed output. Logarithmic depth is not decoded: give distances. The upsample's
+   - Logarithmic depth is not decoded: give distances. The upsample's
      weights are no output: they are nine a pixel, and follow from depth and normals alone.
    - GTAO at half resolution has about the same error in less time (COST), at small radii a smaller one: cells average
      what samples resolve.
@@ -281,6 +281,8 @@ typedef struct ssao_sat_options {
                                 whole picture */
     int bottom_up;           /* 0; 0..1; row 0 is the bottom of the picture, in all buffers */
     int skip_flat;           /* 1; 0..1; regions that are one plane are not looked at */
+    int gl_bent;             /* 0; 0..1; OpenGL, SLABS: programs and textures of ssao_sat_gl_apply_bent are made too */
+    int gl_signed;           /* 0; 0..1; OpenGL: those of ssao_sat_gl_apply_signed */
     sat_allocator allocator; /* malloc; used by create and destroy only */
     sat_threads threads;     /* serial; same bits for any worker count */
 } ssao_sat_options;
@@ -389,9 +391,21 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *g
    depth_kind, projection, clip_zero_to_one and sky count. */
 SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth, unsigned normals,
                                           const ssao_sat_input *input);
+#ifndef SSAO_SAT_NO_BENT
+/* The same and the mean unblocked direction (see ssao_sat_apply_bent): of `to` red, green and blue get the direction,
+   signed, and alpha the accessibility, so let it be RGBA16F or the like; NULL: the object's own,
+   ssao_sat_gl_bent_texture(). For objects made with options.gl_bent. */
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply_bent(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth,
+                                               unsigned normals, const ssao_sat_input *input);
+SSAO_SAT_DEF unsigned ssao_sat_gl_bent_texture(const ssao_sat_gl *gl);
+#endif
+/* Depth unsharp masking, -1..1 (see ssao_sat_apply_signed) in the red of `to`; NULL: ssao_sat_gl_texture(). For objects
+   made with options.gl_signed. */
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply_signed(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth,
+                                                 unsigned normals, const ssao_sat_input *input);
 /* Other options from the next frame on. Those that shaders and textures are made for stay: method, half_resolution,
-   slabs, scales, plane_boxes, refine_levels, as_printed, inverted_depth: SAT_ERR_MISMATCH when one differs. The rest
-   are uniforms and free. */
+   slabs, scales, plane_boxes, refine_levels, as_printed, inverted_depth, gl_bent, gl_signed: SAT_ERR_MISMATCH when one
+   differs. The rest are uniforms and free. */
 SSAO_SAT_DEF sat_result ssao_sat_gl_set_options(ssao_sat_gl *gl, const ssao_sat_options *options);
 SSAO_SAT_DEF unsigned ssao_sat_gl_texture(const ssao_sat_gl *gl);
 /* What the last SAT_ERR_GL_... was about; never NULL, and NULL is fine. */
@@ -718,6 +732,8 @@ static const sat__field ssao_sat__fields[] = {
     SAT__FIELD(ssao_sat_options, 'i', band_rows, 0, 16, 32768, '0'),
     SAT__FIELD(ssao_sat_options, 'i', bottom_up, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', skip_flat, 1, 0, 1, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', gl_bent, 0, 0, 1, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', gl_signed, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'a', allocator, 0, 0, 0, ' '),
     SAT__FIELD(ssao_sat_options, 't', threads, 0, 0, 0, ' ')};
 enum { SSAO_SAT__FIELDS = sizeof ssao_sat__fields / sizeof ssao_sat__fields[0] };
@@ -2103,7 +2119,7 @@ static void ssao_sat__upsample_lanes(const ssao_sat *s, const ssao_sat__picture_
     const ssao_sat__f nz = ssao_sat__load(r->nz + first), z = ssao_sat__load(r->z + first);
     const ssao_sat__f scale = ssao_sat__add(ssao_sat__mul(z, ssao_sat__set(perspective)), ssao_sat__set(orthographic));
     float lane[4], ry = (float)(s->camera.full[2] * (y + 0.5) + s->camera.full[3]);
-    ssao_sat__f total = ssao_sat__set(1e-20f), sum = total, rx, own, sharpness, blocked[3];
+    ssao_sat__f total = ssao_sat__set(1e-20f), sum = s->is_signed ? zero : total, rx, own, sharpness, blocked[3];
     int i, j, k, c;
     for (i = 0; i < 4; i++) lane[i] = (float)(s->camera.full[0] * (x0 + 2 * (first + i) + 0.5) + s->camera.full[1]);
     rx = ssao_sat__load(lane);
@@ -2872,7 +2888,7 @@ static const char ssao_sat__gl_shares[] =
 static const char ssao_sat__gl_edges[] =
     SAT__GLSL(
         uniform sampler2D finer, shares;
-        uniform vec4 region; /* radius, reach, limit */
+        uniform vec4 region; /* radius, reach, limit; parts of a side that a box of the table takes */
         out vec4 result;
         float filled(int bin) { return 0.5 * float(bin) / float(BINS) + 0.5 * texelFetch(shares, ivec2(bin, 0), 0).r; })
     SAT__GLSL(
@@ -2897,7 +2913,7 @@ static const char ssao_sat__gl_edges[] =
                 ? int(min(float(SLABS), floor((range.y - range.x) / thin) + 1.0)) : 1, bits = 31;
             float largest = max(min(region.y * pixels() / (orthographic() ? 1.0 : range.x / MARGIN), region.z), 2.0)
                 * max(aspect(), 1.0);
-            float side = 2.0 * largest / (METHOD == 0 ? 3.0 : 1.0) + 2.0, first = cut(k, slabs, range),
+            float side = 2.0 * largest / region.w + 2.0, first = cut(k, slabs, range),
                 second = cut(k + 1, slabs, range);
             float spare = orthographic() ? min(range.y - range.x + MARGIN * region.x, 1e15) : 0.0, low = first,
                 high = second;
@@ -2986,20 +3002,20 @@ static const char ssao_sat__gl_slabs[] =
         })
     SAT__GLSL(
         uniform vec4 kernel[13]; /* three a ring, then the factors by n.v: see ssao_sat__kernel */
-        /* of one slab in one cell, times its pixels */
-        float occluder(uvec4 sums, vec4 edge, vec3 p, vec3 n, int ring) {
+        /* of one slab in one cell, times its pixels; and the directions it blocks */
+        vec4 occluder(uvec4 sums, vec4 edge, vec3 p, vec3 n, int ring) {
             vec4 s = vec4(ivec4(sums));
-            if (s.x < 0.5) return 0.0;
+            if (s.x < 0.5) return vec4(0.0);
             float mean = (edge.y * s.x + edge.z * s.y) / s.x, z = orthographic() ? mean : 1.0 / max(mean, 1e-30);
             vec3 d = vec3((view[0].xz * (s.zw / s.x + 0.5) + view[0].yw) * (orthographic() ? 1.0 : z), z) - p;
             float square = dot(d, d), height = dot(d, n), share = 1.0 - square / (fit.y * fit.y);
-            if (height <= 0.0 || share <= 0.0) return 0.0;
+            if (height <= 0.0 || share <= 0.0) return vec4(0.0);
             float away = sqrt(max(square, p.z * p.z * 1e-12 + 1e-37)), sine = max(height / away - fit.z, 0.0),
                 r = min(away / region.x, 2.0);
             vec4 powers = vec4(1.0, r, r * r, r * r * r);
             vec3 k = vec3(dot(kernel[3 * ring], powers), dot(kernel[3 * ring + 1], powers),
                 dot(kernel[3 * ring + 2], powers));
-            return sine * (k.x + sine * (k.y + sine * k.z)) * share * s.x;
+            return vec4(1.0, d / away) * (sine * (k.x + sine * (k.y + sine * k.z)) * share * s.x);
         })
     /* What a pixel weighs in each third of an axis: see ssao_sat__cut_axis. */
     SAT__GLSL(
@@ -3013,13 +3029,13 @@ static const char ssao_sat__gl_slabs[] =
         })
     SAT__GLSL(
         /* x[t] = borders along both axes; weights of the thirds */
-        float slab(int k, ivec2 x[4], vec3 u, vec3 v, vec3 p, vec3 n, int ring) {
+        vec4 slab(int k, ivec2 x[4], vec3 u, vec3 v, vec3 p, vec3 n, int ring) {
             ivec2 tile = ivec2(k % TILES, k / TILES) * size;
             vec4 edge = texelFetch(edges, ivec2(k, 0), 0);
             uvec4 row[4];
-            float sum = 0.0;
+            vec4 sum = vec4(0.0);
             if (corner(tile, x[3].x, x[3].y).x - corner(tile, x[0].x, x[3].y).x == corner(tile, x[3].x, x[0].y).x
-                - corner(tile, x[0].x, x[0].y).x) return 0.0;
+                - corner(tile, x[0].x, x[0].y).x) return vec4(0.0);
             for (int t = 0; t < 4; t++) row[t] = corner(tile, x[t].x, x[0].y);
             for (int j = 0; j < 3; j++) {
                 uvec4 last = uvec4(0u);
@@ -3035,8 +3051,9 @@ static const char ssao_sat__gl_slabs[] =
     SAT__GLSL(
         void main() {
             ivec2 work = ivec2(gl_FragCoord.xy), x[4];
-            float z = distance_at(STEP * work), side = half_side(z), strength = fade(side), sum = 0.0, r = side;
-            result = vec4(1.0);
+            float z = distance_at(STEP * work), side = half_side(z), strength = fade(side), r = side;
+            vec4 sum = vec4(0.0);
+            result = vec4(1.0, 0.0, 0.0, 0.0);
             if (!(z > 0.0) || !(strength > 0.0)) return;
             vec3 n = normal_at(STEP * work, z), p = vec3(ray(vec2(work)) * (orthographic() ? 1.0 : z), z);
             int slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);
@@ -3060,7 +3077,7 @@ static const char ssao_sat__gl_slabs[] =
             float cosine = clamp(-dot(n, orthographic() ? vec3(0.0, 0.0, 1.0) : normalize(p)), 0.0, 1.0);
             strength *= cosine < 0.5 ? mix(1.0, kernel[12].x, 1.0 - 2.0 * cosine)
                 : mix(1.0, kernel[12].y, 2.0 * cosine - 1.0);
-            result.r = open(sum, strength * fit.w);
+            result = vec4(open(sum.x, strength * fit.w), strength * fit.w * BLOCKED * sum.yzw);
         });
 
 static const char ssao_sat__gl_single[] =
@@ -3153,18 +3170,67 @@ static const char ssao_sat__gl_single_main[] =
             result.r = open(occlusion, strength * fit.w);
         });
 
-/* To the picture: the 3 x 3 table pixels around, by distance to the tangent plane and angle between normals. */
+/* Depth unsharp masking: mean depth of the region less the own depth, as in C. */
+static const char ssao_sat__gl_signed_slabs[] =
+    SAT__GLSL(
+        uvec4 corner(ivec2 tile, ivec2 at) {
+            return at.x > 0 && at.y > 0 ? texelFetch(table, tile + at - 1, 0) : uvec4(0u);
+        })
+    SAT__GLSL(
+        float mean_depth(ivec4 b) {
+            int slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);
+            float sum = 0.0, count = 0.0;
+            for (int k = 0; k < slabs; k++) {
+                ivec2 tile = ivec2(k % TILES, k / TILES) * size;
+                vec4 edge = texelFetch(edges, ivec2(k, 0), 0);
+                uvec4 s = corner(tile, b.zw) - corner(tile, b.xw) - corner(tile, b.zy) + corner(tile, b.xy);
+                sum += edge.y * float(s.x) + edge.z * float(s.y);
+                count += float(s.x);
+            }
+            sum /= max(count, 1.0);
+            return orthographic() ? sum : 1.0 / sum;
+        });
+
+static const char ssao_sat__gl_signed_single[] =
+    SAT__GLSL(
+        float mean_depth(ivec4 b) {
+            float m = mean(b, texelFetch(edges, ivec2(0), 0));
+            if (METHOD == 1 ? !orthographic() : INVERTED == 1) return 1.0 / m;
+            return METHOD == 1 ? texelFetch(edges, ivec2(SLABS, 0), 0).x - m : m;
+        });
+
+static const char ssao_sat__gl_signed_main[] =
+    SAT__GLSL(
+        void main() {
+            ivec2 work = ivec2(gl_FragCoord.xy), low, high;
+            float z = distance_at(STEP * work), side = half_side(z), strength = fade(side);
+            vec2 c = vec2(work) + 0.5, half_box = vec2(side, side * aspect());
+            result = vec4(0.0);
+            if (!(z > 0.0) || !(strength > 0.0)) return;
+            low = clamp(ivec2(floor(c - half_box + 0.5)), ivec2(0), size - 1);
+            high = clamp(ivec2(floor(c + half_box + 0.5)), low + 1, size);
+            result.r = clamp(strength * fit.w * (mean_depth(ivec4(low, high)) - z) / region.x, -1.0, 1.0);
+        });
+
+/* To the picture: the 3 x 3 table pixels around, by distance to the tangent plane and angle between normals. BLANK is
+   what sky gets. */
 static const char ssao_sat__gl_upsample[] =
     SAT__GLSL(
         uniform sampler2D coarse;
         out vec4 result;
         void main() {
             ivec2 at = sat_pixel();
-            float z = distance_at(at), sum = 0.0, total = 0.0;
-            result = vec4(1.0);
-            if (!(z > 0.0)) return;)
+            float z = distance_at(at), total = 0.0;
+            vec4 sum = vec4(0.0);
+            result = vec4(BLANK);)
+    "#if BENT\n"
+    SAT__GLSL(result.xyz = vec3(0.0, 0.0, -view[2].w);)
+    "#endif\n"
+    SAT__GLSL(if (!(z > 0.0)) return;)
     "#if STEP == 1\n"
-    SAT__GLSL(result.r = texelFetch(coarse, at, 0).r;)
+    SAT__GLSL(
+            sum = texelFetch(coarse, at, 0);
+            total = 1.0;)
     "#else\n"
     SAT__GLSL(
             vec3 n = normal_at(at, z), p = ssao_sat_position(view, at, z);
@@ -3179,9 +3245,17 @@ static const char ssao_sat__gl_upsample[] =
                     float weight = (plane * alike * alike * alike * alike + 1e-4)
                         / float((1 + off.x * off.x) * (1 + off.y * off.y));
                     total += weight;
-                    sum += weight * texelFetch(coarse, t, 0).r;
-                }
-            if (total > 0.0) result.r = sum / total;)
+                    sum += weight * texelFetch(coarse, t, 0);
+                })
+    "#endif\n"
+    SAT__GLSL(sum = total > 0.0 ? sum / total : vec4(BLANK, 0.0, 0.0, 0.0);)
+    "#if BENT\n"
+    SAT__GLSL(
+            vec3 up = normal_at(at, z), bent = 2.0 / 3.0 * up - sum.yzw;
+            if (length(bent) > 1e-3) up = normalize(bent);
+            result = vec4(up * vec3(1.0, 1.0, view[2].w), sum.x);)
+    "#else\n"
+    SAT__GLSL(result.r = sum.x;)
     "#endif\n"
     SAT__GLSL(});
 
@@ -3196,10 +3270,12 @@ enum {
     SSAO_SAT__GL_EDGES,
     SSAO_SAT__GL_WORDS,
     SSAO_SAT__GL_SCAN,
-    SSAO_SAT__GL_ESTIMATE,
+    SSAO_SAT__GL_ESTIMATE, /* from here on two a kind of output: see ssao_sat__gl_output */
     SSAO_SAT__GL_UPSAMPLE,
-    SSAO_SAT__GL_PROGRAMS
+    SSAO_SAT__GL_PROGRAMS = SSAO_SAT__GL_ESTIMATE + 6
 };
+
+typedef enum ssao_sat__gl_output { SSAO_SAT__GL_OPEN, SSAO_SAT__GL_BENT, SSAO_SAT__GL_SIGNED } ssao_sat__gl_output;
 
 typedef struct ssao_sat__gl_target { unsigned texture, framebuffer; int width, height; } ssao_sat__gl_target;
 
@@ -3209,7 +3285,8 @@ struct ssao_sat_gl {
     int width, height, step, columns, rows, tiles, is_built;
     int from[2]; /* where the picture lies in the inputs of this call */
     unsigned programs[2][SSAO_SAT__GL_PROGRAMS]; /* without and with normals */
-    ssao_sat__gl_target range[2], shares, edges, table[2], open, out;
+    ssao_sat__gl_target range[2], shares, edges, table[2], open, out, bent;
+    ssao_sat__gl_output output; /* of this frame */
     ssao_sat__camera camera;
     ssao_sat__fit fit;
     float view[12], limit;
@@ -3243,7 +3320,16 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_view(float *view, const ssao_sat_input *inpu
 /* Programs that read normals are there twice; the others once, under 0. */
 static int ssao_sat__gl_reads_normals(int which)
 {
-    return which == SSAO_SAT__GL_ESTIMATE || which == SSAO_SAT__GL_UPSAMPLE;
+    return which >= SSAO_SAT__GL_ESTIMATE && which != SSAO_SAT__GL_ESTIMATE + 2 * SSAO_SAT__GL_SIGNED;
+}
+
+static int ssao_sat__gl_has_output(const ssao_sat_options *o, int output)
+{
+#ifdef SSAO_SAT_NO_BENT
+    if (output == SSAO_SAT__GL_BENT) return 0;
+#endif
+    return output == SSAO_SAT__GL_OPEN || (output == SSAO_SAT__GL_BENT && o->gl_bent && o->method == SSAO_SAT_SLABS) ||
+           (output == SSAO_SAT__GL_SIGNED && o->gl_signed);
 }
 
 static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *const *fragment, int normals)
@@ -3251,6 +3337,7 @@ static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *co
     const ssao_sat_options *o = &g->options;
     sat__gl_shaders shaders;
     const char *library[2];
+    int output = which < SSAO_SAT__GL_ESTIMATE ? SSAO_SAT__GL_OPEN : (which - SSAO_SAT__GL_ESTIMATE) / 2;
     library[0] = which == SSAO_SAT__GL_SCAN ? "" : ssao_sat_gl_glsl();
     library[1] = NULL;
     memset(&shaders, 0, sizeof shaders);
@@ -3274,36 +3361,57 @@ static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *co
     sat__gl_define_float(&g->gl, "BEYOND", SSAO_SAT__BEYOND);
     sat__gl_define_float(&g->gl, "MARGIN", SSAO_SAT__MARGIN);
     sat__gl_define_float(&g->gl, "SHARPNESS", SSAO_SAT__SHARPNESS);
+    sat__gl_define(&g->gl, "BENT", output == SSAO_SAT__GL_BENT);
+    sat__gl_define_float(&g->gl, "BLANK", output == SSAO_SAT__GL_SIGNED ? 0 : 1);
+    sat__gl_define_float(&g->gl, "BLOCKED", SSAO_SAT__BLOCKED);
     return sat__gl_build(&g->gl, &g->programs[normals][which], &shaders);
 }
 
-static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g)
+/* The texts of one program, in order, into parts[]. */
+static void ssao_sat__gl_texts(const ssao_sat_gl *g, int which, const char **parts)
 {
     static const char last[] = "#define NAME refine_last\n#define CHILD\n#define LEVEL 1\n";
     static const char first[] = "#undef NAME\n#undef CHILD\n#undef LEVEL\n#define NAME refine_all\n#define LEVEL 0\n"
                                 "#define CHILD child = refine_last(c, z, edge);\n";
-    const char *const single[] = {ssao_sat__gl_common,
-                                  ssao_sat__gl_tone,
-                                  ssao_sat__gl_single,
-                                  last,
-                                  ssao_sat__gl_refine,
-                                  first,
-                                  ssao_sat__gl_refine,
-                                  ssao_sat__gl_single_main,
-                                  NULL};
-    const char *const text[SSAO_SAT__GL_PROGRAMS][4] = {
-        {ssao_sat__gl_common, ssao_sat__gl_range, NULL}, {ssao_sat__gl_common, ssao_sat__gl_range, NULL},
-        {ssao_sat__gl_common, ssao_sat__gl_shares, NULL}, {ssao_sat__gl_common, ssao_sat__gl_edges, NULL},
-        {ssao_sat__gl_common, ssao_sat__gl_words, NULL},
-        {ssao_sat__gl_scan, NULL}, {ssao_sat__gl_common, ssao_sat__gl_tone, ssao_sat__gl_slabs, NULL},
-        {ssao_sat__gl_common, sat__gl_pixel(), ssao_sat__gl_upsample, NULL}};
+    static const char *const before[SSAO_SAT__GL_ESTIMATE] = {ssao_sat__gl_range, ssao_sat__gl_range,
+                                                              ssao_sat__gl_shares, ssao_sat__gl_edges,
+                                                              ssao_sat__gl_words, ssao_sat__gl_scan};
+    const int slabs = g->options.method == SSAO_SAT_SLABS;
+    if (which != SSAO_SAT__GL_SCAN) *parts++ = ssao_sat__gl_common;
+    if (which < SSAO_SAT__GL_ESTIMATE) *parts++ = before[which];
+    else if ((which - SSAO_SAT__GL_ESTIMATE) % 2) {
+        *parts++ = sat__gl_pixel();
+        *parts++ = ssao_sat__gl_upsample;
+    } else {
+        *parts++ = ssao_sat__gl_tone;
+        if (!slabs) *parts++ = ssao_sat__gl_single;
+        if (which == SSAO_SAT__GL_ESTIMATE + 2 * SSAO_SAT__GL_SIGNED) {
+            *parts++ = slabs ? ssao_sat__gl_signed_slabs : ssao_sat__gl_signed_single;
+            *parts++ = ssao_sat__gl_signed_main;
+        } else if (slabs) *parts++ = ssao_sat__gl_slabs;
+        else {
+            *parts++ = last;
+            *parts++ = ssao_sat__gl_refine;
+            *parts++ = first;
+            *parts++ = ssao_sat__gl_refine;
+            *parts++ = ssao_sat__gl_single_main;
+        }
+    }
+    *parts = NULL;
+}
+
+static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g)
+{
+    const char *parts[10];
     sat_result result = SAT_OK;
     int i, normals;
     for (normals = 0; normals < 2; normals++)
         for (i = 0; i < SSAO_SAT__GL_PROGRAMS && result == SAT_OK; i++) {
             if (normals && !ssao_sat__gl_reads_normals(i)) continue;
-            result = ssao_sat__gl_program(
-                g, i, i == SSAO_SAT__GL_ESTIMATE && g->options.method != SSAO_SAT_SLABS ? single : text[i], normals);
+            if (i >= SSAO_SAT__GL_ESTIMATE && !ssao_sat__gl_has_output(&g->options, (i - SSAO_SAT__GL_ESTIMATE) / 2))
+                continue;
+            ssao_sat__gl_texts(g, i, parts);
+            result = ssao_sat__gl_program(g, i, parts, normals);
         }
     g->is_built = result == SAT_OK;
     return result;
@@ -3321,7 +3429,7 @@ static sat_result ssao_sat__gl_make_target(ssao_sat_gl *g, ssao_sat__gl_target *
 
 static sat_result ssao_sat__gl_make_targets(ssao_sat_gl *g)
 {
-    int i, slabs = g->options.method == SSAO_SAT_SLABS;
+    int i, slabs = g->options.method == SSAO_SAT_SLABS, bent = ssao_sat__gl_has_output(&g->options, SSAO_SAT__GL_BENT);
     int tile_rows = slabs ? (g->options.slabs + g->tiles - 1) / g->tiles : 1;
     sat_result result = SAT_OK;
     for (i = 0; i < 2 && result == SAT_OK; i++)
@@ -3332,8 +3440,11 @@ static sat_result ssao_sat__gl_make_targets(ssao_sat_gl *g)
     for (i = 0; i < 2 && result == SAT_OK; i++)
         result = ssao_sat__gl_make_target(g, &g->table[i], slabs ? SAT__GL_RGBA32UI : SAT__GL_R32UI,
                                           g->columns * g->tiles, g->rows * tile_rows);
-    if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->open, SAT__GL_R32F, g->columns, g->rows);
+    if (result == SAT_OK)
+        result = ssao_sat__gl_make_target(g, &g->open, bent ? SAT__GL_RGBA16F : SAT__GL_R32F, g->columns, g->rows);
     if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->out, SAT__GL_R32F, g->width, g->height);
+    if (result == SAT_OK && bent)
+        result = ssao_sat__gl_make_target(g, &g->bent, SAT__GL_RGBA16F, g->width, g->height);
     return result;
 }
 
@@ -3379,7 +3490,8 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_set_options(ssao_sat_gl *gl, const ssao_sat_
     if (o.method != gl->options.method || o.half_resolution != gl->options.half_resolution ||
         o.slabs != gl->options.slabs || o.scales != gl->options.scales || o.plane_boxes != gl->options.plane_boxes ||
         o.refine_levels != gl->options.refine_levels || o.as_printed != gl->options.as_printed ||
-        o.inverted_depth != gl->options.inverted_depth)
+        o.inverted_depth != gl->options.inverted_depth || o.gl_bent != gl->options.gl_bent ||
+        o.gl_signed != gl->options.gl_signed)
         return SAT_ERR_MISMATCH;
     o.allocator = gl->options.allocator;
     gl->options = o;
@@ -3409,6 +3521,7 @@ SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl)
         ssao_sat__gl_drop(gl, &gl->edges);
         ssao_sat__gl_drop(gl, &gl->open);
         ssao_sat__gl_drop(gl, &gl->out);
+        ssao_sat__gl_drop(gl, &gl->bent);
         sat__gl_close(&gl->gl);
     }
     allocator = gl->options.allocator;
@@ -3454,7 +3567,7 @@ static void ssao_sat__gl_find_edges(ssao_sat_gl *g, unsigned depth)
     region[0] = (float)g->options.radius;
     region[1] = g->options.region_pixels > 0 ? 1e30f : (float)g->options.radius * g->fit.reach;
     region[2] = g->options.region_pixels > 0 ? (float)g->options.region_pixels / (float)g->step : g->limit;
-    region[3] = 0;
+    region[3] = g->options.method == SSAO_SAT_SLABS && g->output != SSAO_SAT__GL_SIGNED ? 3.0f : 1.0f;
     sat__gl_set_float4(gl, program, "region", region);
     sat__gl_set_texture(gl, program, "finer", 3, g->range[1].texture);
     sat__gl_draw(gl);
@@ -3482,7 +3595,8 @@ static void ssao_sat__gl_estimate(ssao_sat_gl *g, unsigned depth, unsigned norma
 {
     sat__gl *gl = &g->gl;
     const ssao_sat_options *o = &g->options;
-    unsigned program = ssao_sat__gl_pass(g, SSAO_SAT__GL_ESTIMATE, &g->open, depth, normals);
+    int which = SSAO_SAT__GL_ESTIMATE + 2 * (int)g->output;
+    unsigned program = ssao_sat__gl_pass(g, which, &g->open, depth, normals);
     float v[4];
     v[0] = (float)o->radius * g->fit.reach;
     v[1] = o->method == SSAO_SAT_SLABS ? (float)o->radius * g->fit.range : g->fit.range;
@@ -3501,7 +3615,7 @@ static void ssao_sat__gl_estimate(ssao_sat_gl *g, unsigned depth, unsigned norma
     v[1] = (float)o->refine_threshold;
     v[2] = (float)o->depth_gain;
     sat__gl_set_float4(gl, program, "published", v);
-    if (o->method == SSAO_SAT_SLABS) {
+    if (o->method == SSAO_SAT_SLABS && g->output != SSAO_SAT__GL_SIGNED) {
         const ssao_sat__kernel *kernel = &ssao_sat__kernels[o->scales - 1];
         float k[52];
         memset(k, 0, sizeof k);
@@ -3517,6 +3631,7 @@ static void ssao_sat__gl_estimate(ssao_sat_gl *g, unsigned depth, unsigned norma
 static sat_result ssao_sat__gl_run(ssao_sat_gl *g, const sat_gl_target *to, unsigned depth, unsigned normals)
 {
     sat__gl *gl = &g->gl;
+    const ssao_sat__gl_target *own = g->output == SSAO_SAT__GL_BENT ? &g->bent : &g->out;
     sat_result result;
     unsigned program;
     int table;
@@ -3525,12 +3640,13 @@ static sat_result ssao_sat__gl_run(ssao_sat_gl *g, const sat_gl_target *to, unsi
         table = ssao_sat__gl_sum(g, depth);
         ssao_sat__gl_estimate(g, depth, normals, table);
     } else {
-        static const float open[4] = {1, 1, 1, 1};
+        float open[4] = {1, 0, 0, 0};
+        if (g->output == SSAO_SAT__GL_SIGNED) open[0] = 0;
         gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, g->open.framebuffer);
         gl->ClearBufferfv(SAT__GL_COLOR, 0, open);
     }
-    program = ssao_sat__gl_pass(g, SSAO_SAT__GL_UPSAMPLE, &g->out, depth, normals);
-    result = sat__gl_pass_to(gl, program, to, g->out.framebuffer, g->width, g->height);
+    program = ssao_sat__gl_pass(g, SSAO_SAT__GL_UPSAMPLE + 2 * (int)g->output, own, depth, normals);
+    result = sat__gl_pass_to(gl, program, to, own->framebuffer, g->width, g->height);
     if (result != SAT_OK) return result;
     sat__gl_set_texture(gl, program, "coarse", 3, g->open.texture);
     sat__gl_draw(gl);
@@ -3538,19 +3654,25 @@ static sat_result ssao_sat__gl_run(ssao_sat_gl *g, const sat_gl_target *to, unsi
     return SAT_OK;
 }
 
-SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth, unsigned normals,
-                                          const ssao_sat_input *input)
+static sat_result ssao_sat__gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth, unsigned normals,
+                                     const ssao_sat_input *input, ssao_sat__gl_output output)
 {
     sat__gl_state state;
     sat_result result;
     double side;
     if (!gl || !input || !depth || !gl->is_built || !sat__gl_target_is_valid(to)) return SAT_ERR_ARGUMENT;
+    if (!ssao_sat__gl_has_output(&gl->options, (int)output)) return SAT_ERR_ARGUMENT;
     if (sat__gl_target_is(to, depth) || sat__gl_target_is(to, normals)) return SAT_ERR_ARGUMENT;
     if (input->width != gl->width || input->height != gl->height) return SAT_ERR_MISMATCH;
     if ((unsigned)input->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED || !(input->sky >= 0)) return SAT_ERR_ARGUMENT;
     if (!ssao_sat__read_camera(&gl->camera, input, gl->step, gl->options.bottom_up)) return SAT_ERR_ARGUMENT;
     ssao_sat__gl_pack_view(gl->view, &gl->camera, input);
     gl->fit = ssao_sat__fit_of(&gl->options);
+    gl->output = output;
+    if (output == SSAO_SAT__GL_SIGNED) {
+        gl->fit.reach = 1;
+        gl->fit.gain = (float)gl->options.gain;
+    }
     side = ssao_sat__largest_side(gl->columns, gl->rows, gl->step);
     gl->limit = (float)(gl->options.max_pixels < side ? gl->options.max_pixels : side);
     if (gl->camera.aspect > 1) gl->limit /= gl->camera.aspect;
@@ -3560,6 +3682,28 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, const sat_gl_target *
     result = ssao_sat__gl_run(gl, to, depth, normals);
     sat__gl_end(&gl->gl, &state);
     return result;
+}
+
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth, unsigned normals,
+                                          const ssao_sat_input *input)
+{
+    return ssao_sat__gl_apply(gl, to, depth, normals, input, SSAO_SAT__GL_OPEN);
+}
+
+#ifndef SSAO_SAT_NO_BENT
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply_bent(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth,
+                                               unsigned normals, const ssao_sat_input *input)
+{
+    return ssao_sat__gl_apply(gl, to, depth, normals, input, SSAO_SAT__GL_BENT);
+}
+
+SSAO_SAT_DEF unsigned ssao_sat_gl_bent_texture(const ssao_sat_gl *gl) { return gl ? gl->bent.texture : 0; }
+#endif
+
+SSAO_SAT_DEF sat_result ssao_sat_gl_apply_signed(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth,
+                                                 unsigned normals, const ssao_sat_input *input)
+{
+    return ssao_sat__gl_apply(gl, to, depth, normals, input, SSAO_SAT__GL_SIGNED);
 }
 
 #ifdef __cplusplus

@@ -191,6 +191,7 @@ static void dump_ssao_sat(void)
         o.refine_levels = d[5];
         o.as_printed = d[6];
         o.inverted_depth = d[7];
+        o.gl_bent = o.gl_signed = 1;
         if ((o.method == SSAO_SAT_SLABS) ? d[4] || d[5] || d[6] || d[7] : d[2] || d[3]) continue; /* not looked at */
         expect_ok(ssao_sat_gl_create(&gl, gl_fake_proc, 64, 32, &o), ssao_sat_gl_message(gl));
         ssao_sat_gl_destroy(gl);

@@ -78,6 +78,115 @@ static void compare(const ref_picture *p, ssao_sat_options o, ref_convention con
     test_f.DeleteTextures(2, textures);
 }
 
+/* Bent normals and signed output of both, an object of all outputs: largest mean difference of either. */
+static void compare_outputs(const ref_picture *p, ssao_sat_options o, ref_convention convention, int with_normals)
+{
+    static float depth[GL_WIDTH * GL_HEIGHT], a[GL_WIDTH * GL_HEIGHT], b[4 * GL_WIDTH * GL_HEIGHT],
+        bent[3 * GL_WIDTH * GL_HEIGHT];
+    ssao_sat_input in = ref_input(p, convention, depth);
+    ssao_sat *ao = NULL;
+    ssao_sat_gl *gl = NULL;
+    unsigned textures[2] = {0, 0};
+    sat__gl_state state;
+    double off = 0, open = 0;
+    int i, k, n = 0;
+    in.normals = with_normals ? p->normals : NULL;
+    o.gl_bent = o.gl_signed = 1;
+    textures[0] = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, in.depth);
+    if (with_normals) textures[1] = upload(SAT__GL_RGB32F, GL_WIDTH, GL_HEIGHT, p->normals);
+    EXPECT_EQ(ssao_sat_create(&ao, GL_WIDTH, GL_HEIGHT, &o), SAT_OK);
+    if (!EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, &o), SAT_OK))
+        puts(ssao_sat_gl_message(gl));
+#ifndef SSAO_SAT_NO_BENT
+    if (o.method == SSAO_SAT_SLABS) {
+        EXPECT_EQ(ssao_sat_apply_bent(ao, a, 0, bent, 0, &in, NULL), SAT_OK);
+        EXPECT_EQ(ssao_sat_gl_apply_bent(gl, 0, textures[0], textures[1], &in), SAT_OK);
+        sat__gl_begin(&test_f, &state, 1);
+        EXPECT_EQ(sat__gl_read(&test_f, b, ssao_sat_gl_bent_texture(gl), SAT__GL_RGBA16F, GL_WIDTH, GL_HEIGHT), SAT_OK);
+        sat__gl_end(&test_f, &state);
+        for (i = 0; i < GL_WIDTH * GL_HEIGHT; i++) {
+            double dot = 0, length = 0;
+            open += fabs((double)a[i] - (double)b[4 * i + 3]) / (GL_WIDTH * GL_HEIGHT);
+            for (k = 0; k < 3; k++) {
+                dot += (double)bent[3 * i + k] * (double)b[4 * i + k];
+                length += (double)b[4 * i + k] * (double)b[4 * i + k];
+            }
+            n += !(fabs(length - 1) < 4e-3);
+            off += acos(fmin(dot / sqrt(length), 1)) / (GL_WIDTH * GL_HEIGHT);
+        }
+        EXPECT_EQ(n, 0);
+        EXPECT_NEAR(open, 0, 2e-3);
+        if (!EXPECT_NEAR(off * 57.29578, 0, 0.2)) /* degrees, of half floats */
+            printf("    convention %d, half %d\n", (int)convention, o.half_resolution);
+    } else EXPECT_EQ(ssao_sat_gl_apply_bent(gl, 0, textures[0], textures[1], &in), SAT_ERR_ARGUMENT);
+#endif
+    EXPECT_EQ(ssao_sat_apply_signed(ao, a, 0, &in, NULL), SAT_OK);
+    EXPECT_EQ(ssao_sat_gl_apply_signed(gl, 0, textures[0], textures[1], &in), SAT_OK);
+    download(b, ssao_sat_gl_texture(gl), GL_WIDTH, GL_HEIGHT);
+    for (i = 0, off = 0; i < GL_WIDTH * GL_HEIGHT; i++) off += fabs((double)a[i] - (double)b[i]);
+    if (!EXPECT_NEAR(off / (GL_WIDTH * GL_HEIGHT), 0, 2e-3))
+        printf("    signed: method %d, convention %d, half %d\n", (int)o.method, (int)convention, o.half_resolution);
+    EXPECT_EQ(ssao_sat_apply(ao, a, 0, &in, NULL), SAT_OK); /* and nothing is left of it in the next frame */
+    EXPECT_EQ(ssao_sat_gl_apply(gl, 0, textures[0], textures[1], &in), SAT_OK);
+    download(b, ssao_sat_gl_texture(gl), GL_WIDTH, GL_HEIGHT);
+    EXPECT_NEAR(ref_rmse(p, a, b), 0, o.method == SSAO_SAT_REFINED || convention != REF_LINEAR ? 0.01 : 2e-3);
+    ssao_sat_destroy(ao);
+    ssao_sat_gl_destroy(gl);
+    test_f.DeleteTextures(2, textures);
+}
+
+TEST(gpu_bent_and_signed_equal_c)
+{
+    int m, orthographic;
+    if (!open_gl()) SKIP(test_gl.message);
+    for (orthographic = 0; orthographic < 2; orthographic++) {
+        ref_picture p = small_picture(orthographic ? 1 : 2, orthographic); /* the field has sky */
+        for (m = 0; m < 5; m++) {
+            ssao_sat_options o = ssao_sat_defaults();
+            o.method = (ssao_sat_method)m;
+            o.radius = 0.3;
+            o.inverted_depth = m == 2;
+            o.half_resolution = (m + orthographic) % 2 == 0;
+            compare_outputs(&p, o, m ? REF_LINEAR : REF_REVERSED, (m + orthographic) % 2);
+            o.half_resolution = !o.half_resolution;
+            o.radius = m == 3 ? 0 : 0.2;
+            if (m == 0 || m == 3) compare_outputs(&p, o, REF_LINEAR, 1);
+        }
+        ref_free(&p);
+    }
+}
+
+/* A wire between two columns of the tables, before the sky: it has no neighbour to take from. */
+TEST(gpu_wires_before_the_sky)
+{
+    static float z[GL_WIDTH * GL_HEIGHT], a[GL_WIDTH * GL_HEIGHT], b[GL_WIDTH * GL_HEIGHT];
+    ssao_sat_options o = ssao_sat_defaults();
+    ssao_sat_input in = ssao_sat_input_linear(z, GL_WIDTH, GL_HEIGHT, 1);
+    ssao_sat *ao = NULL;
+    ssao_sat_gl *gl = NULL;
+    unsigned depth;
+    int i;
+    if (!open_gl()) SKIP(test_gl.message);
+    o.gl_signed = 1;
+    for (i = 0; i < GL_WIDTH * GL_HEIGHT; i++) z[i] = i % GL_WIDTH == 33 ? 3 : i / GL_WIDTH > 60 ? 5 : sat__float_from_bits(0x7f800000u);
+    depth = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, z);
+    EXPECT_EQ(ssao_sat_create(&ao, GL_WIDTH, GL_HEIGHT, &o), SAT_OK);
+    EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, &o), SAT_OK);
+    EXPECT_EQ(ssao_sat_apply_signed(ao, a, 0, &in, NULL), SAT_OK);
+    EXPECT_EQ(ssao_sat_gl_apply_signed(gl, 0, depth, 0, &in), SAT_OK);
+    download(b, ssao_sat_gl_texture(gl), GL_WIDTH, GL_HEIGHT);
+    EXPECT_NEAR(a[10 * GL_WIDTH + 33], 0, 0);
+    EXPECT_NEAR(b[10 * GL_WIDTH + 33], 0, 0);
+    EXPECT_EQ(ssao_sat_apply(ao, a, 0, &in, NULL), SAT_OK);
+    EXPECT_EQ(ssao_sat_gl_apply(gl, 0, depth, 0, &in), SAT_OK);
+    download(b, ssao_sat_gl_texture(gl), GL_WIDTH, GL_HEIGHT);
+    EXPECT_NEAR(a[10 * GL_WIDTH + 33], 1, 0);
+    EXPECT_NEAR(b[10 * GL_WIDTH + 33], 1, 0);
+    ssao_sat_destroy(ao);
+    ssao_sat_gl_destroy(gl);
+    test_f.DeleteTextures(1, &depth);
+}
+
 TEST(gpu_equals_c)
 {
     int m, orthographic;
@@ -231,6 +340,11 @@ TEST(gpu_errors_have_names)
     EXPECT(gl == NULL);
     if (!EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, 8, 8, NULL), SAT_OK)) return;
     EXPECT_EQ(ssao_sat_gl_apply(gl, 0, 0, 0, &in), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(ssao_sat_gl_apply_signed(gl, 0, texture, 0, &in), SAT_ERR_ARGUMENT); /* not asked for in create */
+#ifndef SSAO_SAT_NO_BENT
+    EXPECT_EQ(ssao_sat_gl_apply_bent(gl, 0, texture, 0, &in), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(ssao_sat_gl_bent_texture(gl), 0);
+#endif
     to = sat_gl_to_texture(texture);
     EXPECT_EQ(ssao_sat_gl_apply(gl, &to, texture, 0, &in), SAT_ERR_ARGUMENT);
     bad = in;
@@ -294,8 +408,8 @@ TEST(gpu_corners_of_the_options)
 /* What needs other shaders, by name: what ssao_sat_gl_set_options refuses to change. */
 static int is_compiled(const char *name)
 {
-    static const char *const names[] = {"method",        "half_resolution", "slabs",      "scales",
-                                        "plane_boxes",   "refine_levels",   "as_printed", "inverted_depth"};
+    static const char *const names[] = {"method",        "half_resolution", "slabs",          "scales",  "plane_boxes",
+                                        "refine_levels", "as_printed",      "inverted_depth", "gl_bent", "gl_signed"};
     size_t i;
     for (i = 0; i < sizeof names / sizeof names[0]; i++)
         if (strcmp(names[i], name) == 0) return 1;
@@ -387,9 +501,16 @@ TEST(nothing_is_compiled_in_a_frame)
     in = ref_input(&p, REF_LINEAR, z);
     depth = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, p.z);
     normals = upload(SAT__GL_RGB32F, GL_WIDTH, GL_HEIGHT, p.normals);
+    o.gl_bent = o.gl_signed = 1;
     if (!EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, &o), SAT_OK)) return;
     gl->gl.CreateProgram = count_program;
-    for (k = 0; k < 4; k++) EXPECT_EQ(ssao_sat_gl_apply(gl, 0, depth, k % 2 ? normals : 0, &in), SAT_OK);
+    for (k = 0; k < 4; k++) {
+        EXPECT_EQ(ssao_sat_gl_apply(gl, 0, depth, k % 2 ? normals : 0, &in), SAT_OK);
+        EXPECT_EQ(ssao_sat_gl_apply_signed(gl, 0, depth, k % 2 ? normals : 0, &in), SAT_OK);
+#ifndef SSAO_SAT_NO_BENT
+        EXPECT_EQ(ssao_sat_gl_apply_bent(gl, 0, depth, k % 2 ? normals : 0, &in), SAT_OK);
+#endif
+    }
     EXPECT_EQ(programs_made, 0);
     ssao_sat_gl_destroy(gl);
     test_f.DeleteTextures(1, &depth);
