@@ -49,8 +49,8 @@
      weights are no output: they are nine a pixel, and follow from depth and normals alone.
    - GTAO at half resolution has about the same error in less time (COST), at small radii a smaller one: cells average
      what samples resolve.
-   - Smooth normals on a coarse mesh are believed: its facets then darken at their edges. Leave normals NULL there:
-     those from depth are the facets' own.
+   - Smooth normals on a coarse mesh are believed: its facets then darken at their edges, unless options.geometric is
+     set or normals are NULL: those from depth are the facets' own.
 
    DEVIATIONS from chapter 5, with their reasons
 
@@ -281,6 +281,8 @@ typedef struct ssao_sat_options {
                                 whole picture */
     int bottom_up;           /* 0; 0..1; row 0 is the bottom of the picture, in all buffers */
     int skip_flat;           /* 1; 0..1; regions that are one plane are not looked at */
+    int geometric;           /* 0; 0..1; SLABS, normals given: what lies below the surface itself, the tangent plane of
+                                the normal from depth, does not occlude: for smooth normals on coarse meshes */
     int gl_bent;             /* 0; 0..1; OpenGL, SLABS: programs and textures of ssao_sat_gl_apply_bent are made too */
     int gl_signed;           /* 0; 0..1; OpenGL: those of ssao_sat_gl_apply_signed */
     sat_allocator allocator; /* malloc; used by create and destroy only */
@@ -689,6 +691,7 @@ struct ssao_sat {
     float flat_limit;
     int frame_slabs;        /* <= options.slabs */
     int bent_wanted, is_signed;
+    int geometric;          /* the option, where normals are given */
     int element;            /* bytes of an output: float, half or 8 bits */
     void *out;
     float *bent_out;
@@ -732,6 +735,7 @@ static const sat__field ssao_sat__fields[] = {
     SAT__FIELD(ssao_sat_options, 'i', band_rows, 0, 16, 32768, '0'),
     SAT__FIELD(ssao_sat_options, 'i', bottom_up, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', skip_flat, 1, 0, 1, ' '),
+    SAT__FIELD(ssao_sat_options, 'i', geometric, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', gl_bent, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', gl_signed, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'a', allocator, 0, 0, 0, ' '),
@@ -1483,6 +1487,7 @@ typedef struct ssao_sat__point {
     int x, y;
     float z, facing, slope[2];             /* n.ray and its change a column and a row; orthographic: n.z, n.x, n.y */
     ssao_sat__f px, py, pz, nx, ny, nz;    /* the same in all lanes */
+    ssao_sat__f surface[3];                /* the normal from depth, where it counts too */
     ssao_sat__f least;                     /* square of a millionth of the distance: nothing is nearer than that */
     ssao_sat__f occlusion[2], blocked[2][3]; /* by cell */
 } ssao_sat__point;
@@ -1522,6 +1527,10 @@ static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s
     dz = ssao_sat__sub(z, p->pz);
     square = ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, dx), ssao_sat__mul(dy, dy)), ssao_sat__mul(dz, dz));
     height = ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, p->nx), ssao_sat__mul(dy, p->ny)), ssao_sat__mul(dz, p->nz));
+    if (s->geometric)
+        height = ssao_sat__min(height, ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, p->surface[0]),
+                                                                   ssao_sat__mul(dy, p->surface[1])),
+                                                     ssao_sat__mul(dz, p->surface[2])));
     share = ssao_sat__sub(one, ssao_sat__mul(square, l->falloff));
     share = ssao_sat__if_positive(height, ssao_sat__mul(ssao_sat__max(zero, share), count));
     if (!ssao_sat__any_positive(share)) return;
@@ -1781,6 +1790,12 @@ static void ssao_sat__estimate_slabs(ssao_sat *s, const ssao_sat__lanes *l, int 
         side_y = (int)(half_side * s->camera.aspect) + 1;
         stats->border += x < side_x || y < side_y || x + side_x >= s->columns || y + side_y >= s->rows;
         stats->estimated++;
+        if (s->geometric) {
+            ssao_sat__vector n = ssao_sat__depth_normal(s, x * s->step, y * s->step, z);
+            p.surface[0] = ssao_sat__set(n.x);
+            p.surface[1] = ssao_sat__set(n.y);
+            p.surface[2] = ssao_sat__set(n.z);
+        }
         ssao_sat__add_rings(&p, s, l, half_side, ssao_sat__ring_count(s, x, y, half_side), first, end);
         fade *= ssao_sat__by_facing(s, &p);
         s->open[at] =
@@ -2473,6 +2488,7 @@ static sat_result ssao_sat__apply(ssao_sat *s, void *out, ptrdiff_t stride, size
     s->bent_stride = bent_stride;
     s->bent_wanted = bent != NULL;
     s->is_signed = is_signed;
+    s->geometric = s->options.geometric && s->input.normals != NULL;
     s->fit = ssao_sat__fit_of(&s->options);
     s->radius = (float)s->options.radius;
     s->reach = is_signed ? s->radius : s->radius * s->fit.reach;
@@ -3001,14 +3017,15 @@ static const char ssao_sat__gl_slabs[] =
             return x > 0 && y > 0 ? texelFetch(table, tile + ivec2(x - 1, y - 1), 0) : uvec4(0u);
         })
     SAT__GLSL(
-        uniform vec4 kernel[13]; /* three a ring, then the factors by n.v: see ssao_sat__kernel */
+        uniform vec4 kernel[13]; /* three a ring, then the factors by n.v: see ssao_sat__kernel; options.geometric */
+        vec3 surface;
         /* of one slab in one cell, times its pixels; and the directions it blocks */
         vec4 occluder(uvec4 sums, vec4 edge, vec3 p, vec3 n, int ring) {
             vec4 s = vec4(ivec4(sums));
             if (s.x < 0.5) return vec4(0.0);
             float mean = (edge.y * s.x + edge.z * s.y) / s.x, z = orthographic() ? mean : 1.0 / max(mean, 1e-30);
             vec3 d = vec3((view[0].xz * (s.zw / s.x + 0.5) + view[0].yw) * (orthographic() ? 1.0 : z), z) - p;
-            float square = dot(d, d), height = dot(d, n), share = 1.0 - square / (fit.y * fit.y);
+            float square = dot(d, d), height = min(dot(d, n), dot(d, surface)), share = 1.0 - square / (fit.y * fit.y);
             if (height <= 0.0 || share <= 0.0) return vec4(0.0);
             float away = sqrt(max(square, p.z * p.z * 1e-12 + 1e-37)), sine = max(height / away - fit.z, 0.0),
                 r = min(away / region.x, 2.0);
@@ -3056,6 +3073,8 @@ static const char ssao_sat__gl_slabs[] =
             result = vec4(1.0, 0.0, 0.0, 0.0);
             if (!(z > 0.0) || !(strength > 0.0)) return;
             vec3 n = normal_at(STEP * work, z), p = vec3(ray(vec2(work)) * (orthographic() ? 1.0 : z), z);
+            surface = n;
+            if (kernel[12].z > 0.0) surface = ssao_sat_depth_normal(view, depth, STEP * work, z);
             int slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);
             for (int ring = 0; ring < RINGS; ring++, r /= 3.0) {
                 ivec2 inner = max(ivec2(vec2(r, r * aspect()) / 3.0 + 0.5), 1),
@@ -3622,6 +3641,7 @@ static void ssao_sat__gl_estimate(ssao_sat_gl *g, unsigned depth, unsigned norma
         memcpy(k, kernel->term, sizeof kernel->term);
         k[48] = kernel->grazing;
         k[49] = kernel->facing;
+        k[50] = (float)o->geometric;
         gl->Uniform4fv(gl->GetUniformLocation(program, "kernel"), 13, k);
     }
     sat__gl_set_texture(gl, program, "table", 3, g->table[table].texture);

@@ -168,7 +168,8 @@ TEST(gpu_wires_before_the_sky)
     int i;
     if (!open_gl()) SKIP(test_gl.message);
     o.gl_signed = 1;
-    for (i = 0; i < GL_WIDTH * GL_HEIGHT; i++) z[i] = i % GL_WIDTH == 33 ? 3 : i / GL_WIDTH > 60 ? 5 : sat__float_from_bits(0x7f800000u);
+    for (i = 0; i < GL_WIDTH * GL_HEIGHT; i++)
+        z[i] = i % GL_WIDTH == 33 ? 3 : i / GL_WIDTH > 60 ? 5 : sat__float_from_bits(0x7f800000u);
     depth = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, z);
     EXPECT_EQ(ssao_sat_create(&ao, GL_WIDTH, GL_HEIGHT, &o), SAT_OK);
     EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, &o), SAT_OK);
