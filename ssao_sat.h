@@ -281,6 +281,8 @@ typedef struct ssao_sat_options {
                                 whole picture */
     int bottom_up;           /* 0; 0..1; row 0 is the bottom of the picture, in all buffers */
     int skip_flat;           /* 1; 0..1; regions that are one plane are not looked at */
+    double tolerance;        /* 0.03; 0..1; SLABS: where neighbours on one surface agree to this, what lies between
+                                takes their mean; 0: every table pixel is estimated */
     int geometric;           /* 0; 0..1; SLABS, normals given: what lies below the surface itself, the tangent plane of
                                 the normal from depth, does not occlude: for smooth normals on coarse meshes */
     int gl_bent;             /* 0; 0..1; OpenGL, SLABS: programs and textures of ssao_sat_gl_apply_bent are made too */
@@ -291,10 +293,11 @@ typedef struct ssao_sat_options {
 
 /* What the last call met. Counts are pixels of the tables (a quarter of the picture at half resolution). */
 typedef struct ssao_sat_stats {
-    size_t pixels;            /* of the tables; = sky + tiny + flat + estimated */
+    size_t pixels;            /* of the tables; = sky + tiny + flat + interpolated + estimated */
     size_t sky;               /* nothing there, or depth not a positive finite number */
     size_t tiny;              /* radius below min_pixels */
     size_t flat;              /* left out: the whole region is one plane */
+    size_t interpolated;      /* SLABS: between neighbours that agree to options.tolerance */
     size_t estimated;
     size_t border;            /* estimated with a region that the picture's border cuts */
     size_t cut;               /* radius cut to max_pixels */
@@ -379,7 +382,7 @@ extern "C" {
 
 /* Belongs to the context that is current in create: it must be current in every call. Every call leaves the OpenGL
    state as it was (but for pending errors, which are lost). Does not wait for the GPU. All methods; band_rows, threads,
-   float_table and skip_flat mean nothing here. Textures drawn by OpenGL have the bottom row first: set
+   float_table, tolerance and skip_flat mean nothing here. Textures drawn by OpenGL have the bottom row first: set
    options.bottom_up. */
 typedef struct ssao_sat_gl ssao_sat_gl;
 
@@ -576,6 +579,7 @@ enum {
     SSAO_SAT__MAX_SLABS = 16,
     SSAO_SAT__MAX_SCALES = 4,
     SSAO_SAT__GRID = 32,      /* the slabs are cut from a sample of 32 x 32 depths ... */
+    SSAO_SAT__SPACING = 4,    /* of the table pixels that are estimated in any case; a power of 2 */
     SSAO_SAT__TRIM = 4        /* ... less the nearest and farthest 4 of its 256 blocks */
 };
 #define SSAO_SAT__BINS 256    /* the sample is counted in so many bins */
@@ -584,6 +588,9 @@ enum {
                                   keeps its value */
 #define SSAO_SAT__BLOCKED 2.0f  /* length of blocked directions against occlusion, fitted */
 #define SSAO_SAT__SHARPNESS 50 /* upsampling: a neighbour off the tangent plane by 1/50 of the distance has no weight */
+#define SSAO_SAT__BEND 0.2f   /* there is interpolation between neighbours on a plane up to a tenth of a radius, */
+#define SSAO_SAT__ALIKE 0.9f  /* with normals less than 25 degrees apart */
+#define SSAO_SAT__COARSE 10   /* half side from which it may be between those two apart */
 #define SSAO_SAT__FAR 1e18f   /* distances beyond are sky: their squares would overflow */
 
 /* What was fitted to ray-traced references by tests/bench/bench_ssao_sat.c. reach: half side of the region in radii.
@@ -698,6 +705,8 @@ struct ssao_sat {
     ptrdiff_t out_stride, bent_stride;
     /* this band: rows [first, first + held) are held, [begin, end) estimated */
     int first, held, begin, end;
+    int estimated_first;    /* of the rows that are estimated: the band's, and those its pixels take from */
+    int spacing;            /* of the pixels of this pass */
 };
 
 SSAO_SAT_DEF int ssao_sat_version(void) { return SSAO_SAT_VERSION; }
@@ -735,6 +744,7 @@ static const sat__field ssao_sat__fields[] = {
     SAT__FIELD(ssao_sat_options, 'i', band_rows, 0, 16, 32768, '0'),
     SAT__FIELD(ssao_sat_options, 'i', bottom_up, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', skip_flat, 1, 0, 1, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', tolerance, 0.03, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', geometric, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', gl_bent, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', gl_signed, 0, 0, 1, ' '),
@@ -2046,22 +2056,74 @@ static float ssao_sat__estimate_pixel(const ssao_sat *s, int x, int y, ssao_sat_
     return ssao_sat__accessibility(s, ssao_sat__published(s, &region, z, stats), fade * s->fit.gain);
 }
 
+#ifndef SSAO_SAT_NO_SLABS
+/* Do the table pixels `offset` before and after this one lie on a plane with it, and agree? */
+static inline int ssao_sat__agrees(const ssao_sat *s, size_t at, ptrdiff_t offset, float z)
+{
+    const size_t a = at - (size_t)offset, b = at + (size_t)offset;
+    const float own = s->affine[at], bend = s->affine[a] + s->affine[b] - 2 * own;
+    if (!(s->z[a] > 0) || !(s->z[b] > 0)) return 0;
+    if (!(fabsf(s->open[a] - s->open[b]) <= (float)s->options.tolerance)) return 0;
+    if (!(fabsf(bend) * (s->camera.orthographic ? 1 : z) <= SSAO_SAT__BEND * s->radius * own / z)) return 0;
+    return s->nx[at] * s->nx[a] + s->ny[at] * s->ny[a] + s->nz[at] * s->nz[a] > SSAO_SAT__ALIKE &&
+           s->nx[at] * s->nx[b] + s->ny[at] * s->ny[b] + s->nz[at] * s->nz[b] > SSAO_SAT__ALIKE;
+}
+
+/* A pixel between two or four of those `spacing` apart takes their mean where they agree. */
+static int ssao_sat__interpolate(ssao_sat *s, int x, int y, int spacing, ssao_sat_stats *stats)
+{
+    const int dx = x & spacing, dy = y & spacing;
+    const size_t at = ssao_sat__at(s, y) + (size_t)x;
+    const ptrdiff_t down = (ptrdiff_t)s->stride * dy, first = down + dx, second = down - dx;
+    const float z = s->z[at], tolerance = (float)s->options.tolerance;
+    float *planes[4];
+    int i, cut;
+    if (!(z > 0) || x + dx >= s->columns || y + dy >= s->rows) return 0;
+    if (spacing > 1 && ssao_sat__half_side(s, z, &cut) < SSAO_SAT__COARSE) return 0;
+    if (!ssao_sat__agrees(s, at, first, z)) return 0;
+    if (dx && dy && (!(fabsf(s->open[at - (size_t)first] - s->open[at - (size_t)second]) <= tolerance) ||
+                     !ssao_sat__agrees(s, at, second, z)))
+        return 0;
+    planes[0] = s->open;
+    for (i = 0; i < 3; i++) planes[i + 1] = s->blocked[i];
+    for (i = 0; i < (s->bent_wanted ? 4 : 1); i++) {
+        float *v = planes[i] + at, mean = 0.5f * (v[-first] + v[first]);
+        if (dx && dy) mean = 0.5f * mean + 0.25f * (v[-second] + v[second]);
+        *v = mean;
+    }
+    stats->interpolated++;
+    return 1;
+}
+
+/* A row of one of the passes: estimates SPACING apart, then what lies between them, then between these. */
+static void ssao_sat__estimate_row(ssao_sat *s, const ssao_sat__lanes *lanes, int y, ssao_sat_stats *stats)
+{
+    const int spacing = s->spacing, first = spacing == SSAO_SAT__SPACING || !(s->options.tolerance > 0);
+    int x;
+    if (y % spacing) return;
+    for (x = 0; x < s->columns; x += spacing) {
+        if (!first && !((x | y) & spacing)) continue;
+        if (first || !ssao_sat__interpolate(s, x, y, spacing, stats)) ssao_sat__estimate_slabs(s, lanes, x, y, stats);
+    }
+}
+#endif
+
 static void ssao_sat__estimate_rows(int begin, int end, int worker, void *context)
 {
     ssao_sat *s = (ssao_sat *)context;
     ssao_sat_stats unused;
-    int y, x, above = s->step == 2 && s->begin > 0;
+    int y, x;
 #ifndef SSAO_SAT_NO_SLABS
     ssao_sat__lanes lanes;
     if (s->options.method == SSAO_SAT_SLABS && !s->is_signed) ssao_sat__set_lanes(&lanes, s);
 #endif
     memset(&unused, 0, sizeof unused);
-    for (y = s->begin - above + begin; y < s->begin - above + end; y++) {
+    for (y = s->estimated_first + begin; y < s->estimated_first + end; y++) {
         ssao_sat_stats *stats =
             y >= s->begin && y < s->end ? &s->workers[worker].stats : &unused; /* neighbours of the band count there */
 #ifndef SSAO_SAT_NO_SLABS
         if (s->options.method == SSAO_SAT_SLABS && !s->is_signed) {
-            for (x = 0; x < s->columns; x++) ssao_sat__estimate_slabs(s, &lanes, x, y, stats);
+            ssao_sat__estimate_row(s, &lanes, y, stats);
             continue;
         }
 #endif
@@ -2262,7 +2324,8 @@ static void ssao_sat__write_rows(int begin, int end, int worker, void *context)
 static void ssao_sat__run_band(ssao_sat *s, int begin, int end)
 {
     const sat_threads *threads = &s->options.threads;
-    int reserve = s->reserve, k, i, estimated,
+    int sparse = s->options.method == SSAO_SAT_SLABS && !s->is_signed && s->options.tolerance > 0;
+    int reserve = s->reserve, i, last,
         tables = s->options.method == SSAO_SAT_SLABS ? s->frame_slabs + s->options.skip_flat : 1;
     s->begin = begin;
     s->end = end;
@@ -2278,8 +2341,14 @@ static void ssao_sat__run_band(ssao_sat *s, int begin, int end)
     s->used_slabs = 0;
     for (i = 0; i < s->held && s->options.method == SSAO_SAT_SLABS; i++) s->used_slabs |= s->row_slabs[i];
     sat__parallel_for(threads, tables, ssao_sat__build_tables, s);
-    for (k = 0, estimated = end - begin; k < 2 && s->step == 2; k++) estimated += k ? end < s->rows : begin > 0;
-    sat__parallel_for(threads, estimated, ssao_sat__estimate_rows, s);
+    s->estimated_first = begin - (s->step == 2 && begin > 0); /* upsampling takes from the rows beside the band */
+    last = end - (s->step == 1 || end == s->rows);
+    if (sparse) { /* and what lies between from what is around */
+        s->estimated_first -= s->estimated_first % SSAO_SAT__SPACING;
+        last = sat__min_int((last + SSAO_SAT__SPACING - 1) / SSAO_SAT__SPACING * SSAO_SAT__SPACING, s->rows - 1);
+    }
+    for (s->spacing = sparse ? SSAO_SAT__SPACING : 1; s->spacing; s->spacing /= 2)
+        sat__parallel_for(threads, last + 1 - s->estimated_first, ssao_sat__estimate_rows, s);
     sat__parallel_for(threads, sat__min_int(end * s->step, s->height) - begin * s->step, ssao_sat__write_rows, s);
 }
 
@@ -2389,6 +2458,7 @@ static void ssao_sat__collect(const ssao_sat *s, ssao_sat_stats *stats, int was_
         stats->sky += w->sky;
         stats->tiny += w->tiny;
         stats->flat += w->flat;
+        stats->interpolated += w->interpolated;
         stats->estimated += w->estimated;
         stats->border += w->border;
         stats->cut += w->cut;
@@ -2634,7 +2704,7 @@ static int ssao_sat__measure(ssao_sat *s, int width, int height, size_t *used)
     s->step = s->options.half_resolution ? 2 : 1;
     s->columns = (width + s->step - 1) / s->step;
     s->rows = (height + s->step - 1) / s->step;
-    s->reserve = (int)s->options.max_pixels + 4;
+    s->reserve = (int)s->options.max_pixels + 4 + SSAO_SAT__SPACING;
     s->capacity = s->options.band_rows ? sat__min_int(s->rows, s->options.band_rows + 2 * s->reserve) : s->rows;
     s->stride = ((size_t)s->columns + 15) / 16 * 16 + 3 * SSAO_SAT__PAD;
     s->table_stride = ((size_t)s->columns + 1 + 15) / 16 * 16;
