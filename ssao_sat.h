@@ -281,7 +281,7 @@ typedef struct ssao_sat_options {
                                 whole picture */
     int bottom_up;           /* 0; 0..1; row 0 is the bottom of the picture, in all buffers */
     int skip_flat;           /* 1; 0..1; regions that are one plane are not looked at */
-    double tolerance;        /* 0.03; 0..1; SLABS: where neighbours on one surface agree to this, what lies between
+    double tolerance;        /* 0.04; 0..1; SLABS: where neighbours on one surface agree to this, what lies between
                                 takes their mean; 0: every table pixel is estimated */
     int geometric;           /* 0; 0..1; SLABS, normals given: what lies below the surface itself, the tangent plane of
                                 the normal from depth, does not occlude: for smooth normals on coarse meshes */
@@ -456,10 +456,9 @@ extern "C" {
 #endif
 
 /* ------------------------------------------------------------------------------------------------
-   >> vectors: of four, SSE2 and NEON through sat.h, or plain C. One kernel serves them all.
+   >> vectors: of four, those of sat.h under shorter names. One kernel serves SSE2, NEON and plain C.
    ------------------------------------------------------------------------------------------------ */
 
-#if defined(SAT__VECTOR)
 typedef sat__f32x4 ssao_sat__f;
 typedef sat__i32x4 ssao_sat__i;
 static inline ssao_sat__f ssao_sat__load(const float *p) { return sat__f32x4_load(p); }
@@ -494,77 +493,12 @@ static inline void ssao_sat__transpose(ssao_sat__f *m) { _MM_TRANSPOSE4_PS(m[0],
 #else
 static inline void ssao_sat__transpose(ssao_sat__f *m)
 {
-    float32x4x2_t a = vtrnq_f32(m[0], m[1]), b = vtrnq_f32(m[2], m[3]);
-    m[0] = vcombine_f32(vget_low_f32(a.val[0]), vget_low_f32(b.val[0]));
-    m[1] = vcombine_f32(vget_low_f32(a.val[1]), vget_low_f32(b.val[1]));
-    m[2] = vcombine_f32(vget_high_f32(a.val[0]), vget_high_f32(b.val[0]));
-    m[3] = vcombine_f32(vget_high_f32(a.val[1]), vget_high_f32(b.val[1]));
+    float rows[16], columns[16];
+    int i;
+    for (i = 0; i < 4; i++) ssao_sat__store(rows + 4 * i, m[i]);
+    for (i = 0; i < 16; i++) columns[i] = rows[i % 4 * 4 + i / 4];
+    for (i = 0; i < 4; i++) m[i] = ssao_sat__load(columns + 4 * i);
 }
-#endif
-#else
-typedef struct ssao_sat__f { float v[4]; } ssao_sat__f;
-typedef struct ssao_sat__i { uint32_t v[4]; } ssao_sat__i;
-/* written out: loops over four would stay loops where nothing vectorises them */
-#define SSAO_SAT__LANE(lane, expression) { enum { k = lane }; r.v[k] = (expression); }
-#define SSAO_SAT__EACH(type, expression)                                                                               \
-    type r;                                                                                                            \
-    SSAO_SAT__LANE(0, expression)                                                                                      \
-    SSAO_SAT__LANE(1, expression) SSAO_SAT__LANE(2, expression) SSAO_SAT__LANE(3, expression) return r
-static inline ssao_sat__f ssao_sat__load(const float *p) { SSAO_SAT__EACH(ssao_sat__f, p[k]); }
-static inline void ssao_sat__store(float *p, ssao_sat__f v)
-{
-    p[0] = v.v[0];
-    p[1] = v.v[1];
-    p[2] = v.v[2];
-    p[3] = v.v[3];
-}
-static inline ssao_sat__f ssao_sat__set(float v) { SSAO_SAT__EACH(ssao_sat__f, v); }
-static inline ssao_sat__f ssao_sat__add(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] + b.v[k]); }
-static inline ssao_sat__f ssao_sat__sub(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] - b.v[k]); }
-static inline ssao_sat__f ssao_sat__mul(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] * b.v[k]); }
-static inline ssao_sat__f ssao_sat__div(ssao_sat__f a, ssao_sat__f b) { SSAO_SAT__EACH(ssao_sat__f, a.v[k] / b.v[k]); }
-static inline ssao_sat__f ssao_sat__max(ssao_sat__f a, ssao_sat__f b)
-{
-    SSAO_SAT__EACH(ssao_sat__f, a.v[k] > b.v[k] ? a.v[k] : b.v[k]);
-}
-static inline ssao_sat__f ssao_sat__min(ssao_sat__f a, ssao_sat__f b)
-{
-    SSAO_SAT__EACH(ssao_sat__f, a.v[k] < b.v[k] ? a.v[k] : b.v[k]);
-}
-static inline ssao_sat__f ssao_sat__sqrt(ssao_sat__f a) { SSAO_SAT__EACH(ssao_sat__f, sqrtf(a.v[k])); }
-static inline ssao_sat__f ssao_sat__abs(ssao_sat__f a) { SSAO_SAT__EACH(ssao_sat__f, fabsf(a.v[k])); }
-static inline ssao_sat__f ssao_sat__if_positive(ssao_sat__f a, ssao_sat__f b)
-{
-    SSAO_SAT__EACH(ssao_sat__f, a.v[k] > 0 ? b.v[k] : 0);
-}
-static inline int ssao_sat__any_positive(ssao_sat__f a) { return a.v[0] > 0 || a.v[1] > 0 || a.v[2] > 0 || a.v[3] > 0; }
-static inline ssao_sat__i ssao_sat__load_i(const uint32_t *p) { SSAO_SAT__EACH(ssao_sat__i, p[k]); }
-static inline void ssao_sat__store_i(uint32_t *p, ssao_sat__i v)
-{
-    p[0] = v.v[0];
-    p[1] = v.v[1];
-    p[2] = v.v[2];
-    p[3] = v.v[3];
-}
-static inline ssao_sat__i ssao_sat__add_i(ssao_sat__i a, ssao_sat__i b)
-{
-    SSAO_SAT__EACH(ssao_sat__i, a.v[k] + b.v[k]);
-}
-static inline ssao_sat__i ssao_sat__sub_i(ssao_sat__i a, ssao_sat__i b)
-{
-    SSAO_SAT__EACH(ssao_sat__i, a.v[k] - b.v[k]);
-}
-static inline ssao_sat__f ssao_sat__to_f(ssao_sat__i a) { SSAO_SAT__EACH(ssao_sat__f, (float)(int32_t)a.v[k]); }
-static inline void ssao_sat__transpose(ssao_sat__f *m)
-{
-    ssao_sat__f t[4];
-    int i, k;
-    for (i = 0; i < 4; i++) t[i] = m[i];
-    for (i = 0; i < 4; i++)
-        for (k = 0; k < 4; k++) m[i].v[k] = t[k].v[i];
-}
-#undef SSAO_SAT__EACH
-#undef SSAO_SAT__LANE
 #endif
 
 /* ------------------------------------------------------------------------------------------------
@@ -578,6 +512,7 @@ enum {
     SSAO_SAT__PAD = 16,       /* words of nothing left and right of a row: neighbours may be read blindly */
     SSAO_SAT__MAX_SLABS = 16,
     SSAO_SAT__MAX_SCALES = 4,
+    SSAO_SAT__BLOCK = 8,      /* table pixels of a row that are asked for a slab together */
     SSAO_SAT__GRID = 32,      /* the slabs are cut from a sample of 32 x 32 depths ... */
     SSAO_SAT__SPACING = 4,    /* of the table pixels that are estimated in any case; a power of 2 */
     SSAO_SAT__TRIM = 4        /* ... less the nearest and farthest 4 of its 256 blocks */
@@ -590,7 +525,7 @@ enum {
 #define SSAO_SAT__SHARPNESS 50 /* upsampling: a neighbour off the tangent plane by 1/50 of the distance has no weight */
 #define SSAO_SAT__BEND 0.2f   /* there is interpolation between neighbours on a plane up to a tenth of a radius, */
 #define SSAO_SAT__ALIKE 0.9f  /* with normals less than 25 degrees apart */
-#define SSAO_SAT__COARSE 10   /* half side from which it may be between those two apart */
+#define SSAO_SAT__COARSE 6    /* half side from which it may be between those two apart */
 #define SSAO_SAT__FAR 1e18f   /* distances beyond are sky: their squares would overflow */
 
 /* What was fitted to ray-traced references by tests/bench/bench_ssao_sat.c. reach: half side of the region in radii.
@@ -676,6 +611,8 @@ struct ssao_sat {
                                SSAO_SAT__NOTHING */
     size_t word_stride;
     uint32_t *row_slabs;    /* which slabs occur in the row */
+    uint32_t *block_slabs;  /* and in each BLOCK pixels of it */
+    size_t blocks;          /* in a row */
     uint32_t *table, *flags;
     float *scratch;         /* per worker: a row of the picture */
     ssao_sat__worker *workers;
@@ -744,7 +681,7 @@ static const sat__field ssao_sat__fields[] = {
     SAT__FIELD(ssao_sat_options, 'i', band_rows, 0, 16, 32768, '0'),
     SAT__FIELD(ssao_sat_options, 'i', bottom_up, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', skip_flat, 1, 0, 1, ' '),
-    SAT__FIELD(ssao_sat_options, 'd', tolerance, 0.03, 0, 1, ' '),
+    SAT__FIELD(ssao_sat_options, 'd', tolerance, 0.04, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', geometric, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', gl_bent, 0, 0, 1, ' '),
     SAT__FIELD(ssao_sat_options, 'i', gl_signed, 0, 0, 1, ' '),
@@ -949,7 +886,7 @@ static ssao_sat__vector ssao_sat__depth_normal(const ssao_sat *s, int x, int y, 
     return n;
 }
 
-/* The given normal, made unit; from depth when there is none or when it is no direction. */
+/* The given normal, made unit; from depth when there is none or when it is no direction. stats may be NULL. */
 static inline ssao_sat__vector ssao_sat__normal(const ssao_sat *s, int x, int y, float z, ssao_sat_stats *stats)
 {
     ssao_sat__vector n;
@@ -963,7 +900,7 @@ static inline ssao_sat__vector ssao_sat__normal(const ssao_sat *s, int x, int y,
     n.z = s->camera.forward * p[2];
     square = n.x * n.x + n.y * n.y + n.z * n.z;
     if (!sat__is_finite(square) || !(square > 1e-20f)) {
-        stats->normals_replaced++;
+        if (stats) stats->normals_replaced++;
         return ssao_sat__depth_normal(s, x, y, z);
     }
     if (fabsf(square - 1) > 1e-6f) {
@@ -972,6 +909,7 @@ static inline ssao_sat__vector ssao_sat__normal(const ssao_sat *s, int x, int y,
         n.y *= square;
         n.z *= square;
     }
+    if (!stats) return n;
     if (s->camera.orthographic) stats->normals_backfacing += n.z > 0;
     else {
         ssao_sat__vector ray = ssao_sat__position(s, x, y, 1);
@@ -1241,11 +1179,13 @@ static inline uint32_t ssao_sat__is_rough(const float *a, int x, float limit)
 }
 
 #ifndef SSAO_SAT_NO_SLABS
-/* Words of one row of the picture; `affine` (columns * step + 1 of them, 0: nothing) is turned into them. */
+/* Words of one row of the picture; `affine` (columns * step + 1 of them, 0: nothing) is turned into them. Which slabs
+   occur in the row, and in each BLOCK table pixels of it. */
 static void ssao_sat__classify_row(ssao_sat *s, int y, const float *z, float *affine, uint32_t *words)
 {
-    int x, k, slabs = s->frame_slabs, n = s->columns * s->step;
-    uint32_t found = 0;
+    uint32_t *found = s->block_slabs + (size_t)(y - s->first) * s->blocks;
+    const int slabs = s->frame_slabs, n = s->columns * s->step, block = SSAO_SAT__BLOCK * s->step;
+    int x, k;
     for (x = 0; x < n; x++) affine[x] = z[x] > 0 ? ssao_sat__affine(s, z[x]) : 0;
     affine[n] = 0;
     for (x = 0; x < n; x++) {
@@ -1256,9 +1196,9 @@ static void ssao_sat__classify_row(ssao_sat *s, int y, const float *z, float *af
         }
         for (k = 1; k < slabs; k++) index += z[x] >= s->edge[k];
         words[x] = (uint32_t)index << SSAO_SAT__LEVEL_BITS | ssao_sat__level(&s->slabs[index], affine[x]);
-        found |= 1u << index;
+        found[x / block] |= 1u << index;
     }
-    s->row_slabs[y - s->first] |= found;
+    for (x = 0; x < (int)s->blocks; x++) s->row_slabs[y - s->first] |= found[x];
     for (x = 0; x + 2 < n && s->step == 2; x += 2) words[x] |= ssao_sat__is_rough(affine, x, s->flat_limit);
 }
 
@@ -1269,6 +1209,7 @@ static void ssao_sat__hold_words(ssao_sat *s, int y, float *scratch, ssao_sat__w
     float *z = scratch, *affine = scratch + 2 * s->stride;
     size_t at = ssao_sat__at(s, y);
     s->row_slabs[y - s->first] = 0;
+    memset(s->block_slabs + (size_t)(y - s->first) * s->blocks, 0, s->blocks * sizeof *s->block_slabs);
     for (j = 0; j < s->step; j++) {
         uint32_t *words = s->words + ((size_t)(y - s->first) * (size_t)s->step + (size_t)j) * s->word_stride;
         int row = y * s->step + j;
@@ -1292,8 +1233,7 @@ static void ssao_sat__hold_rows(int begin, int end, int worker, void *context)
     for (i = begin; i < end; i++) {
         int y = s->first + i;
         size_t at = ssao_sat__at(s, y);
-        ssao_sat_stats unused, *stats = y >= s->begin && y < s->end ? &w->stats : &unused;
-        memset(&unused, 0, sizeof unused);
+        ssao_sat_stats *stats = y >= s->begin && y < s->end ? &w->stats : NULL;
         ssao_sat__read_row(s, y * s->step, 0, s->width, s->step, s->z + at, s->nx + at, s->ny + at, s->nz + at,
                            stats);
 #ifndef SSAO_SAT_NO_SLABS
@@ -1331,9 +1271,10 @@ static void ssao_sat__build_slab(ssao_sat *s, int k)
         memset(o, 0, 4 * sizeof *o);
         sum = ssao_sat__load_i(o);
         for (x = 0; x < s->columns; x++) {
+            const int holds = s->block_slabs[(size_t)row * s->blocks + (size_t)(x / SSAO_SAT__BLOCK)] >> k & 1;
             o += 4;
             above += 4;
-            for (i = 0; i < step * step; i++) {
+            for (i = 0; holds && i < step * step; i++) {
                 uint32_t w = words[(size_t)(i / step) * s->word_stride + (size_t)(x * step + i % step)];
                 if ((int)(w >> SSAO_SAT__LEVEL_BITS & 31) != k) continue;
                 word[1] = w & ((1u << SSAO_SAT__LEVEL_BITS) - 1);
@@ -2259,9 +2200,7 @@ static inline int ssao_sat__is_open(const ssao_sat *s, int y, int first)
 /* Every second pixel of row y, from x0 on, into r. */
 static void ssao_sat__upsample_row(const ssao_sat *s, const ssao_sat__picture_row *r, int x0, int y)
 {
-    ssao_sat_stats unused;
     int i;
-    memset(&unused, 0, sizeof unused);
     for (i = 0; x0 + 2 * i < s->width; i += 4) {
         int x = x0 + 2 * i;
         if (ssao_sat__is_open(s, y, i)) {
@@ -2270,7 +2209,7 @@ static void ssao_sat__upsample_row(const ssao_sat *s, const ssao_sat__picture_ro
             continue;
         }
         ssao_sat__read_row(s, y, x, sat__min_int(x + 8, s->width), 2, r->z + i, r->nx + i, r->ny + i, r->nz + i,
-                           &unused);
+                           NULL);
         ssao_sat__upsample_lanes(s, r, x0, y, i);
     }
 }
@@ -2425,12 +2364,10 @@ static void ssao_sat__compare_normals(const ssao_sat *s, ssao_sat_stats *stats)
     for (j = 0; j < SSAO_SAT__GRID && s->input.normals; j++)
         for (i = 0; i < SSAO_SAT__GRID; i++) {
             ssao_sat__vector given, n;
-            ssao_sat_stats unused;
             float z = ssao_sat__sample(s, i, j);
             if (!(z > 0)) continue;
-            memset(&unused, 0, sizeof unused);
             ssao_sat__sample_at(s, i, j, &x, &y);
-            given = ssao_sat__normal(s, x, y, z, &unused);
+            given = ssao_sat__normal(s, x, y, z, NULL);
             n = ssao_sat__depth_normal(s, x, y, z);
             stats->normals_compared++;
             stats->normals_off += given.x * n.x + given.y * n.y + given.z * n.z < 0.7f;
@@ -2687,6 +2624,8 @@ static int ssao_sat__lay_out(ssao_sat *s, sat__arena *arena)
     s->word_stride = ((size_t)s->columns * (size_t)s->step + 15) / 16 * 16;
     s->words = (uint32_t *)sat__carve(arena, s->tables > 1 ? rows * (size_t)s->step * s->word_stride : 0, 4);
     s->row_slabs = (uint32_t *)sat__carve(arena, rows, 4);
+    s->blocks = ((size_t)s->columns + SSAO_SAT__BLOCK - 1) / SSAO_SAT__BLOCK;
+    s->block_slabs = (uint32_t *)sat__carve(arena, s->tables > 1 ? rows * s->blocks : 0, 4);
     s->table = (uint32_t *)sat__carve(arena, words, 4);
     s->flags = (uint32_t *)sat__carve(arena, s->tables > 1 ? s->table_plane : 0, 4);
     s->scratch = (float *)sat__carve(arena, (size_t)sat__worker_count(&s->options.threads) * 8, s->stride * 4);
