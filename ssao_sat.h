@@ -32,21 +32,20 @@
    - One matrix decides the convention: linear, hardware or reversed depth, [-1,1] or [0,1], infinite far planes,
      off-centre, flipped, left-handed, orthographic, jittered, an oblique near plane (mirrors, water). What must be 0
      may be the rounding of a matrix product. A depth kind that contradicts the matrix is refused.
-   - No pixel moves the frame and a small object hardly does (a bird nearer than all else: by 0.0002 on average, 0.035
-     at most): depth ranges leave out the nearest and farthest 4 of 256 blocks of a sample, and what lies beyond is in
-     the end slabs.
+   - No pixel moves the frame, nor does a small object nearer or farther than all else (a bird): depth ranges leave out
+     the nearest and farthest 4 of 256 blocks of a sample, and what lies beyond is in the end slabs.
    - Half-resolution tables (SLABS: of all pixels, so a wire counts at every column) with an upsample that knows planes
      and never reads sky; bent normals; signed depth unsharp masking; bands of rows for stills of any size; statistics
      of what was left out and of normals in the wrong space; 8 bits, half floats or floats; other sizes and options
-     without a new object; OpenGL 3.3 / ES 3.0, nothing compiled in a frame.
+     without a new object; OpenGL 3.3 / ES 3.0 with all of it, nothing compiled in a frame.
+   - Pixels between estimates that agree are not estimated (options.tolerance): two thirds of what is in reach.
 
    WHAT IT DOES NOT
 
    - It sees what the depth buffer holds: occluders off the screen or behind others do not count. Nothing is assumed
      about thickness, so thin poles darken a little what lies behind them.
    - No temporal accumulation: there is no noise to accumulate away. No shading: the accessibility is yours to multiply.
-   - Logarithmic depth is not decoded: give distances. The upsample's
-     weights are no output: they are nine a pixel, and follow from depth and normals alone.
+   - Logarithmic depth is not decoded: give distances.
    - GTAO at half resolution has about the same error in less time (COST), at small radii a smaller one: cells average
      what samples resolve.
    - Smooth normals on a coarse mesh are believed: its facets then darken at their edges, unless options.geometric is
@@ -114,10 +113,10 @@
 
    COST
 
-   Work a table pixel: 16 lookups a ring and slab in reach; flat regions cost 4. Fitted and measured at 512 x 512 with
-   256 rays a pixel, radii 0.1, 0.25, 0.6, gcc -O2 (SSE2), by fit_ssao_sat and bench_ssao_sat. The peers are four lanes
-   wide as the slabs are, and at half resolution run in the slabs' own frame. RMSE of three scenes, to which the slabs'
-   kernel and the peers' parameters were fitted:
+   Work a table pixel that is estimated: 16 lookups a ring and slab in reach; flat regions cost 4, what lies between
+   estimates nothing. Fitted and measured at 512 x 512 with 256 rays a pixel, radii 0.1, 0.25, 0.6, gcc -O2 (SSE2), by
+   fit_ssao_sat and bench_ssao_sat. The peers are four lanes wide as the slabs are, and at half resolution run in the
+   slabs' own frame. RMSE of three scenes, to which the slabs' kernel and the peers' parameters were fitted:
 
      slabs (default) 0.058      4 slabs 0.060                   full resolution 0.058
      XeGTAO, half resolution:   low 0.087, medium 0.064, high 0.057, ultra 0.056
@@ -128,24 +127,25 @@
 
    Scenes that nothing was fitted to, RMSE on other objects, on grass and poles, in a hall of 40 m:
 
-     slabs (default)               0.038   0.104   0.064
-     4 slabs                       0.041   0.113   0.067
+     slabs (default)               0.038   0.104   0.065
+     4 slabs                       0.040   0.113   0.067
      XeGTAO high, half and full    0.048   0.131   0.060    0.048   0.116   0.060
      XeGTAO ultra, half and full   0.047   0.125   0.059    0.046   0.115   0.055
      bitmask 4 x (8 + 8), the same 0.046   0.168   0.059    0.043   0.155   0.054
      HBAO 16 x 8, half and full    0.050   0.088   0.057    0.050   0.082   0.051
 
-   Time, 1 = XeGTAO high at half resolution: slabs 1.4, 4 slabs 1.3; XeGTAO low 0.67, ultra 2.3; bitmask 1.4 and 3.7;
-   HBAO 2.5; at full resolution slabs 5.1, XeGTAO 3.1 and 7.8, bitmask 14, HBAO 11; GTAO in scalar C at half resolution
-   3.9; plane 0.84 with one box, 1.3 with 2 x 2; minimalist 0.66. So XeGTAO is the faster on scenes it was fitted to,
-   for about the same error; the slabs carry over better to other objects, and have no noise to denoise. A gliding
-   camera changes the result by 0.0013 a frame in the corner, 0.0014 in the room, 0.010 in grass, 0.0010 in the hall;
-   XeGTAO high at half resolution by 0.0015, 0.0023, 0.030, 0.0010; HBAO by 0.0011, 0.0015, 0.013, 0.0007. Time grows
-   with the radius, because more slabs come into reach and less is flat: radii 0.1 : 0.25 : 0.6 cost 1 : 1.7 : 2.4,
-   XeGTAO 1 : 1.0 : 1.1. Leaving out flat regions and rings changes nothing in the output. Bent normals cost a tenth or
-   so and are 1 to 7 degrees off the ray-traced ones. RMSE of the others, fitted scenes and other objects: plane 0.118
-   and 0.103, 2 x 2 0.103 and 0.092; minimalist 0.184 and 0.139, normal-guided 0.174 and 0.222, refined 0.173 and
-   0.148.
+   Time, 1 = XeGTAO high at half resolution: slabs 1.1, 4 slabs 1.0, with tolerance 0 1.5; XeGTAO low 0.67, ultra
+   2.3; bitmask 1.4 and 3.7; HBAO 2.5; at full resolution slabs 2.6, XeGTAO 3.1 and 7.8, bitmask 14, HBAO 11; GTAO in
+   scalar C at half resolution 3.9; plane 0.84 with one box, 1.3 with 2 x 2; minimalist 0.66. So XeGTAO is a little
+   faster on scenes it was fitted to, for about the same error; the slabs carry over better to other objects, and
+   have no noise to denoise. A gliding camera changes the result by 0.0014 a frame in the corner, 0.0015 in the room,
+   0.010 in grass, 0.0011 in the hall; XeGTAO high at half resolution by 0.0015, 0.0023, 0.030, 0.0010; HBAO by
+   0.0011, 0.0015, 0.013, 0.0007. Time grows with the radius, because more slabs come into reach and less is flat:
+   radii 0.1 : 0.25 : 0.6 cost 1 : 1.2 : 1.6, XeGTAO 1 : 1.0 : 1.1. Leaving out flat regions and rings changes
+   nothing in the output; what lies between estimates is 0.002 RMS off an estimate and no farther from the ray
+   tracer. Bent normals cost a tenth or so and are 1 to 7 degrees off the ray-traced ones. RMSE of the others, fitted
+   scenes and other objects: plane 0.118 and 0.103, 2 x 2 0.103 and 0.092; minimalist 0.184 and 0.139, normal-guided
+   0.174 and 0.222, refined 0.173 and 0.148.
    Box means of 1/z at 4096 x 4096: 5e-6 of a depth step off, where float tables are 0.6 off.
 */
 
@@ -363,6 +363,11 @@ SSAO_SAT_DEF float ssao_sat_multi_bounce(float accessibility, float albedo);
    the bent normal and that of the reflection. cosine: between bent normal and reflected view direction; roughness
    0..1. */
 SSAO_SAT_DEF float ssao_sat_specular(float accessibility, float cosine, float roughness);
+/* What the upsample weighs a neighbour by, for half-resolution effects of your own: 1 on the same plane with the same
+   normal, 1e-4 on another surface. View positions and unit normals (xyz) of a pixel and of the one taken from; times
+   1 / ((1 + dx^2) (1 + dy^2)) of the distance in pixels, over the 3 x 3 nearest that are not sky. 0 for NULL. */
+SSAO_SAT_DEF float ssao_sat_edge(const float *position, const float *normal, const float *from,
+                                 const float *from_normal);
 SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao); /* NULL is fine */
 
 #ifdef __cplusplus
@@ -427,7 +432,9 @@ SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl); /* NULL is fine */
        vec3  ssao_sat_position(vec4 view[3], ivec2 pixel, float z)
            z points forward
        vec3  ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z)
-           the same axes */
+           the same axes
+       float ssao_sat_edge(vec3 p, vec3 n, vec3 from, vec3 from_n)
+           see above; z forward, from ssao_sat_position */
 SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void);
 SSAO_SAT_DEF sat_result ssao_sat_gl_view(float *view, const ssao_sat_input *input, int bottom_up);
 
@@ -522,7 +529,8 @@ enum {
 #define SSAO_SAT__BEYOND 0.73f /* of a side's weight that the border takes, to the cells beside the pixel: a corner
                                   keeps its value */
 #define SSAO_SAT__BLOCKED 2.0f  /* length of blocked directions against occlusion, fitted */
-#define SSAO_SAT__SHARPNESS 50 /* upsampling: a neighbour off the tangent plane by 1/50 of the distance has no weight */
+#define SSAO_SAT__SHARPNESS 50 /* upsampling: a neighbour off the tangent plane by 1/50 of the distance has no weight; in
+                                  GLSL too */
 #define SSAO_SAT__BEND 0.2f   /* there is interpolation between neighbours on a plane up to a tenth of a radius, */
 #define SSAO_SAT__ALIKE 0.9f  /* with normals less than 25 degrees apart */
 #define SSAO_SAT__COARSE 6    /* half side from which it may be between those two apart */
@@ -1026,7 +1034,7 @@ static void ssao_sat__count_depths(const ssao_sat *s, float *share, float low, f
     for (j = 0; j < SSAO_SAT__GRID; j++)
         for (i = 0; i < SSAO_SAT__GRID; i++) {
             float z = ssao_sat__sample(s, i, j);
-            if (!(z > 0)) continue;
+            if (!(z >= s->nearest && z <= s->farthest)) continue; /* nothing, or what the range leaves out */
             count[range > 0 ? sat__clamp_int((int)((ssao_sat__scale_depth(s, z) - low) / range * SSAO_SAT__BINS), 0,
                                              SSAO_SAT__BINS - 1)
                             : 0]++;
@@ -2729,6 +2737,22 @@ SSAO_SAT_DEF float ssao_sat_specular(float accessibility, float cosine, float ro
     return full / all * share * share * (3 - 2 * share);
 }
 
+SSAO_SAT_DEF float ssao_sat_edge(const float *position, const float *normal, const float *from,
+                                 const float *from_normal)
+{
+    float off = 0, alike = 0, plane, z;
+    int i;
+    if (!position || !normal || !from || !from_normal) return 0;
+    for (i = 0; i < 3; i++) {
+        off += normal[i] * (from[i] - position[i]);
+        alike += normal[i] * from_normal[i];
+    }
+    z = fabsf(position[2]);
+    plane = 1 - fabsf(off) * SSAO_SAT__SHARPNESS / (z > 1 / SSAO_SAT__FAR ? z : 1 / SSAO_SAT__FAR);
+    alike = alike > 0 ? alike * alike : 0;
+    return (plane > 0 ? plane : 0) * alike * alike + 1e-4f;
+}
+
 SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao)
 {
     sat_allocator allocator;
@@ -2810,6 +2834,11 @@ SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void)
                 n = normalize(n);
                 facing = facing > 0.5 ? n.z : dot(n, ssao_sat_position(view, pixel, z));
                 return facing > 0.0 ? -n : n;
+            })
+        SAT__GLSL(
+            float ssao_sat_edge(vec3 p, vec3 n, vec3 from, vec3 from_n) {
+                float alike = max(dot(n, from_n), 0.0), plane = max(0.0, 1.0 - abs(dot(n, from - p)) * 50.0 / p.z);
+                return plane * alike * alike * alike * alike + 1e-4;
             })
         SAT__GLSL(
             vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z) {
@@ -2900,7 +2929,7 @@ static const char ssao_sat__gl_shares[] =
                 bin = floor(gl_FragCoord.x);
             for (int j = 0; j < GRID * GRID; j++) {
                 float z = distance_at(STEP * ((2 * ivec2(j % GRID, j / GRID) + 1) * size / (2 * GRID)));
-                if (!(z > 0.0)) continue;
+                if (!(z >= range.x && z <= range.y)) continue;
                 all += 1.0;
                 if ((width > 0.0 ? clamp(floor((scaled(z) - low) / width * float(BINS)), 0.0, float(BINS - 1)) : 0.0)
                     < bin) below += 1.0;
@@ -3266,11 +3295,9 @@ static const char ssao_sat__gl_upsample[] =
                 for (int i = -1; i <= 1; i++) {
                     ivec2 t = at / 2 + ivec2(i, j), off = 2 * t - at;
                     if (any(lessThan(t, ivec2(0))) || any(greaterThanEqual(t, size))) continue;
-                    float zt = distance_at(2 * t), alike;
+                    float zt = distance_at(2 * t);
                     if (!(zt > 0.0)) continue;
-                    alike = max(dot(n, normal_at(2 * t, zt)), 0.0);
-                    float plane = max(0.0, 1.0 - abs(dot(n, ssao_sat_position(view, 2 * t, zt) - p)) * SHARPNESS / z);
-                    float weight = (plane * alike * alike * alike * alike + 1e-4)
+                    float weight = ssao_sat_edge(p, n, ssao_sat_position(view, 2 * t, zt), normal_at(2 * t, zt))
                         / float((1 + off.x * off.x) * (1 + off.y * off.y));
                     total += weight;
                     sum += weight * texelFetch(coarse, t, 0);
@@ -3388,7 +3415,6 @@ static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *co
     sat__gl_define(&g->gl, "TRIM", SSAO_SAT__TRIM);
     sat__gl_define_float(&g->gl, "BEYOND", SSAO_SAT__BEYOND);
     sat__gl_define_float(&g->gl, "MARGIN", SSAO_SAT__MARGIN);
-    sat__gl_define_float(&g->gl, "SHARPNESS", SSAO_SAT__SHARPNESS);
     sat__gl_define(&g->gl, "BENT", output == SSAO_SAT__GL_BENT);
     sat__gl_define_float(&g->gl, "BLANK", output == SSAO_SAT__GL_SIGNED ? 0 : 1);
     sat__gl_define_float(&g->gl, "BLOCKED", SSAO_SAT__BLOCKED);

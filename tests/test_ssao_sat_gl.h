@@ -375,7 +375,8 @@ TEST(gpu_functions_for_other_shaders)
         "void main() {\n"
         "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
         "    float z = ssao_sat_distance(view, texelFetch(depth, p, 0).r);\n"
-        "    color = vec4(ssao_sat_position(view, p, z) + ssao_sat_depth_normal(view, depth, p, z), z);\n"
+        "    vec3 at = ssao_sat_position(view, p, z), n = ssao_sat_depth_normal(view, depth, p, z);\n"
+        "    color = vec4(at + n, ssao_sat_edge(at, n, at, n));\n"
         "}\n", NULL};
     const char *library[2];
     sat__gl_shaders shaders;
