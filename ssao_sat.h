@@ -1034,7 +1034,8 @@ static void ssao_sat__count_depths(const ssao_sat *s, float *share, float low, f
     for (j = 0; j < SSAO_SAT__GRID; j++)
         for (i = 0; i < SSAO_SAT__GRID; i++) {
             float z = ssao_sat__sample(s, i, j);
-            if (!(z >= s->nearest && z <= s->farthest)) continue; /* nothing, or what the range leaves out */
+            /* nothing, or what the range leaves out; the slack is for the rounding of what lies at its ends */
+            if (!(z >= 0.999f * s->nearest && z <= 1.001f * s->farthest)) continue;
             count[range > 0 ? sat__clamp_int((int)((ssao_sat__scale_depth(s, z) - low) / range * SSAO_SAT__BINS), 0,
                                              SSAO_SAT__BINS - 1)
                             : 0]++;
@@ -2929,7 +2930,7 @@ static const char ssao_sat__gl_shares[] =
                 bin = floor(gl_FragCoord.x);
             for (int j = 0; j < GRID * GRID; j++) {
                 float z = distance_at(STEP * ((2 * ivec2(j % GRID, j / GRID) + 1) * size / (2 * GRID)));
-                if (!(z >= range.x && z <= range.y)) continue;
+                if (!(z >= 0.999 * range.x && z <= 1.001 * range.y)) continue;
                 all += 1.0;
                 if ((width > 0.0 ? clamp(floor((scaled(z) - low) / width * float(BINS)), 0.0, float(BINS - 1)) : 0.0)
                     < bin) below += 1.0;
