@@ -1297,12 +1297,9 @@ FIV_DEF sat_result fiv_environment_create(fiv_environment **out, const sat_image
     memset(&arena, 0, sizeof arena);
     sat__carve(&arena, 1, sizeof e);
     fiv__environment_layout(&e, &arena);
-    e.block_size = arena.used + 63;
-    e.block = sat__alloc(&e.allocator, e.block_size);
-    if (!e.block) return SAT_ERR_MEMORY;
+    result = sat__arena_allocate(&arena, &e.block, &e.block_size, &e.allocator);
+    if (result != SAT_OK) return result;
     e.stats.bytes = e.block_size;
-    memset(&arena, 0, sizeof arena);
-    arena.base = sat__align64(e.block);
     made = (fiv_environment *)sat__carve(&arena, 1, sizeof e);
     fiv__environment_layout(&e, &arena);
     *made = e;
@@ -1455,24 +1452,6 @@ typedef struct fiv__mesh {
     unsigned char *corner;     /* 3 a triangle, into the cluster's vertices */
 } fiv__mesh;
 
-/* Radix sort of keys by their bytes [low, high); scratch holds n. Returns whichever of the two arrays is sorted. */
-static uint64_t *fiv__sort(uint64_t *keys, uint64_t *scratch, size_t n, int low, int high)
-{
-    int byte;
-    size_t i;
-    for (byte = low; byte < high; byte++) {
-        size_t count[257];
-        uint64_t *swap = keys;
-        memset(count, 0, sizeof count);
-        for (i = 0; i < n; i++) count[((keys[i] >> (8 * byte)) & 255) + 1]++;
-        for (i = 0; i < 256; i++) count[i + 1] += count[i];
-        for (i = 0; i < n; i++) scratch[count[(keys[i] >> (8 * byte)) & 255]++] = keys[i];
-        keys = scratch;
-        scratch = swap;
-    }
-    return keys;
-}
-
 static int fiv__triangle_is_usable(const float *positions, const unsigned *t)
 {
     int i, k;
@@ -1494,7 +1473,7 @@ static int fiv__is_closed(const uint64_t *triangles, size_t count, const unsigne
             uint64_t a = t[k], b = t[(k + 1) % 3];
             keys[n++] = a < b ? a << 32 | b << 1 : b << 32 | a << 1 | 1;
         }
-    keys = fiv__sort(keys, scratch, n, 0, 8);
+    keys = sat__radix_sort(keys, scratch, n, 0, 64, 8);
     for (i = 0; i < n;) {
         size_t j = i;
         long balance = 0;
@@ -1542,7 +1521,7 @@ static uint64_t *fiv__order_triangles(uint64_t *order, uint64_t *scratch, size_t
         order[i] |= key << 32;
     }
     *count = n;
-    return fiv__sort(order, scratch, n, 4, 8);
+    return sat__radix_sort(order, scratch, n, 32, 64, 8);
 }
 
 /* Cuts the ordered triangles into clusters, each with its own list of vertices. */
@@ -2339,15 +2318,13 @@ static sat_result fiv__allocate_occluder(fiv_occluder **out, const fiv_occluder 
 {
     fiv_occluder o = *from, *made;
     sat__arena arena;
+    sat_result result;
     memset(&arena, 0, sizeof arena);
     sat__carve(&arena, 1, sizeof o);
     fiv__occluder_layout(&o, &arena);
-    if (arena.overflow || fiv__grid_samples(&o.grid) > 0x7fffffff) return SAT_ERR_SIZE;
-    o.block_size = arena.used + 63;
-    o.block = sat__alloc(&o.allocator, o.block_size);
-    if (!o.block) return SAT_ERR_MEMORY;
-    memset(&arena, 0, sizeof arena);
-    arena.base = sat__align64(o.block);
+    if (fiv__grid_samples(&o.grid) > 0x7fffffff) return SAT_ERR_SIZE;
+    result = sat__arena_allocate(&arena, &o.block, &o.block_size, &o.allocator);
+    if (result != SAT_OK) return result;
     made = (fiv_occluder *)sat__carve(&arena, 1, sizeof o);
     fiv__occluder_layout(&o, &arena);
     o.stats.samples = fiv__grid_samples(&o.grid);
@@ -2691,6 +2668,7 @@ static sat_result fiv__read_mesh(fiv_occluder *o, const float *positions, const 
 {
     fiv__mesh *mesh = &o->mesh;
     sat__arena arena;
+    sat_result result;
     uint64_t *scratch, *order;
     size_t size, usable = 0, k;
     for (k = 0; k < triangle_count; k++) usable += (size_t)fiv__triangle_is_usable(positions, indices + 3 * k);
@@ -2698,14 +2676,11 @@ static sat_result fiv__read_mesh(fiv_occluder *o, const float *positions, const 
     mesh->cluster_count = (usable + FIV__CLUSTER - 1) / FIV__CLUSTER;
     memset(&arena, 0, sizeof arena);
     fiv__mesh_layout(mesh, &arena);
-    if (arena.overflow || !sat__multiply_size(&size, triangle_count, 8 * sizeof *scratch)) return SAT_ERR_SIZE;
-    o->mesh_size = arena.used + 63;
-    o->mesh_block = sat__alloc(&o->allocator, o->mesh_size);
-    if (!o->mesh_block) return SAT_ERR_MEMORY;
+    if (!sat__multiply_size(&size, triangle_count, 8 * sizeof *scratch)) return SAT_ERR_SIZE;
+    result = sat__arena_allocate(&arena, &o->mesh_block, &o->mesh_size, &o->allocator);
+    if (result != SAT_OK) return result;
     scratch = (uint64_t *)sat__alloc(&o->allocator, size);
     if (!scratch) return SAT_ERR_MEMORY;
-    memset(&arena, 0, sizeof arena);
-    arena.base = sat__align64(o->mesh_block);
     fiv__mesh_layout(mesh, &arena);
     order = fiv__order_triangles(scratch, scratch + triangle_count, &usable, positions, indices, triangle_count);
     mesh->closed = fiv__is_closed(order, usable, indices, scratch + 2 * triangle_count, scratch + 5 * triangle_count);
@@ -4420,19 +4395,16 @@ static int fiv__load_mesh(fiv__mesh *m, const unsigned char *p)
 static sat_result fiv__allocate_loaded(fiv_occluder *o, size_t words)
 {
     sat__arena arena;
+    sat_result result;
     o->words_size = words ? words * sizeof(uint16_t) : 1;
     o->words_block = sat__alloc(&o->allocator, o->words_size);
     o->words = (uint16_t *)o->words_block;
     memset(&arena, 0, sizeof arena);
     fiv__mesh_layout(&o->mesh, &arena);
     if (!o->words_block) return SAT_ERR_MEMORY;
-    if (arena.overflow) return SAT_ERR_SIZE;
-    o->mesh_size = arena.used + 63;
-    o->mesh_block = sat__alloc(&o->allocator, o->mesh_size);
-    if (!o->mesh_block) return SAT_ERR_MEMORY;
+    result = sat__arena_allocate(&arena, &o->mesh_block, &o->mesh_size, &o->allocator);
+    if (result != SAT_OK) return result;
     memset(o->mesh_block, 0, o->mesh_size);
-    memset(&arena, 0, sizeof arena);
-    arena.base = sat__align64(o->mesh_block);
     fiv__mesh_layout(&o->mesh, &arena);
     return SAT_OK;
 }

@@ -2340,7 +2340,6 @@ typedef struct raindrop__visible {
     uint32_t rows;
 } raindrop__visible;
 
-typedef struct raindrop__pair { uint32_t key, at; } raindrop__pair;
 
 /* Why a drop is drawn or not, as in raindrop_render_stats. */
 typedef enum raindrop__fate {
@@ -2366,7 +2365,7 @@ struct raindrop_rain {
     double time;              /* seconds so far, less whole RAINDROP__PERIODs: phases of the oscillations */
     raindrop_rain_options options;
     raindrop__visible *visible;
-    raindrop__pair *pairs[2];
+    uint64_t *pairs[2];         /* the bits of the depth, inverted, and the place in visible below them */
     uint32_t *rows;           /* visible[].rows in drawing order: what a band scans */
     raindrop__chunk *chunks;
     int *unsettled;           /* a flag a chunk */
@@ -2756,8 +2755,8 @@ static inline void raindrop__rain_layout(raindrop_rain *rain, sat__arena *arena,
     sat__carve(arena, 1, sizeof *rain);
     rain->drops = (raindrop_drop *)sat__carve(arena, n, sizeof(raindrop_drop));
     rain->visible = (raindrop__visible *)sat__carve(arena, n, sizeof(raindrop__visible));
-    rain->pairs[0] = (raindrop__pair *)sat__carve(arena, n, sizeof(raindrop__pair));
-    rain->pairs[1] = (raindrop__pair *)sat__carve(arena, n, sizeof(raindrop__pair));
+    rain->pairs[0] = (uint64_t *)sat__carve(arena, n, sizeof(uint64_t));
+    rain->pairs[1] = (uint64_t *)sat__carve(arena, n, sizeof(uint64_t));
     rain->rows = (uint32_t *)sat__carve(arena, n, sizeof(uint32_t));
     rain->chunks = (raindrop__chunk *)sat__carve(arena, n / RAINDROP__CHUNK + 1, sizeof(raindrop__chunk));
     rain->unsettled = (int *)sat__carve(arena, n / RAINDROP__CHUNK + 1, sizeof(int));
@@ -3116,7 +3115,7 @@ typedef struct raindrop__frame {
     int width, height, visible;
     float focal, half_width, half_height; /* pixels */
     float side_x, side_y;                 /* lengths of the normals of the frustum's sides */
-    const raindrop__pair *order;
+    const uint64_t *order;
     raindrop__water water;                /* with lamps */
 } raindrop__frame;
 
@@ -3432,35 +3431,19 @@ static inline int raindrop__gather_pairs(const raindrop_rain *rain)
     for (chunk = 0; chunk < chunks; chunk++) {
         for (i = 0; i < rain->chunks[chunk].visible; i++, n++) {
             uint32_t at = (uint32_t)(chunk * RAINDROP__CHUNK + i);
-            rain->pairs[0][n].key =
-                ~sat__float_bits(rain->visible[at].depth); /* depths are positive: bits order as values do */
-            rain->pairs[0][n].at = at;
+            /* depths are positive: bits order as values do */
+            rain->pairs[0][n] = (uint64_t)~sat__float_bits(rain->visible[at].depth) << 32 | at;
         }
     }
     return n;
 }
 
-static inline void raindrop__sort_pass(raindrop__pair *out, const raindrop__pair *in, int n, int shift)
+static inline const uint64_t *raindrop__sort(const raindrop_rain *rain, int n, int sort)
 {
-    uint32_t start[2049], digit;
+    const uint64_t *order = rain->pairs[0];
     int i;
-    memset(start, 0, sizeof start);
-    for (i = 0; i < n; i++) start[((in[i].key >> (shift)) & 2047u) + 1]++;
-    for (digit = 1; digit < 2048; digit++) start[digit] += start[digit - 1];
-    for (i = 0; i < n; i++) out[start[(in[i].key >> (shift)) & 2047u]++] = in[i];
-}
-
-static inline const raindrop__pair *raindrop__sort(const raindrop_rain *rain, int n, int sort)
-{
-    const raindrop__pair *order = rain->pairs[0];
-    int i;
-    if (sort) {
-        raindrop__sort_pass(rain->pairs[1], rain->pairs[0], n, 0);
-        raindrop__sort_pass(rain->pairs[0], rain->pairs[1], n, 11);
-        raindrop__sort_pass(rain->pairs[1], rain->pairs[0], n, 22);
-        order = rain->pairs[1];
-    }
-    for (i = 0; i < n; i++) rain->rows[i] = rain->visible[order[i].at].rows;
+    if (sort) order = sat__radix_sort(rain->pairs[0], rain->pairs[1], (size_t)n, 32, 64, 11);
+    for (i = 0; i < n; i++) rain->rows[i] = rain->visible[(uint32_t)order[i]].rows;
     return order;
 }
 
@@ -4394,7 +4377,7 @@ static void raindrop__draw_bands(int begin, int end, int worker, void *context)
         for (i = n = 0; i < frame->visible; i++) {
             uint32_t rows = frame->rain->rows[i];
             if ((int)(rows >> 16) >= y1 || (int)(rows & 0xffffu) <= y0) continue;
-            queue[n] = frame->order[i].at;
+            queue[n] = (uint32_t)frame->order[i];
             raindrop__fetch(&frame->rain->visible[queue[n]]);
             if (++n < QUEUE) continue;
             raindrop__draw_queue(&batch, queue, n, y0, y1);

@@ -757,6 +757,38 @@ static inline unsigned char *sat__align64(void *block)
     return (unsigned char *)block + (63 & (0 - (uintptr_t)block));
 }
 
+/* What was carved so far becomes one block, which the same calls then carve for good. size is the block's, for
+   sat__release; 63 bytes of it are for alignment. */
+static inline sat_result sat__arena_allocate(sat__arena *arena, void **block, size_t *size,
+                                             const sat_allocator *allocator)
+{
+    if (arena->overflow || arena->used > SIZE_MAX / 2 - 63) return SAT_ERR_SIZE;
+    *size = arena->used + 63;
+    *block = sat__alloc(allocator, *size);
+    if (!*block) return SAT_ERR_MEMORY;
+    arena->base = sat__align64(*block);
+    arena->used = 0;
+    return SAT_OK;
+}
+
+/* Stable radix sort of keys by their bits [low, high), `digit` bits a pass, at most 11; scratch holds n. Returns
+   whichever of the two arrays is sorted. */
+static inline uint64_t *sat__radix_sort(uint64_t *keys, uint64_t *scratch, size_t n, int low, int high, int digit)
+{
+    const uint64_t mask = ((uint64_t)1 << digit) - 1;
+    size_t start[2049], i;
+    for (; low < high; low += digit) {
+        uint64_t *swap = keys;
+        memset(start, 0, sizeof start);
+        for (i = 0; i < n; i++) start[((keys[i] >> low) & mask) + 1]++;
+        for (i = 0; i < mask; i++) start[i + 1] += start[i];
+        for (i = 0; i < n; i++) scratch[start[(keys[i] >> low) & mask]++] = keys[i];
+        keys = scratch;
+        scratch = swap;
+    }
+    return keys;
+}
+
 static inline int sat__worker_count(const sat_threads *threads)
 {
     return threads->parallel_for && threads->workers > 1 ? threads->workers : 1;

@@ -3965,6 +3965,7 @@ static sat_result softassign__allocate(softassign **out, const softassign__size 
     softassign *s, measure;
     sat__arena arena = {NULL, 0, 0};
     sat_allocator allocator;
+    sat_result result;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
     if (!sat__resolve_allocator(&allocator, &options->allocator)) return SAT_ERR_ARGUMENT;
@@ -3985,12 +3986,8 @@ static sat_result softassign__allocate(softassign **out, const softassign__size 
     measure.list = sat__min_int(options->neighbours, measure.max_slots);
     sat__carve(&arena, 1, sizeof *s);
     softassign__carve_solver(&measure, &arena, size->features);
-    if (arena.overflow || arena.used > SIZE_MAX / 2) return SAT_ERR_SIZE;
-    measure.bytes = arena.used + 63;
-    measure.block = sat__alloc(&allocator, measure.bytes);
-    if (!measure.block) return SAT_ERR_MEMORY;
-    arena.base = sat__align64(measure.block);
-    arena.used = 0;
+    result = sat__arena_allocate(&arena, &measure.block, &measure.bytes, &allocator);
+    if (result != SAT_OK) return result;
     s = (softassign *)sat__carve(&arena, 1, sizeof *s);
     *s = measure;
     softassign__carve_solver(s, &arena, size->features);

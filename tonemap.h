@@ -2429,6 +2429,7 @@ TONEMAP_DEF sat_result tonemap_create(tonemap **out, int width, int height, cons
     tonemap_options o = options ? *options : tonemap_defaults();
     tonemap shape, *map;
     sat__arena arena;
+    sat_result result;
     void *block;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
@@ -2446,13 +2447,9 @@ TONEMAP_DEF sat_result tonemap_create(tonemap **out, int width, int height, cons
     memset(&arena, 0, sizeof arena);
     sat__carve(&arena, 1, sizeof shape);
     tonemap__carve(&shape, &arena);
-    if (arena.overflow || arena.used > SIZE_MAX / 2 - 63) return SAT_ERR_SIZE;
-    shape.block_size = arena.used + 63;
-    block = sat__alloc(&shape.allocator, shape.block_size);
-    if (!block) return SAT_ERR_MEMORY;
+    result = sat__arena_allocate(&arena, &block, &shape.block_size, &shape.allocator);
+    if (result != SAT_OK) return result;
     memset(block, 0, shape.block_size);
-    memset(&arena, 0, sizeof arena);
-    arena.base = sat__align64(block);
     map = (tonemap *)sat__carve(&arena, 1, sizeof shape);
     *map = shape;
     map->block = block;

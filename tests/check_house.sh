@@ -161,6 +161,14 @@ check_contents() {
         }' "$lib.h")"
 }
 
+# Options change between frames: every OpenGL object has set_options, and structs are compared by their rows, never as
+# memory, whose padding is anything.
+check_options() {
+    empty "X_gl_create without X_gl_set_options" "$(grep -oE "^[A-Z_]+DEF sat_result ${lib}_gl_create\(" "$lib.h" | sort -u | while read -r line; do
+        grep -qE "^[A-Z_]+DEF sat_result ${lib}_gl_set_options\(" "$lib.h" || echo "$line"; done)"
+    empty "structs compared as memory" "$(code "$lib.h" | grep -E "memcmp *\([^;]*(option|sizeof \*?\(?o\b|_input\b)")"
+}
+
 # what vectors and plain C give are the same bits
 check_same_bits() {
     local vectors plain o=build/check/house/$lib/same_bits
@@ -194,5 +202,6 @@ check_comments
 check_shape
 check_snippets
 check_contents
+check_options
 check_same_bits
 finish

@@ -590,7 +590,7 @@ static raindrop__box box_of(const single *s, const raindrop__visible *v)
 }
 
 /* weight: 0 equation 9 with its 200 at the farthest drop, 1 the fourth power of nearness. */
-static void blend_weighted(single *s, const raindrop__pair *order, int n, double farthest, int weight)
+static void blend_weighted(single *s, const uint64_t *order, int n, double farthest, int weight)
 {
     double *sum = (double *)calloc(SIZE * SIZE * 5, sizeof *sum), *at;
     size_t k;
@@ -598,7 +598,7 @@ static void blend_weighted(single *s, const raindrop__pair *order, int n, double
     for (k = 0; k < SIZE * SIZE; k++) sum[5 * k + 4] = 1;
     for (k = 0; k < 3 * SIZE * SIZE; k++) { s->over[0][k] = 0; s->over[1][k] = 1; }
     for (i = 0; i < n; i++) {
-        const raindrop__visible *v = &s->frame.rain->visible[order[i].at];
+        const raindrop__visible *v = &s->frame.rain->visible[(uint32_t)order[i]];
         raindrop__box box = box_of(s, v);
         double z = (double)v->depth, w = weight ? pow(farthest / z, 4) : 0.03 / (1e-5 + pow(z / farthest, 4));
         w = w < 0.01 ? 0.01 : w > 3000 && !weight ? 3000 : w;
@@ -627,14 +627,14 @@ static void blend_weighted(single *s, const raindrop__pair *order, int n, double
 }
 
 /* Slices as raindrop_gl_render has them: thinner the nearer. */
-static void blend_slices(single *s, const raindrop__pair *order, int n, double farthest, int slices)
+static void blend_slices(single *s, const uint64_t *order, int n, double farthest, int slices)
 {
     int i, k;
     memcpy(the.picture, the.background, sizeof(float) * 3 * SIZE * SIZE);
     s->frame.rgb = (unsigned char *)the.picture;
     for (k = slices - 1; k >= 0; k--)
         for (i = 0; i < n; i++) {
-            const raindrop__visible *v = &s->frame.rain->visible[order[i].at];
+            const raindrop__visible *v = &s->frame.rain->visible[(uint32_t)order[i]];
             int at = (int)(sqrt((double)v->depth / farthest) * slices);
             if ((at < slices ? at : slices - 1) == k) raindrop__draw(&s->batch, v, 0, SIZE);
         }
@@ -655,7 +655,7 @@ static void bench_order(void)
         raindrop_rain_options o = raindrop_rain_defaults();
         frame f;
         double farthest = 0;
-        const raindrop__pair *order;
+        const uint64_t *order;
         char name[64];
         if (bench_quick() && k != 1) continue;
         o.count = rains[k].count;
@@ -684,7 +684,7 @@ static void bench_order(void)
         n = raindrop__gather_pairs(f.rain);
         order = f.rain->pairs[0];
         for (i = 0; i < n; i++) {
-            double z = (double)f.rain->visible[order[i].at].depth;
+            double z = (double)f.rain->visible[(uint32_t)order[i]].depth;
             farthest = z > farthest ? z : farthest;
         }
         for (i = 0; i < 4; i++) {
