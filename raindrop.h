@@ -118,8 +118,8 @@
      at least a pixel, as published, are worse than none. 1e6 drops: map 1 .140, ray .62 .0767, auto .59 .0772.
    - Lamps, rain of 25 mm/h with streaks: each a fifth of the frame; oscillation twice the frame, and each lamp then
      two thirds of it. Both off: the time without them.
-   - Lookups in mips: a texel of the octahedral picture 256..2048 wide costs the same; 1024 is as good as 2048 (.0221,
-     .0208). Boxes of a table: 20 to 150 times as long, better for small drops only (12 pixels: .036 against .049).
+   - Lookups in mips: a texel of the octahedral picture 256..2048 wide costs the same; 1024 is as good as 2048 (.0212,
+     .0199). Boxes of a table: 13 to 85 times as long, better for small drops only (12 pixels: .030 against .044).
    - Streaks: RMSE .0004 to .0014 from 64 still moments, 40 to 75 times faster.
    - Sorting is 2 % of a frame.
    - OpenGL, auto, 50000 drops of 2 mm at 512 x 512 on llvmpipe (tests/bench/gpu_raindrop.c), over round, sharp and
