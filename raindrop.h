@@ -95,8 +95,8 @@
      degrees, their light within .5 % of geometrical optics'.
    - RMSE from sorted drops (bench_raindrop, "The order of drops"): in rain of 50 mm/h unsorted ones 1e-5; 1e5 drops
      of 2 mm in the published box unsorted .0067, 4 slices .0004, 16 slices 3e-6; 1e6 of them .022, .0065, .0025.
-     Weighted blending (McGuire and Bavoil 2013) errs 4e-5, .001 to .003 and .008 there: more than four slices
-     everywhere, and in natural rain more than no order at all. It is left out.
+     Weighted blending (McGuire and Bavoil 2013) errs 4e-5, .001 to .003 and .008 there: more than four slices, and in
+     natural rain more than no order at all. It is left out.
    - Lamps: a glint's light within 5 % of traced rays (8 % half a degree beside the bow), its place within a pixel of a
      drop 160 wide; lamps all around sum to a white sky within .5 %. Swinging drops keep the mean light of their streaks
      within .2 %; a still one is the spheroid of the moment.
