@@ -5068,7 +5068,8 @@ typedef struct sat__filter_line {
     sat__span y;
     int channel, radius, y0, y1, giants;
     int held[SAT__LINE_TILES];          /* which tile a slot holds, -1: none */
-    double columns[SAT__LINE_COLUMNS];  /* a slot holds the columns of one tile */
+    double columns[SAT__LINE_COLUMNS + 2 * SAT__LINE_TILES]; /* a slot holds two numbers, of which the second is 0, what
+                                                                is left of the tile, and the columns of one tile */
     double edges[SAT__LINE_TILES];      /* whole tiles of the rows */
     int edge_of[SAT__LINE_TILES];
 } sat__filter_line;
@@ -5078,19 +5079,20 @@ static int sat__tile_width(const sat_table *t, int tx)
     return sat__min_int(t->options.tile, t->width - (tx << t->shift));
 }
 
-static const double *sat__line_columns(sat__filter_line *f, int tx)
+static inline const double *sat__line_columns(sat__filter_line *f, int tx)
 {
     const sat_table *t = f->table;
     int slot = tx & ((SAT__LINE_COLUMNS >> t->shift) - 1);
-    double *columns = f->columns + ((size_t)slot << t->shift);
+    double *columns = f->columns + ((size_t)slot << t->shift) + 2 * slot + 2;
     if (f->held[slot] != tx) {
+        columns[-1] = 0;
         sat__tile_columns(columns, t, f->channel, &f->y, tx, sat__tile_width(t, tx));
         f->held[slot] = tx;
     }
     return columns;
 }
 
-static double sat__line_edge(sat__filter_line *f, int tx)
+static inline double sat__line_edge(sat__filter_line *f, int tx)
 {
     int slot = tx & (SAT__LINE_TILES - 1);
     if (f->edge_of[slot] != tx) {
@@ -5142,24 +5144,24 @@ static void sat__line_means(float *out, size_t step, sat__filter_line *f, int x,
     const sat_table *t = f->table;
     double edge = 0, rest = 0;
     const double *low, *high;
-    int i = 0, tx, one = first == last;
-    if (!one) edge = sat__line_edge(f, first);
+    int i = 0, tx;
+    if (first < last) edge = sat__line_edge(f, first);
     for (tx = first + 1; tx < last; tx++) rest += sat__line_edge(f, tx);
     low = sat__line_columns(f, first) + (x - f->radius - 1 - (first << t->shift));
     high = sat__line_columns(f, last) + (x + f->radius - (last << t->shift));
 #ifdef SAT__SSE2
-    for (; step == 1 && i + 4 <= n; i += 4) {
+    if (step == 1 && n >= 4) {
         const __m128d e = _mm_set1_pd(edge), r = _mm_set1_pd(rest), v = _mm_set1_pd(inverse);
-        __m128d a = _mm_loadu_pd(low + i), b = _mm_loadu_pd(low + i + 2), c = _mm_loadu_pd(high + i),
-                d = _mm_loadu_pd(high + i + 2);
-        a = one ? _mm_sub_pd(c, a) : _mm_add_pd(_mm_add_pd(_mm_sub_pd(e, a), r), c);
-        b = one ? _mm_sub_pd(d, b) : _mm_add_pd(_mm_add_pd(_mm_sub_pd(e, b), r), d);
-        _mm_storeu_ps(out + i, _mm_movelh_ps(_mm_cvtpd_ps(_mm_mul_pd(a, v)), _mm_cvtpd_ps(_mm_mul_pd(b, v))));
+        for (;; i = sat__min_int(i + 4, n - 4)) { /* the last four overlap those before them */
+            __m128d a = _mm_sub_pd(e, _mm_loadu_pd(low + i)), b = _mm_sub_pd(e, _mm_loadu_pd(low + i + 2));
+            a = _mm_add_pd(_mm_add_pd(a, r), _mm_loadu_pd(high + i));
+            b = _mm_add_pd(_mm_add_pd(b, r), _mm_loadu_pd(high + i + 2));
+            _mm_storeu_ps(out + i, _mm_movelh_ps(_mm_cvtpd_ps(_mm_mul_pd(a, v)), _mm_cvtpd_ps(_mm_mul_pd(b, v))));
+            if (i + 4 >= n) return;
+        }
     }
 #endif
-    for (; i < n; i++)
-        out[(size_t)i * step] =
-            (float)((one ? high[i] - low[i] : ((edge - low[i]) + rest) + high[i]) * inverse);
+    for (; i < n; i++) out[(size_t)i * step] = (float)((((edge - low[i]) + rest) + high[i]) * inverse);
 }
 
 static int sat__has_spikes(const sat_table *t, int channel, int band)
@@ -5175,8 +5177,8 @@ static int sat__has_spikes(const sat_table *t, int channel, int band)
 static void sat__filter_tiled(float *out, const sat_table *t, int channel, int radius, int y0, int y1)
 {
     sat__filter_line f;
-    double sum[SAT__MAX_TILE_SIDE], height = (double)(y1 - y0);
-    int x, i, n, skip, spiky = 0, room = SAT__LINE_COLUMNS >> t->shift;
+    double sum[SAT__MAX_TILE_SIDE], height = (double)(y1 - y0), inverse;
+    int x, i, n, spiky = 0, room = SAT__LINE_COLUMNS >> t->shift;
     int step = t->channels, width = t->width, r = sat__min_int(radius, width);
     f.table = t;
     f.channel = channel;
@@ -5184,7 +5186,8 @@ static void sat__filter_tiled(float *out, const sat_table *t, int channel, int r
     f.y0 = y0;
     f.y1 = y1;
     f.giants = 0;
-    for (i = 0; i < SAT__LINE_TILES; i++) f.held[i] = f.edge_of[i] = -1;
+    inverse = 1 / ((2.0 * r + 1) * height);
+    for (i = sat__min_int(t->tiles_x, SAT__LINE_TILES) - 1; i >= 0; i--) f.held[i] = f.edge_of[i] = -1;
     sat__span_of(&f.y, y0, y1, t->shift);
     for (i = 0; i < f.y.count; i++) spiky |= sat__has_spikes(t, channel, f.y.tile[i]);
     for (i = y0 >> t->shift; t->has_giants && i <= (y1 - 1) >> t->shift; i++)
@@ -5193,13 +5196,12 @@ static void sat__filter_tiled(float *out, const sat_table *t, int channel, int r
         int first = sat__max_int(0, x - r) >> t->shift, last = sat__min_int(width - 1, x + r) >> t->shift;
         n = sat__min_int(SAT__MAX_TILE_SIDE, sat__min_int(width - x, ((first + 1) << t->shift) + r - x));
         if (last < t->tiles_x - 1) n = sat__min_int(n, ((last + 1) << t->shift) - r - x);
-        skip = (first << t->shift) + r + 1 - x; /* of these the left side is the tile's */
-        if (x >= r && x + n <= width - r && skip <= 0 && !spiky && !f.giants && last - first < room) {
-            sat__line_means(out + (size_t)x * (size_t)step, (size_t)step, &f, x, n, first, last,
-                            1 / ((2.0 * r + 1) * height));
+        if (x < r) n = sat__min_int(n, r - x); /* the picture's borders stand apart */
+        else if (x < width - r) n = sat__min_int(n, width - r - x);
+        if (x >= r && x < width - r && !spiky && !f.giants && last - first < room) {
+            sat__line_means(out + (size_t)x * (size_t)step, (size_t)step, &f, x, n, first, last, inverse);
             continue;
         }
-        if (x >= r && x + n <= width - r && skip > 0) n = sat__min_int(n, skip);
         sat__line_sums(sum, &f, x, n, first, last);
         for (i = 0; i < n; i++) {
             int x0 = x + i > r ? x + i - r : 0, x1 = width - (x + i) > r ? x + i + r + 1 : width;
