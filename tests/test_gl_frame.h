@@ -172,6 +172,7 @@ static void ft_occlusion(void)
     ssao_sat *ao;
     int i, k;
     o.radius = 0.12, o.bottom_up = 1;
+    o.tolerance = 0; /* the GPU estimates all pixels */
     for (i = 0; i < FT_N; i++)
         for (k = 0; k < 3; k++) cpu_normal[3 * i + k] = ft_normal[4 * i + k];
     in.depth = ft_depth;
