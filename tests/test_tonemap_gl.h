@@ -385,7 +385,7 @@ TEST(gl_sums_are_the_cpus_integers)
     sat_image view = sat_image_f32(pixels, W, H, 4);
     unsigned char *out = (unsigned char *)malloc(W * H * 4);
     uint32_t *quanta = (uint32_t *)malloc(W * H * 4);
-    int32_t row[W], sums[4];
+    int32_t row[W + 3], sums[4]; /* quantise writes by fours */
     tonemap_options o = local_options();
     tonemap *map = NULL;
     tonemap_gl *gl = NULL;
