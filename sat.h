@@ -103,9 +103,9 @@
        FIXED32, FIXED64                                4.6 to 5.6   2.1 to 2.8
      cv::integral over FLOAT, over DOUBLE              2.1, 1.5     1.6, 1.3
      box filter over cv::blur at radius 1, 5, 20, 100, 1024^2
-       TILED                                           1.9 2.2 2.6 2.9, with the build 2.6 2.9 3.7 3.7
-       TILED, tile = 64                                1.3 1.4 1.4 1.9, with the build 1.9 2.1 2.1 2.3
-       FLOAT, DOUBLE, FIXED32                          1.0 to 1.3, 0.7 to 0.8, 0.6 to 0.7
+       TILED                                           1.1 1.1 1.1 1.0, with the build 1.9 2.8 2.4 1.7 (tile = 64: two
+                                                       thirds to all of it)
+       FLOAT, DOUBLE, FIXED32                          0.7 to 0.8, 0.6 to 0.7, 0.5 to 0.7
      random boxes in a table that the cache holds (2048^2), over four bare reads of floats, at radius 1, 5, 20, 100
        TILED by sat_sums                               5 6 9 19 (tile = 64: 6 5 6 18)
        FLOAT by sat_sum, by sat_sums                   2.4 to 2.9, 1.9 to 2.1
