@@ -263,8 +263,9 @@ figcaption i { display: inline-block; width: 70px; height: 9px; border: 1px soli
 .note, .machine { color: #666 } details { margin: .4em 0 }
 @media (max-width: 800px) {
     .answer { grid-template-columns: minmax(0, 1fr) }
-    .summary :is(th, td):is(:nth-child(2), :nth-child(3)) { display: none } .summary td { min-width: 0 !important }
+    .summary td { min-width: 0 !important }
 }
+@media screen and (max-width: 800px) { .summary :is(th, td):is(:nth-child(2), :nth-child(3)) { display: none } }
 @media print { nav { display: none } details:not([open]) { display: none } .answer, figure, tr { break-inside: avoid } h2, h3 { break-after: avoid } body { max-width: none } }
 </style></head><body>
 <h1>lightscan: error against run time</h1>
