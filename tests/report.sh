@@ -266,7 +266,7 @@ figcaption i { display: inline-block; width: 70px; height: 9px; border: 1px soli
     .summary td { min-width: 0 !important }
 }
 @media screen and (max-width: 800px) { .summary :is(th, td):is(:nth-child(2), :nth-child(3)) { display: none } }
-@media print { nav { display: none } details:not([open]) { display: none } .answer, figure, tr { break-inside: avoid } h2, h3 { break-after: avoid } body { max-width: none } }
+@media print { .summary :is(th, td) { white-space: normal; min-width: 0 !important; text-align: left; font-size: 85% } nav { display: none } details:not([open]) { display: none } .answer, figure, tr { break-inside: avoid } h2, h3 { break-after: avoid } body { max-width: none } }
 </style></head><body>
 <h1>lightscan: error against run time</h1>
 <nav><a href="#answers">Answers</a> <a href="#where">Where the errors are</a> <a href="#time">Error against run time</a> <a href="#cases">Stiff and extreme cases</a> <a href="#left">What is left out</a> <a href="#tables">All tables</a></nav>
