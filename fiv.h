@@ -3612,37 +3612,48 @@ static void fiv__cover_lights(float covered[FIV_MAX_LIGHTS], const fiv__receiver
     }
 }
 
-/* Fills in a shadow; 0 when the occluder takes nothing. */
-static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], fiv__receiver *r, const fiv_instance *instance)
+/* The share of the occluder's ball that the receiver's horizon cuts; -1 when it takes nothing: behind the horizon, or
+   too little. `normal` is the receiver's, turned into the occluder's frame. */
+static float fiv__horizon_cut(float normal[3], fiv__receiver *r, const fiv_occluder *o, const float world[3],
+                              float distance)
 {
-    const fiv_occluder *o = instance->occluder;
-    float offset[3], world[3], distance, height, normal[3], v[FIV__TERMS], below = 1, above = 1, cut = 0, back[3];
-    int k, published = r->options->accuracy <= FIV_TRILINEAR, masks = 0, own = 0, inside = 0;
-    float contact = 0, around[3], angle;
-    fiv__cell cell;
-    if (!fiv__place(offset, world, &distance, instance, r->point)) return 0;
-    height = fiv__dot(world, r->normal);
+    float height = fiv__dot(world, r->normal), below = 1, above = 1, back[3], cut = 0;
+    int k;
     if (height <= -1) {
         r->stats->below_horizon++;
-        return 0;
+        return -1;
     }
     if (fiv__is_negligible(r, world, distance)) {
         r->stats->below_cutoff++;
-        return 0;
+        return -1;
     }
     fiv__turn_back(normal, o->rotation, r->normal);
-    if (height < 1 && !published) {
+    if (height < 1 && r->options->accuracy > FIV_TRILINEAR) {
         for (k = 0; k < 3; k++) back[k] = -normal[k];
         below = fiv__reach(o, back);
         above = fiv__reach(o, normal);
         if (height <= -above) {
             r->stats->below_horizon++;
-            return 0;
+            return -1;
         }
     }
     if (height < below - 1e-4f) cut = (below - height) / (below + above);
     r->stats->clipped += cut > 0;
     r->stats->whole += !(cut > 0);
+    return cut;
+}
+
+/* Fills in a shadow; 0 when the occluder takes nothing. */
+static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], fiv__receiver *r, const fiv_instance *instance)
+{
+    const fiv_occluder *o = instance->occluder;
+    float offset[3], world[3], distance, normal[3], v[FIV__TERMS], cut;
+    int k, published = r->options->accuracy <= FIV_TRILINEAR, masks = 0, own = 0, inside = 0;
+    float contact = 0, around[3], angle;
+    fiv__cell cell;
+    if (!fiv__place(offset, world, &distance, instance, r->point)) return 0;
+    cut = fiv__horizon_cut(normal, r, o, world, distance);
+    if (cut < 0) return 0;
     fiv__locate(&cell, &o->grid, offset);
     if (r->options->accuracy == FIV_NEAREST) fiv__take_nearest(&cell);
     if (published) {
