@@ -488,6 +488,9 @@ typedef struct sat_gl_target {
     int x, y;           /* where the picture's corner (0, 0) lies in it: two views side by side, a part of the window */
     int flip;           /* 0; 1: rows in the reverse order, from top-down to bottom-up and back */
     int from_x, from_y; /* where it lies in the pictures that the call reads: one of two views, a part of an atlas */
+    int width, height;  /* 0: as created (where the call names a size: that). Smaller ones cost nothing but what they
+                           draw, in any frame: dynamic resolution. All of it is in the corner of the object's own
+                           textures */
 } sat_gl_target;
 
 static inline sat_gl_target sat_gl_to(sat_gl_place place, unsigned name, int layer, int x, int y, int flip)
@@ -499,7 +502,7 @@ static inline sat_gl_target sat_gl_to(sat_gl_place place, unsigned name, int lay
     target.x = x;
     target.y = y;
     target.flip = flip;
-    target.from_x = target.from_y = 0;
+    target.from_x = target.from_y = target.width = target.height = 0;
     return target;
 }
 static inline sat_gl_target sat_gl_to_texture(unsigned texture)
@@ -2183,10 +2186,22 @@ static inline void sat__gl_set_from(sat__gl *gl, unsigned program, const sat_gl_
 
 static inline int sat__gl_target_is_valid(const sat_gl_target *target)
 {
-    if (target && (target->from_x < 0 || target->from_y < 0)) return 0;
+    if (target && (target->from_x < 0 || target->from_y < 0 || target->width < 0 || target->height < 0 ||
+                   (target->width > 0) != (target->height > 0)))
+        return 0;
     if (!target || target->place == SAT_GL_OWN) return 1;
     return (unsigned)target->place <= (unsigned)SAT_GL_FRAMEBUFFER && target->layer >= 0 &&
            (target->name != 0 || target->place == SAT_GL_FRAMEBUFFER);
+}
+
+/* The size of this call's picture, from the created one: the target's, when it names one. 0 when it is larger. */
+static inline int sat__gl_take_size(const sat_gl_target *target, int *width, int *height)
+{
+    if (!target || !target->width) return 1;
+    if (target->width > *width || target->height > *height) return 0;
+    *width = target->width;
+    *height = target->height;
+    return 1;
 }
 
 /* Whether the target is this texture, which the pass reads. */
