@@ -253,8 +253,9 @@ typedef struct fiv_occluder_options {
     int lazy;                /* 0; 0..1; 1 (without keep_masks): only what fiv_occluder_prepare asks for is computed */
     int sun_map;             /* 512; 64..4096; side of the square in which all split-off lights have their depth maps:
                                 one light the whole of it, two to four a quarter each, five to nine a ninth ... */
-    int contact_map;         /* 64; 0..256; side of each of the 384 depth maps along fixed directions that answer near
-                                contact and on the mesh itself; 8 at least; 0, and lazy: none */
+    int contact_map;         /* -1; -1..256; side of each of the 384 depth maps along fixed directions that answer near
+                                contact and on the mesh itself: 0, and lazy: none; 8..256; -1: 64 texels, with 64
+                                azimuths or more 128, which is where the error of resting meshes ends (1.6, 6.3 MB) */
     fiv_progress_fn *progress;     /* NULL */
     void *progress_user;
     sat_allocator allocator; /* malloc; not used after create */
@@ -536,7 +537,7 @@ static const sat__field fiv__occluder_fields[] = {
     SAT__FIELD(fiv_occluder_options, 'i', keep_masks, 1, 0, 1, ' '),
     SAT__FIELD(fiv_occluder_options, 'i', lazy, 0, 0, 1, ' '),
     SAT__FIELD(fiv_occluder_options, 'i', sun_map, 512, 64, 4096, ' '),
-    SAT__FIELD(fiv_occluder_options, 'i', contact_map, 64, 0, 256, ' '),
+    SAT__FIELD(fiv_occluder_options, 'i', contact_map, -1, -1, 256, ' '),
     SAT__FIELD(fiv_occluder_options, 'a', allocator, 0, 0, 0, ' '),
     SAT__FIELD(fiv_occluder_options, 't', threads, 0, 0, 0, ' '),
 };
@@ -554,7 +555,7 @@ static int fiv__explain_occluder_options(sat__text *t, const fiv_occluder_option
     if (wrong) sat__text_field(t, wrong, o);
     else if (o->theta & 1) sat__text_add(t, "theta is odd");
     else if (!(o->first_shell < o->last_shell)) sat__text_add(t, "last_shell is not beyond first_shell");
-    else if (o->contact_map && o->contact_map < 8) sat__text_add(t, "contact_map is below 8; 0 or 8..256");
+    else if (o->contact_map > 0 && o->contact_map < 8) sat__text_add(t, "contact_map is below 8; -1, 0 or 8..256");
     else if (o->keep_masks && o->lazy) sat__text_add(t, "lazy is 1 with keep_masks; what deforms keeps none");
 #ifdef FIV_NO_MASKS
     else if (o->keep_masks) sat__text_add(t, "keep_masks is 1; 0 with FIV_NO_MASKS");
@@ -2283,7 +2284,8 @@ static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
     o->keep_masks = options->keep_masks != 0;
     o->lazy = options->lazy != 0;
     o->map_side = options->sun_map;
-    o->contact_side = o->lazy ? 0 : options->contact_map;
+    o->contact_side = options->contact_map >= 0 ? options->contact_map : options->theta < 64 ? 64 : 128;
+    if (o->lazy) o->contact_side = 0;
     for (k = 0; k < FIV__VIEWS; k++) {
         float t = o->view_tangent[k] = fiv__texel_coordinate(k, FIV__VIEWS);
         o->view_scale[k] = 0.5f * (float)(o->contact_side - 2) / sqrtf(1 + t * t);
@@ -2513,9 +2515,15 @@ static uint64_t fiv__hash(uint64_t h, const void *from, size_t size)
 
 #define FIV__HASH UINT64_C(0xcbf29ce484222325)
 
-/* ---- views: depth maps along the middle of each of FIV__VIEWS^2 squares of a cube's face, in the occluder's frame, so
-   that neither light nor rotation enters. Rays are parallel to the direction, but the picture to the face: where a
-   point is seen then depends on the view's column alone, or its row alone, and its depth on the face alone. */
+/* ---- views: depth maps along the middle of each of FIV__VIEWS^2 squares of the faces of a cube that is fixed to the
+   occluder, so that neither light nor rotation enters. Rays are parallel to the direction, but the picture to the face:
+   where a point is seen then depends on the view's column alone, or its row alone, and its depth on the face alone.
+   The cube lies askew, since meshes are often made along their axes: else all views of a row would be covered at
+   once. */
+
+/* view = frame * occluder: 0.7 about (0.36, 0.48, 0.8) */
+static const float fiv__view_frame[9] = {0.79531864f,   -0.47473888f, 0.37694994f, 0.55600942f, 0.819022547f,
+                                         -0.141617767f, -0.24149904f, 0.322218967f, 0.915343187f};
 
 static void fiv__draw_views(int begin, int end, int worker, void *context)
 {
@@ -2540,6 +2548,8 @@ static void fiv__draw_views(int begin, int end, int worker, void *context)
         to[2][ax.w] = ax.sign;
         fiv__cube_direction(direction, face, u, v);
         fiv__normalise(direction, direction);
+        fiv__turn_back(direction, fiv__view_frame, direction);
+        for (k = 0; k < 3; k++) fiv__turn_back(to[k], fiv__view_frame, to[k]);
         fiv__draw_mesh(&canvas, &o->mesh, to, 0.5f * (float)canvas.side - 0.5f, direction);
     }
 }
@@ -2840,19 +2850,29 @@ static void fiv__store_vector(fiv_occluder *o, size_t sample, const double sum[F
         else o->table[FIV__TERMS * sample + (size_t)k] = v[k];
 }
 
-/* The light around each view. */
+/* The light around each view: each texel of the cube, in `cut`^2 parts, is the nearest view's. */
 static void fiv__light_views(fiv_occluder *o)
 {
-    int view, y, k, n = o->face;
-    for (view = 0; view < FIV__ALL_VIEWS && o->contact_side; view++) {
-        int column = view % FIV__VIEWS, row = view / FIV__VIEWS % FIV__VIEWS, face = view / FIV__VIEWS / FIV__VIEWS;
-        double sum[FIV__TERMS];
-        memset(sum, 0, sizeof sum);
-        for (y = row * n / FIV__VIEWS; y < (row + 1) * n / FIV__VIEWS; y++)
-            fiv__add_span(sum, o->sums + (size_t)((face * n + y) * (n + 1)) * FIV__TERMS, column * n / FIV__VIEWS,
-                          (column + 1) * n / FIV__VIEWS);
-        for (k = 0; k < FIV__TERMS; k++) o->contact_light[k * FIV__ALL_VIEWS + view] = (float)sum[k];
-    }
+    int row, x, i, k, n = o->face, cut = (31 + n) / n;
+    float *light = o->contact_light;
+    if (!o->contact_side) return;
+    memset(light, 0, (size_t)FIV__TERMS * FIV__ALL_VIEWS * sizeof *light);
+    for (row = 0; row < 6 * n; row++)
+        for (x = 0; x < n; x++) {
+            float part[FIV__TERMS], d[3];
+            double sum[FIV__TERMS];
+            memset(sum, 0, sizeof sum);
+            fiv__add_span(sum, o->sums + (size_t)row * (size_t)(n + 1) * FIV__TERMS, x, x + 1);
+            for (k = 0; k < FIV__TERMS; k++) part[k] = (float)(sum[k] / (cut * cut));
+            for (k = 0; k < 9; k += 3) fiv__turn(part + k, fiv__view_frame, part + k);
+            for (i = 0; i < cut * cut; i++) {
+                fiv__cube_direction(d, row / n, fiv__texel_coordinate(x * cut + i % cut, n * cut),
+                                    fiv__texel_coordinate(row % n * cut + i / cut, n * cut));
+                fiv__turn(d, fiv__view_frame, d);
+                for (k = 0; k < FIV__TERMS; k++)
+                    light[(size_t)k * FIV__ALL_VIEWS + fiv__cube_texel(d, FIV__VIEWS)] += part[k];
+            }
+        }
 }
 
 static void fiv__light_sample(fiv_occluder *o, size_t sample, const uint16_t *words, size_t count)
@@ -3207,15 +3227,18 @@ static void fiv__add_views(fiv__around *sum, const fiv__facing *f, const uint8_t
 
 /* What an occluder takes of the light above the horizon, as a part of `diffuse`, and the solid angle that it covers
    there: the light around each view counts as its middle is covered. */
-static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o, const float offset[3],
-                             const float normal[3], const float diffuse[3])
+static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o, const float from[3],
+                             const float upwards[3], const float diffuse[3])
 {
+    float offset[3], normal[3];
     int side = o->contact_side, face, x, y, c;
     float shift = 0.5f * (float)(side - 1), least = 0.5f / (float)(side - 2), all[3] = {0, 0, 0};
     const float *tangent = o->view_tangent, *scale = o->view_scale;
     fiv__around sum;
     fiv__facing f;
     memset(&sum, 0, sizeof sum);
+    fiv__turn(offset, fiv__view_frame, from);
+    fiv__turn(normal, fiv__view_frame, upwards);
     f.side = side;
     f.normal = normal;
     for (face = 0; face < 6; face++) {
@@ -4590,8 +4613,8 @@ static const char fiv__glsl_cell[] =
             return fiv_sum(unit * mat3(a.xyz, vec3(a.w, b.xy), vec3(b.zw, g.x)), g.y, h.x, h.y);
         });
 
-/* What the views say, as fiv__look_around has it: p the receiver, n its normal, in the occluder's frame; the part of
-   `open` that is taken, and the solid angle. */
+/* What the views say, as fiv__look_around has it: p the receiver, n its normal, in the occluder's frame and then in the
+   views'; the part of `open` that is taken, and the solid angle. */
 static const char fiv__glsl_views[] =
     SAT__GLSL(
         bool fiv_hit(ivec3 p, float beyond) { return float(texelFetch(fiv_views, p, 0).r) > beyond; }
@@ -4610,6 +4633,9 @@ static const char fiv__glsl_views[] =
             int slot = int(fiv_row(instance, 3).w);
             float side = fiv_row(instance, 8).w, angle = 0.0;
             vec3 all = vec3(0.0), taken = vec3(0.0);
+            mat3 turn = mat3(fiv_row(instance, 9).xyz, fiv_row(instance, 10).xyz, fiv_row(instance, 11).xyz);
+            p = turn * p;
+            n = turn * n;
             for (int face = 0; face < 6; face++) {
                 bool back = (face & 1) != 0;
                 vec3 q = face < 2 ? p.yzx : face < 4 ? p.zxy : p, m = face < 2 ? n.yzx : face < 4 ? n.zxy : n;
@@ -5120,7 +5146,7 @@ static void fiv__gl_send_diffuse(fiv_gl *g, const fiv_environment *e)
     }
 }
 
-/* Texels 0 to 8 of an instance: where it is, and its tables. */
+/* Texels 0 to 11 of an instance: where it is, its tables, and the frame of its views. */
 static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *instance, int layer, int kind)
 {
     const fiv_occluder *o = instance->occluder;
@@ -5130,6 +5156,7 @@ static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *inst
     for (k = 0; k < 3; k++) row[0][k] = instance->position[k] + instance->scale * centre[k];
     row[0][3] = o->radius > 0 && instance->scale > 0 ? 1 / (o->radius * instance->scale) : 0;
     for (k = 0; k < 9; k++) row[1 + k / 3][k % 3] = o->rotation[k];
+    for (k = 0; k < 9; k++) row[9 + k % 3][k / 3] = fiv__view_frame[k];
     row[1][3] = (float)layer;
     row[2][3] = (float)o->grid.octahedral;
     row[3][3] = (float)kind;
