@@ -598,8 +598,9 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *gl, const sat_gl_target 
                                            const raindrop_render_options *options);
 
 /* raindrop_veil over the target `to`; NULL: over the framebuffer that is bound. depth: a depth texture of the picture's
-   size, row for row with it, which the target must not hold; where it is as far as it can be, it is empty. 0: empty
-   everywhere. projection: as in raindrop_gl_render; options->clip_zero_to_one tells how it maps depth. */
+   size, row for row with it, or a larger one (to->from_x, from_y), which the target must not hold; where it is as far
+   as it can be, it is empty. 0: empty everywhere. projection: as in raindrop_gl_render; options->clip_zero_to_one tells
+   how it maps depth. */
 RAINDROP_DEF sat_result raindrop_gl_veil(raindrop_gl *gl, const sat_gl_target *to, int width, int height,
                                          unsigned depth, const raindrop_camera *camera, const float projection[16],
                                          const raindrop_veil_options *options);
@@ -636,6 +637,8 @@ extern "C" {
    ------------------------------------------------------------------------------------------------ */
 
 #define RAINDROP__PI 3.14159265358979323846
+#define RAINDROP__GOLDEN 2.39996323f /* the golden angle */
+#define RAINDROP__SQUARE 0.886227f   /* sqrt(pi)/2: half the side of the square that is as large as the unit disc */
 
 RAINDROP_DEF int raindrop_version(void) { return RAINDROP_VERSION; }
 
@@ -1095,6 +1098,7 @@ typedef struct raindrop__optics {
 
 #define RAINDROP__TINY 1e-12f /* keeps 0/0 away at the rim when n = 1 */
 #define RAINDROP__RIM 1e-6f   /* bounds 1/cos at the rim */
+#define RAINDROP__INNER 0.999f /* rays beyond it are moved to it, this side of the rim */
 
 static inline raindrop__optics raindrop__refract(float one_minus_b2, float n)
 {
@@ -1377,8 +1381,8 @@ struct raindrop_map {
     int base, levels;
     float n;
     const float *level[13];
-    float *texels;
     sat_allocator allocator;
+    void *block;
     size_t bytes;
 };
 
@@ -1432,40 +1436,33 @@ static inline void raindrop__map_fill(float *texels, int resolution, int level, 
 RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, const raindrop_map_options *options)
 {
     raindrop_map_options o = options ? *options : raindrop_map_defaults();
-    sat_allocator memory;
     sat__arena arena = {0, 0, 0};
-    raindrop_map *map;
+    raindrop_map map;
     float *texels;
-    void *block;
     size_t count = 0;
+    sat_result result;
     int level, r;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
     if (sat__fields_check(&o, raindrop__map_fields, SAT__COUNT(raindrop__map_fields))) return SAT_ERR_ARGUMENT;
-    if (!sat__resolve_allocator(&memory, &o.allocator)) return SAT_ERR_ARGUMENT;
+    if (!sat__resolve_allocator(&map.allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     for (r = o.resolution; r; r >>= 1) count += (size_t)r * (size_t)r;
-    sat__carve(&arena, 1, sizeof *map);
+    sat__carve(&arena, 1, sizeof map);
     sat__carve(&arena, count, 8 * sizeof(float));
-    if (arena.overflow) return SAT_ERR_SIZE;
-    block = sat__alloc(&memory, arena.used);
-    if (!block) return SAT_ERR_MEMORY;
-    map = (raindrop_map *)block;
-    map->allocator = memory;
-    map->bytes = arena.used;
-    arena.base = (unsigned char *)block;
-    arena.used = 0;
-    sat__carve(&arena, 1, sizeof *map);
-    map->texels = texels = (float *)(void *)sat__carve(&arena, count, 8 * sizeof(float));
-    map->base = o.resolution;
-    map->n = o.n;
+    result = sat__arena_allocate(&arena, &map.block, &map.bytes, &map.allocator);
+    if (result != SAT_OK) return result;
+    *out = (raindrop_map *)sat__carve(&arena, 1, sizeof map);
+    texels = (float *)sat__carve(&arena, count, 8 * sizeof(float));
+    map.base = o.resolution;
+    map.n = o.n;
     for (level = 0, r = o.resolution; r; r >>= 1, level++) {
-        map->level[level] = texels;
+        map.level[level] = texels;
         raindrop__map_fill(texels, r, level, o.n, o.alpha_samples);
         texels += (size_t)r * (size_t)r * 8;
     }
-    map->levels = level;
-    *out = map;
+    map.levels = level;
+    **out = map;
     return SAT_OK;
 }
 
@@ -1473,7 +1470,7 @@ RAINDROP_DEF void raindrop_map_destroy(raindrop_map *map)
 {
     if (map) {
         sat_allocator memory = map->allocator;
-        sat__release(&memory, map, map->bytes);
+        sat__release(&memory, map->block, map->bytes);
     }
 }
 
@@ -1579,6 +1576,7 @@ struct raindrop_environment {
     float sun_direction[3], sun_irradiance[3];
     float n, largest;
     sat_allocator allocator;
+    void *block;
     size_t bytes;
 };
 
@@ -1692,19 +1690,24 @@ static inline void raindrop__bilinear(float out[4], const raindrop__sphere *sphe
 }
 
 /* log2 to 0.05, enough to choose between mips; v > 0 */
+#define RAINDROP__LOG2_STEP 1.1920929e-7f /* 2^-23 */
+#define RAINDROP__LOG2_BIAS 126.957f      /* 127, less the mean of what the mantissa lacks */
+
 static inline float raindrop__rough_log2(float v)
 {
     uint32_t bits = sat__float_bits(v);
-    return (float)bits * 1.1920929e-7f - 126.957f;
+    return (float)bits * RAINDROP__LOG2_STEP - RAINDROP__LOG2_BIAS;
 }
 
 /* texels: width of the cone in texels of level 0 there. A bilinear lookup is wider than one texel of its level, so a
    finer one is read: of 0.35, 0.5, 0.6, 0.7 and 1 this factor is nearest to 8 x 8 rays for drops of 16..256 pixels. */
+#define RAINDROP__FINER 0.6f
+
 static inline void raindrop__trilinear(float out[4], const raindrop__sphere *sphere, const float uv[2], float texels)
 {
     float lod, f, coarse[4];
     int level, c;
-    texels *= 0.6f;
+    texels *= RAINDROP__FINER;
     if (!(texels > 1)) {
         raindrop__bilinear(out, sphere, 0, uv);
         return;
@@ -1783,6 +1786,9 @@ typedef struct raindrop__picture {
     raindrop_layout layout;
 } raindrop__picture;
 
+/* What a lookup stays in: the whole picture, which goes once around, or a face of the cube. */
+typedef struct raindrop__sheet { const float *rgb; int width, height, wraps; } raindrop__sheet;
+
 static inline float raindrop__repair(float v, float largest, float limit, raindrop_environment_stats *stats)
 {
     if (sat__is_nan(v)) { stats->nan++; v = 0; }
@@ -1823,16 +1829,18 @@ static inline void raindrop__read_picture(raindrop__picture *picture, const sat_
     for (i = 0; i < count; i++) picture->rgb[i] = raindrop__repair(picture->rgb[i], largest, o->max_radiance, stats);
 }
 
-static inline void raindrop__picture_bilinear(float rgb[3], const raindrop__picture *p, int top, int height, int wrap,
-                                              float x, float y)
+/* u, v: 0..1 from the left and from the top. */
+static inline void raindrop__sheet_bilinear(float rgb[3], const raindrop__sheet *sheet, float u, float v)
 {
-    float fx = floorf(x), fy = floorf(y), a = x - fx, b = y - fy;
+    const int width = sheet->width, height = sheet->height;
+    float x = u * (float)width - 0.5f, y = v * (float)height - 0.5f, fx = floorf(x), fy = floorf(y), a = x - fx,
+          b = y - fy;
     int x0 = (int)fx, x1 = x0 + 1, y0 = sat__clamp_int((int)fy, 0, height - 1),
         y1 = sat__clamp_int((int)fy + 1, 0, height - 1), c;
-    const float *row0 = p->rgb + 3 * (size_t)(top + y0) * (size_t)p->width,
-                *row1 = p->rgb + 3 * (size_t)(top + y1) * (size_t)p->width;
-    x0 = wrap ? (x0 + p->width) % p->width : sat__clamp_int(x0, 0, p->width - 1);
-    x1 = wrap ? (x1 + p->width) % p->width : sat__clamp_int(x1, 0, p->width - 1);
+    const float *row0 = sheet->rgb + 3 * (size_t)y0 * (size_t)width,
+                *row1 = sheet->rgb + 3 * (size_t)y1 * (size_t)width;
+    x0 = sheet->wraps ? (x0 + width) % width : sat__clamp_int(x0, 0, width - 1);
+    x1 = sheet->wraps ? (x1 + width) % width : sat__clamp_int(x1, 0, width - 1);
     for (c = 0; c < 3; c++) {
         float v0 = row0[3 * x0 + c] * (1 - a) + row0[3 * x1 + c] * a,
               v1 = row1[3 * x0 + c] * (1 - a) + row1[3 * x1 + c] * a;
@@ -1842,18 +1850,21 @@ static inline void raindrop__picture_bilinear(float rgb[3], const raindrop__pict
 
 static inline void raindrop__picture_sample(float rgb[3], const raindrop__picture *p, const float d[3])
 {
+    raindrop__sheet sheet = {p->rgb, p->width, p->height, 1};
     if (p->layout == RAINDROP_LAYOUT_EQUIRECT) {
         float length = sqrtf(raindrop__dot(d, d)), y = raindrop__clamp(d[1] / length, -1, 1);
-        float u = atan2f(d[0], -d[2]) * (float)(0.5 / RAINDROP__PI) + 0.5f, v = acosf(y) * (float)(1 / RAINDROP__PI);
-        raindrop__picture_bilinear(rgb, p, 0, p->height, 1, u * (float)p->width - 0.5f, v * (float)p->height - 0.5f);
+        raindrop__sheet_bilinear(rgb, &sheet, atan2f(d[0], -d[2]) * (float)(0.5 / RAINDROP__PI) + 0.5f,
+                                 acosf(y) * (float)(1 / RAINDROP__PI));
     } else {
-        float ax = fabsf(d[0]), ay = fabsf(d[1]), az = fabsf(d[2]), s, t, m, side = (float)p->width;
+        float ax = fabsf(d[0]), ay = fabsf(d[1]), az = fabsf(d[2]), s, t, m;
         int face;
         if (ax >= ay && ax >= az) { face = d[0] < 0; m = ax; s = d[0] < 0 ? d[2] : -d[2]; t = -d[1]; }
         else if (ay >= az) { face = 2 + (d[1] < 0); m = ay; s = d[0]; t = d[1] < 0 ? -d[2] : d[2]; }
         else { face = 4 + (d[2] < 0); m = az; s = d[2] < 0 ? -d[0] : d[0]; t = -d[1]; }
-        raindrop__picture_bilinear(rgb, p, face * p->width, p->width, 0, (s / m * 0.5f + 0.5f) * side - 0.5f,
-                                   (t / m * 0.5f + 0.5f) * side - 0.5f);
+        sheet.rgb += 3 * (size_t)face * (size_t)p->width * (size_t)p->width;
+        sheet.height = p->width;
+        sheet.wraps = 0;
+        raindrop__sheet_bilinear(rgb, &sheet, s / m * 0.5f + 0.5f, t / m * 0.5f + 0.5f);
     }
 }
 
@@ -1920,34 +1931,79 @@ static inline void raindrop__perpendicular(float u[3], float v[3], const float n
     raindrop__set(v, b, sign + n[1] * n[1] * a, -n[1]);
 }
 
-/* Colour of one ray from all its orders up to `orders`; width: radius of the drop over the width of the ray. */
-static inline void raindrop__ray_colour(float rgb[3], const raindrop_environment *environment, const float d[3],
-                                        const float p[3], float one_minus_b2, int orders, float width)
+/* How rays through a drop look at the environment: the orders they have, whether the last one carries only its own
+   light, and their width, in radii of the drop and in radians before it; lookups are `blur` times as wide. */
+typedef struct raindrop__gaze {
+    const raindrop_environment *environment;
+    int orders, exit_fresnel;
+    float width, pixel, blur;
+} raindrop__gaze;
+
+static inline void raindrop__add_light(float colour[3], const raindrop__gaze *gaze, float share, const float d[3],
+                                       float cone)
 {
-    raindrop_ray ray;
-    raindrop_order order;
     float v[4];
-    int k, c;
-    raindrop_trace(&ray, d, p, one_minus_b2, environment->n);
-    raindrop__sample(v, environment, ray.reflected, ray.footprint_reflected * width);
-    for (c = 0; c < 3; c++) rgb[c] = ray.fresnel * v[c];
-    for (k = 0; k <= orders; k++) {
-        float share;
-        raindrop_trace_order(&order, d, p, one_minus_b2, environment->n, k);
-        share = k == orders ? order.rest : order.weight;
-        raindrop__sample(v, environment, order.direction, order.footprint * width);
-        for (c = 0; c < 3; c++) rgb[c] += share * v[c];
+    int c;
+    raindrop__sample(v, gaze->environment, d, gaze->blur * cone);
+    for (c = 0; c < 3; c++) colour[c] += share * v[c];
+}
+
+static inline void raindrop__add_mirrored(float colour[3], const raindrop__gaze *gaze, const raindrop_ray *ray)
+{
+    raindrop__add_light(colour, gaze, ray->fresnel, ray->reflected,
+                        ray->footprint_reflected * gaze->width + gaze->pixel);
+}
+
+/* Adds what one ray shows by its mirrored light and order 0. */
+static inline void raindrop__add_ray(float colour[3], const raindrop__gaze *gaze, const raindrop_ray *ray)
+{
+    raindrop__add_mirrored(colour, gaze, ray);
+    raindrop__add_light(colour, gaze, gaze->exit_fresnel ? ray->transmit : 1 - ray->fresnel, ray->refracted,
+                        fabsf(ray->footprint_refracted * gaze->width - gaze->pixel));
+}
+
+/* Adds what one ray shows by all its orders. */
+static inline void raindrop__add_orders(float colour[3], const raindrop__gaze *gaze, const float d[3], const float p[3],
+                                        float one_minus_b2)
+{
+    const float n = gaze->environment->n;
+    raindrop_order order;
+    raindrop_ray ray;
+    int k;
+    raindrop_trace(&ray, d, p, one_minus_b2, n);
+    raindrop__add_mirrored(colour, gaze, &ray);
+    for (k = 0; k <= gaze->orders; k++) {
+        raindrop_trace_order(&order, d, p, one_minus_b2, n, k);
+        raindrop__add_light(colour, gaze, k == gaze->orders && !gaze->exit_fresnel ? order.rest : order.weight,
+                            order.direction, fabsf(order.footprint * gaze->width - gaze->pixel));
     }
+}
+
+/* Point i of `count` on a spiral that fills the unit disc evenly: turned by the golden angle each. */
+static inline void raindrop__spiral(float at[2], int i, int count)
+{
+    float b = sqrtf(((float)i + 0.5f) / (float)count), angle = RAINDROP__GOLDEN * (float)i;
+    at[0] = b * cosf(angle);
+    at[1] = b * sinf(angle);
+}
+
+/* The gaze of the prefilter's samples: each is as wide as its share of the disc. */
+static inline raindrop__gaze raindrop__far_gaze(const raindrop__environment_job *job)
+{
+    raindrop__gaze gaze = {NULL, 0, 0, 0, 0, 1};
+    gaze.environment = job->environment;
+    gaze.orders = job->options->far_orders;
+    gaze.width = 2 * RAINDROP__SQUARE / sqrtf((float)job->options->far_samples);
+    return gaze;
 }
 
 /* Mean light of a far spheroid seen along the unit vector d, by order 0: samples on a spiral in its elliptic disc, with
    half axes of 1 to the side and k upwards. */
 static inline double raindrop__spheroid_light(const raindrop__environment_job *job, const float d[3], float ratio)
 {
-    const raindrop_environment *environment = job->environment;
+    const raindrop__gaze gaze = raindrop__far_gaze(job);
     const int samples = job->options->far_samples;
-    float k = sqrtf(ratio * ratio * (1 - d[1] * d[1]) + d[1] * d[1]), width = 1.77f / sqrtf((float)samples), side[3],
-          up[3], p[3], v[4];
+    float k = sqrtf(ratio * ratio * (1 - d[1] * d[1]) + d[1] * d[1]), side[3], up[3], p[3], at[2];
     double sum = 0;
     int i;
     raindrop__set(side, -d[2], 0, d[0]);
@@ -1956,14 +2012,13 @@ static inline double raindrop__spheroid_light(const raindrop__environment_job *j
     raindrop__set(up, side[1] * d[2] - side[2] * d[1], side[2] * d[0] - side[0] * d[2],
                   side[0] * d[1] - side[1] * d[0]);
     for (i = 0; i < samples; i++) {
-        float b = sqrtf(((float)i + 0.5f) / (float)samples), angle = 2.39996323f * (float)i;
+        float rgb[3] = {0, 0, 0};
         raindrop_ray ray;
-        raindrop__combine(p, 0.999f * b * cosf(angle), side, 0.999f * b * k * sinf(angle), up);
-        if (!raindrop_trace_spheroid(&ray, d, p, ratio, environment->n)) continue;
-        raindrop__sample(v, environment, ray.reflected, ray.footprint_reflected * width);
-        sum += (double)ray.fresnel * (double)(v[0] + v[1] + v[2]);
-        raindrop__sample(v, environment, ray.refracted, ray.footprint_refracted * width);
-        sum += (1 - (double)ray.fresnel) * (double)(v[0] + v[1] + v[2]);
+        raindrop__spiral(at, i, samples);
+        raindrop__combine(p, RAINDROP__INNER * at[0], side, RAINDROP__INNER * at[1] * k, up);
+        if (!raindrop_trace_spheroid(&ray, d, p, ratio, job->environment->n)) continue;
+        raindrop__add_ray(rgb, &gaze, &ray);
+        sum += (double)rgb[0] + (double)rgb[1] + (double)rgb[2];
     }
     return sum;
 }
@@ -1971,32 +2026,33 @@ static inline double raindrop__spheroid_light(const raindrop__environment_job *j
 /* Relative change of a far drop's light with its axis ratio. */
 static inline float raindrop__far_swing(const raindrop__environment_job *job, const float d[3])
 {
-    double flat = raindrop__spheroid_light(job, d, 0.93f), tall = raindrop__spheroid_light(job, d, 1.07f),
+    const float change = 0.07f;
+    double flat = raindrop__spheroid_light(job, d, 1 - change), tall = raindrop__spheroid_light(job, d, 1 + change),
            both = flat + tall;
-    return both > 0 ? (float)((tall - flat) / (0.07 * both)) : 0;
+    return both > 0 ? (float)((tall - flat) / ((double)change * both)) : 0;
 }
 
 /* Rows of the far drops' picture: the mean over the drop's disc, samples on a spiral of equal areas. */
 static void raindrop__prefilter_rows(int begin, int end, int worker, void *context)
 {
     const raindrop__environment_job *job = (const raindrop__environment_job *)context;
-    const raindrop_environment *environment = job->environment;
-    const raindrop__sphere *sphere = &environment->far_sphere;
+    const raindrop__sphere *sphere = &job->environment->far_sphere;
+    const raindrop__gaze gaze = raindrop__far_gaze(job);
     int samples = job->options->far_samples, x, y, i, c;
-    float width = 1.77f / sqrtf((float)samples);
     (void)worker;
     for (y = begin; y < end; y++) {
         for (x = 0; x < sphere->resolution; x++) {
-            float *out = raindrop__texel(sphere, 0, x, y), d[3], u[3], v[3], p[3], rgb[3];
+            float *out = raindrop__texel(sphere, 0, x, y), d[3], u[3], v[3], p[3], at[2];
             double sum[3] = {0, 0, 0};
             sat__octahedral_unfold(d, (2 * (float)x + 1) / (float)sphere->resolution - 1,
                                    (2 * (float)y + 1) / (float)sphere->resolution - 1);
             raindrop__normalise(d);
             raindrop__perpendicular(u, v, d);
             for (i = 0; i < samples; i++) {
-                float b2 = ((float)i + 0.5f) / (float)samples, b = sqrtf(b2), angle = 2.39996323f * (float)i;
-                raindrop__combine(p, b * cosf(angle), u, b * sinf(angle), v);
-                raindrop__ray_colour(rgb, environment, d, p, 1 - b2, job->options->far_orders, width);
+                float rgb[3] = {0, 0, 0};
+                raindrop__spiral(at, i, samples);
+                raindrop__combine(p, at[0], u, at[1], v);
+                raindrop__add_orders(rgb, &gaze, d, p, 1 - ((float)i + 0.5f) / (float)samples);
                 for (c = 0; c < 3; c++) sum[c] += (double)rgb[c];
             }
             for (c = 0; c < 3; c++) out[c] = (float)(sum[c] / samples);
@@ -2032,43 +2088,41 @@ RAINDROP_DEF void raindrop_environment_destroy(raindrop_environment *environment
     if (environment) {
         sat_allocator memory = environment->allocator;
         if (environment->table) sat_destroy(environment->table);
-        sat__release(&memory, environment, environment->bytes);
+        sat__release(&memory, environment->block, environment->bytes);
     }
 }
 
-/* The object, its two octahedral pictures and the bows, in one block: called once to measure and once on the block. */
-static inline void raindrop__environment_layout(raindrop_environment *e, sat__arena *arena, int resolution,
-                                                const raindrop_environment_options *o)
+/* The object, its two octahedral pictures and the bows in one block, once to measure and once on it; returns where the
+   object is. */
+static inline raindrop_environment *raindrop__environment_layout(raindrop_environment *e, sat__arena *arena,
+                                                                 int resolution, const raindrop_environment_options *o)
 {
+    raindrop_environment *place = (raindrop_environment *)sat__carve(arena, 1, sizeof *e);
     size_t size;
     int levels = 1;
     while (resolution >> (levels)) levels++;
-    sat__carve(arena, 1, sizeof *e);
     size = raindrop__sphere_size(&e->near_sphere, resolution, levels);
-    e->near_sphere.texels = (float *)(void *)sat__carve(arena, size, sizeof(float));
+    e->near_sphere.texels = (float *)sat__carve(arena, size, sizeof(float));
     size = raindrop__sphere_size(&e->far_sphere, o->far_resolution, 1);
-    e->far_sphere.texels = (float *)(void *)sat__carve(arena, size, sizeof(float));
-    if (o->bow_by_depth) e->bow = (float *)(void *)sat__carve(arena, 3 * RAINDROP__BOW_BINS, sizeof(float));
+    e->far_sphere.texels = (float *)sat__carve(arena, size, sizeof(float));
+    if (o->bow_by_depth) e->bow = (float *)sat__carve(arena, 3 * RAINDROP__BOW_BINS, sizeof(float));
+    return place;
 }
 
 static inline sat_result raindrop__allocate_environment(raindrop_environment **out, int resolution,
                                                         const raindrop_environment_options *o,
                                                         const sat_allocator *memory)
 {
-    raindrop_environment layout, *e;
+    raindrop_environment e;
     sat__arena arena = {0, 0, 0};
-    memset(&layout, 0, sizeof layout);
-    raindrop__environment_layout(&layout, &arena, resolution, o);
-    if (arena.overflow) return SAT_ERR_SIZE;
-    layout.bytes = arena.used;
-    layout.allocator = *memory;
-    e = (raindrop_environment *)sat__alloc(memory, arena.used);
-    if (!e) return SAT_ERR_MEMORY;
-    arena.base = (unsigned char *)e;
-    arena.used = 0;
-    raindrop__environment_layout(&layout, &arena, resolution, o);
-    *e = layout;
-    *out = e;
+    sat_result result;
+    memset(&e, 0, sizeof e);
+    e.allocator = *memory;
+    raindrop__environment_layout(&e, &arena, resolution, o);
+    result = sat__arena_allocate(&arena, &e.block, &e.bytes, memory);
+    if (result != SAT_OK) return result;
+    *out = raindrop__environment_layout(&e, &arena, resolution, o);
+    **out = e;
     return SAT_OK;
 }
 
@@ -2325,7 +2379,8 @@ RAINDROP_DEF sat_result raindrop_bow_profile(float *rgb, int count, double diame
    >> rain   drops, their fall, the box
    ------------------------------------------------------------------------------------------------ */
 
-enum { RAINDROP__TURN = 0x2545f491 }; /* from one crossing of the box to the next in the streams of random numbers */
+#define RAINDROP__TURN 0x2545f491u /* from one crossing of the box to the next in the streams of random numbers */
+#define RAINDROP__FORGETS 64.0     /* crossings after which a drop has forgotten where it began */
 enum { RAINDROP__CHUNK = 4096 }; /* drops that are culled together; fixes the order of everything, whatever the
                                     workers */
 
@@ -2371,6 +2426,7 @@ struct raindrop_rain {
     int *unsettled;           /* a flag a chunk */
     raindrop__tally *tally;   /* one a worker */
     sat_allocator allocator;
+    void *block;
     size_t bytes;
 };
 
@@ -2379,6 +2435,10 @@ struct raindrop_rain {
 #define RAINDROP__VISCOSITY 1.81e-5                         /* of air, Pa s */
 #define RAINDROP__DENSITY 998.2                             /* of water, kg/m^3 */
 #define RAINDROP__TENSION 0.0728                            /* of water's surface, N/m */
+#define RAINDROP__BEST_SPEED 9.32                           /* of falling drops, Best 1950: m/s, mm and a power */
+#define RAINDROP__BEST_MM 1.77
+#define RAINDROP__BEST_POWER 1.147
+#define RAINDROP__OBLATE(d) 1.0048 + d * (5.7e-4 + d * (-2.628e-2 + d * (3.682e-3 - d * 1.677e-4)))
 #define RAINDROP__PERIOD 16.0 /* seconds; frequencies of oscillations are whole multiples of 1 over it */
 
 /* Stokes' law for the smallest and Best 1950 for the others, blended; rms 4 % of Gunn and Kinzer's table. */
@@ -2387,7 +2447,7 @@ RAINDROP_DEF double raindrop_terminal_velocity(double diameter_mm)
     double d = diameter_mm * 1e-3, stokes, best, slow;
     if (!(diameter_mm > 0)) return 0;
     stokes = RAINDROP__GRAVITY * RAINDROP__DENSITY * d * d / (18 * RAINDROP__VISCOSITY);
-    best = 9.32 * -expm1(-pow(diameter_mm / 1.77, 1.147));
+    best = RAINDROP__BEST_SPEED * -expm1(-pow(diameter_mm / RAINDROP__BEST_MM, RAINDROP__BEST_POWER));
     slow = stokes < best ? stokes : best; /* factored out: no power of a small number underflows */
     return slow * pow(pow(slow / stokes, 4) + pow(slow / best, 4), -0.25);
 }
@@ -2396,7 +2456,7 @@ RAINDROP_DEF double raindrop_oblateness(double diameter_mm)
 {
     double d = diameter_mm < 6 ? diameter_mm : 6, ratio;
     if (!(diameter_mm > 0)) return 1;
-    ratio = 1.0048 + d * (5.7e-4 + d * (-2.628e-2 + d * (3.682e-3 - d * 1.677e-4)));
+    ratio = RAINDROP__OBLATE(d);
     return ratio < 1 ? ratio : 1;
 }
 
@@ -2595,11 +2655,10 @@ static inline float raindrop__wrap(double position, double low, double size)
     return (float)(inside < low + size ? inside : low);
 }
 
-/* Seconds after which a drop that crosses the box again and again has forgotten where it began: 64 crossings of the
-   fastest. */
+/* Seconds after which even the fastest drop has crossed the box so often. */
 static inline double raindrop__forgets(const raindrop_rain_options *o, double fastest)
 {
-    return 64 * (double)o->box_size[1] / fastest;
+    return RAINDROP__FORGETS * (double)o->box_size[1] / fastest;
 }
 
 /* Out below since `left` seconds: another drop comes in on top, one more for each crossing of the box that the time
@@ -2748,11 +2807,11 @@ RAINDROP_DEF double raindrop_extinction(double rate_mm_h)
     return area;
 }
 
-/* Lays the object and its arrays out; called once to measure and once on the block. */
-static inline void raindrop__rain_layout(raindrop_rain *rain, sat__arena *arena, int capacity, int workers)
+/* Lays the object and its arrays out, once to measure and once on the block; returns where the object is. */
+static inline raindrop_rain *raindrop__rain_layout(raindrop_rain *rain, sat__arena *arena, int capacity, int workers)
 {
+    raindrop_rain *place = (raindrop_rain *)sat__carve(arena, 1, sizeof *rain);
     size_t n = (size_t)sat__max_int(capacity, 1);
-    sat__carve(arena, 1, sizeof *rain);
     rain->drops = (raindrop_drop *)sat__carve(arena, n, sizeof(raindrop_drop));
     rain->visible = (raindrop__visible *)sat__carve(arena, n, sizeof(raindrop__visible));
     rain->pairs[0] = (uint64_t *)sat__carve(arena, n, sizeof(uint64_t));
@@ -2761,6 +2820,7 @@ static inline void raindrop__rain_layout(raindrop_rain *rain, sat__arena *arena,
     rain->chunks = (raindrop__chunk *)sat__carve(arena, n / RAINDROP__CHUNK + 1, sizeof(raindrop__chunk));
     rain->unsettled = (int *)sat__carve(arena, n / RAINDROP__CHUNK + 1, sizeof(int));
     rain->tally = (raindrop__tally *)sat__carve(arena, (size_t)workers, sizeof(raindrop__tally));
+    return place;
 }
 
 RAINDROP_DEF sat_result raindrop_rain_create(raindrop_rain **out, const raindrop_rain_options *options)
@@ -2769,28 +2829,23 @@ RAINDROP_DEF sat_result raindrop_rain_create(raindrop_rain **out, const raindrop
     raindrop_rain layout, *rain;
     sat__arena arena = {0, 0, 0};
     sat__text ignored = sat__text_begin(NULL, 0);
-    sat_allocator memory;
     double expected;
+    sat_result result;
     int count, workers;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (!raindrop__rain_is_valid(&ignored, &o) || !sat__resolve_allocator(&memory, &o.allocator))
+    memset(&layout, 0, sizeof layout);
+    if (!raindrop__rain_is_valid(&ignored, &o) || !sat__resolve_allocator(&layout.allocator, &o.allocator))
         return SAT_ERR_ARGUMENT;
     expected = o.drops || o.count ? (double)o.count : raindrop__expected_count(&o);
     if (expected > RAINDROP__MAX_DROPS) return SAT_ERR_LIMIT;
     count = (int)(expected + 0.5);
     workers = sat__worker_count(&o.threads);
-    memset(&layout, 0, sizeof layout);
     raindrop__rain_layout(&layout, &arena, count, workers);
-    if (arena.overflow) return SAT_ERR_SIZE;
-    layout.bytes = arena.used;
-    rain = (raindrop_rain *)sat__alloc(&memory, arena.used);
-    if (!rain) return SAT_ERR_MEMORY;
-    arena.base = (unsigned char *)rain;
-    arena.used = 0;
-    raindrop__rain_layout(&layout, &arena, count, workers);
-    layout.allocator = memory;
+    result = sat__arena_allocate(&arena, &layout.block, &layout.bytes, &layout.allocator);
+    if (result != SAT_OK) return result;
+    rain = raindrop__rain_layout(&layout, &arena, count, workers);
     layout.options = o;
     layout.options.drops = NULL;
     layout.count = layout.capacity = count;
@@ -2809,7 +2864,7 @@ RAINDROP_DEF void raindrop_rain_destroy(raindrop_rain *rain)
 {
     if (rain) {
         sat_allocator memory = rain->allocator;
-        sat__release(&memory, rain, rain->bytes);
+        sat__release(&memory, rain->block, rain->bytes);
     }
 }
 
@@ -2846,19 +2901,28 @@ RAINDROP_DEF sat_result raindrop_rain_set_drops(raindrop_rain *rain, const raind
    glint inversely bright: exp(-x sin(phase)) over its mean, Bessel's I0(x), keeps its light.
    ------------------------------------------------------------------------------------------------ */
 
-/* Index of the drops, and order 1's least angle. */
-typedef struct raindrop__water { float n, bow; } raindrop__water;
+/* Index of the drops, order 1's least angle, internal reflections that are drawn. */
+typedef struct raindrop__water { float n, bow; int orders; } raindrop__water;
 
-static inline raindrop__water raindrop__water_of(float n)
+static inline raindrop__water raindrop__water_of(float n, int orders)
 {
     raindrop__water water;
     water.n = n;
+    water.orders = orders;
     water.bow = n > 1.1f && n < 1.9f ? (float)raindrop_bow_angle(1, (double)n) : 4; /* none, or not of this kind */
     return water;
 }
 
 enum { RAINDROP__GLINTS = 4 }; /* mirrored, order 0, order 1 by its inner and its outer ray */
 #define RAINDROP__LEAST_LAMP 0.004 /* radians; lamps that look smaller are as wide as this, as the sun is */
+#define RAINDROP__LEAST_GLINT 0.3f /* pixels; smaller ones of near drops are as large as this */
+#define RAINDROP__NEAREST 0.25f    /* radii over distance: nearer drops show glints as if they were there */
+#define RAINDROP__SWINGS 0.0004f   /* metres; drops of smaller radius do not swing */
+#define RAINDROP__SWINGS_RISE 5000.0f /* share of the amplitude that a metre more brings, up to 1 */
+#define RAINDROP__OVERTONE 1.9364917f /* sqrt(15/4): the second mode's frequency over the first's */
+#define RAINDROP__LEAN 2.07f       /* the transverse mode's largest height, of P31 */
+#define RAINDROP__FLICKERS 0.6f    /* largest exponent of a far drop's first mode; the second's is more by */
+#define RAINDROP__FLICKERS_MORE 2.5f
 
 typedef struct raindrop__swing { float amplitude, cycles[2], rate[2], lean[2]; } raindrop__swing;
 
@@ -2868,13 +2932,13 @@ static inline raindrop__swing raindrop__swing_of(const raindrop_rain *rain, uint
     raindrop__swing s = {0, {0, 0}, {0, 0}, {0, 0}};
     float r = rain->drops[index].radius, frequency;
     int k;
-    if (!(oscillation > 0) || !(r > 0.0004f)) return s;
-    s.amplitude = oscillation * raindrop__clamp((r - 0.0004f) * 5000, 0, 1);
+    if (!(oscillation > 0) || !(r > RAINDROP__SWINGS)) return s;
+    s.amplitude = oscillation * raindrop__clamp((r - RAINDROP__SWINGS) * RAINDROP__SWINGS_RISE, 0, 1);
     frequency = sqrtf((float)(8 * RAINDROP__TENSION / RAINDROP__DENSITY) / (r * r * r)) * (float)(0.5 / RAINDROP__PI);
     for (k = 0; k < 2; k++) {
         uint32_t bits = raindrop__hash(rain->options.seed, 8 + (uint32_t)k, index);
         double turns;
-        s.rate[k] = floorf(frequency * (k ? 1.9364917f : 1) * (float)RAINDROP__PERIOD) / (float)RAINDROP__PERIOD;
+        s.rate[k] = floorf(frequency * (k ? RAINDROP__OVERTONE : 1) * (float)RAINDROP__PERIOD) / (float)RAINDROP__PERIOD;
         turns = (double)s.rate[k] * rain->time;
         s.cycles[k] = raindrop__uniform(bits) + (float)(turns - floor(turns));
         if (k) continue;
@@ -2917,7 +2981,7 @@ static inline void raindrop__flicker_at(float x[2], const raindrop__swing *s, co
 {
     float y2 = n[1] * n[1], e = s->amplitude / 1.5f;
     x[0] = -4 * e * (1.5f * y2 - 0.5f);
-    x[1] = -10 * e * 1.5f * (5 * y2 - 1) * (n[0] * s->lean[0] + n[2] * s->lean[1]) / 2.07f;
+    x[1] = -10 * e * 1.5f * (5 * y2 - 1) * (n[0] * s->lean[0] + n[2] * s->lean[1]) / RAINDROP__LEAN;
 }
 
 /* b^2 of the rays of a path that turn by `angle`, at its ends where there are none; path: as RAINDROP__GLINTS. */
@@ -2948,10 +3012,11 @@ static inline float raindrop__turned_b2(float angle, int path, const raindrop__w
     return b * b;
 }
 
-/* Share of a path at b^2: with `orders` 0 order 0 has the later ones'. */
-static inline float raindrop__path_share(float b2, int path, float n, int orders)
+/* Share of a path at b^2: without further orders, order 0 has theirs. */
+static inline float raindrop__path_share(float b2, int path, const raindrop__water *water)
 {
-    raindrop__optics o = raindrop__refract(1 - b2, n);
+    raindrop__optics o = raindrop__refract(1 - b2, water->n);
+    const int orders = water->orders;
     if (path == 0) return 0.5f * (o.fs + o.fp);
     if (o.total) return 0;
     if (path == 1)
@@ -2972,13 +3037,15 @@ static inline float raindrop__glint_b2(float angle, int path, const raindrop__wa
     return b2;
 }
 
-/* A lamp as a drop sees it that is seen along a unit vector: a unit vector to it, its irradiance, half its width in
-   radians; the angle between the two, less and plus that, and 2 (cos low - cos high). */
-typedef struct raindrop__lit { float to[3], irradiance[3], width, cosine, angle, low, high, ring; } raindrop__lit;
+/* A drop that is seen along a unit vector, its radius over its distance (0: far away); and a lamp as it sees it: a unit
+   vector to it, its irradiance, half its width in radians; the angle between the two, less and plus that, and
+   2 (cos low - cos high). */
+typedef struct raindrop__lit {
+    float along[3], per_distance, to[3], irradiance[3], width, cosine, angle, low, high, ring;
+} raindrop__lit;
 
-/* 0: it is dark there. */
-static inline int raindrop__light(raindrop__lit *lit, const raindrop_lamp *lamp, const raindrop_drop *drop,
-                                  const float d[3])
+/* Fills what is the lamp's; 0: it is dark there. */
+static inline int raindrop__light(raindrop__lit *lit, const raindrop_lamp *lamp, const raindrop_drop *drop)
 {
     float distance, axis, share = 1;
     int c;
@@ -2996,7 +3063,7 @@ static inline int raindrop__light(raindrop__lit *lit, const raindrop_lamp *lamp,
     lit->width = lamp->radius / (distance > lamp->radius ? distance : lamp->radius);
     if (!(lit->width > (float)RAINDROP__LEAST_LAMP)) lit->width = (float)RAINDROP__LEAST_LAMP;
     for (c = 0; c < 3; c++) lit->irradiance[c] = share * lamp->intensity[c] / (distance * distance);
-    lit->cosine = raindrop__clamp(raindrop__dot(d, lit->to), -1, 1);
+    lit->cosine = raindrop__clamp(raindrop__dot(lit->along, lit->to), -1, 1);
     lit->angle = acosf(lit->cosine);
     lit->low = lit->angle > lit->width ? lit->angle - lit->width : 0;
     lit->high = lit->angle + lit->width < (float)RAINDROP__PI ? lit->angle + lit->width : (float)RAINDROP__PI;
@@ -3008,21 +3075,22 @@ static inline int raindrop__light(raindrop__lit *lit, const raindrop_lamp *lamp,
 typedef struct raindrop__way { float b2, g, share; } raindrop__way;
 
 static inline int raindrop__find_way(raindrop__way *out, const raindrop__lit *lit, int path,
-                                     const raindrop__water *water, int orders, float per_distance)
+                                     const raindrop__water *water)
 {
-    float low, high, per2 = per_distance * per_distance;
-    if (path == 0 && !(per_distance > 0)) { /* the usual case */
+    const float per = lit->per_distance, per2 = per * per;
+    if (path == 0 && !(per > 0)) { /* the usual case */
         out->b2 = 0.5f + 0.5f * lit->cosine;
         out->g = 0.25f;
     } else {
-        if (path > 1 && (!orders || lit->high + 1.02f * per_distance < water->bow)) return 0;
-        low = raindrop__glint_b2(lit->low, path, water, per_distance);
-        high = raindrop__glint_b2(lit->high, path, water, per_distance);
+        float low, high;
+        if (path > 1 && (!water->orders || lit->high + 1.02f * per < water->bow)) return 0;
+        low = raindrop__glint_b2(lit->low, path, water, per);
+        high = raindrop__glint_b2(lit->high, path, water, per);
         out->g = fabsf(high - low) / (lit->ring + 1e-9f) * (1 - per2) / sqrtf(1 - 0.5f * (low + high) * per2);
         if (!(out->g > 0)) return 0;
-        out->b2 = raindrop__glint_b2(lit->angle, path, water, per_distance);
+        out->b2 = raindrop__glint_b2(lit->angle, path, water, per);
     }
-    out->share = raindrop__path_share(out->b2, path, water->n, orders);
+    out->share = raindrop__path_share(out->b2, path, water);
     return out->share > 0;
 }
 
@@ -3030,16 +3098,16 @@ static inline int raindrop__find_way(raindrop__way *out, const raindrop__lit *li
    light enters. */
 typedef struct raindrop__glint { float seen[3], light[3], radius, normal[3]; } raindrop__glint;
 
-/* The glint of a path in a drop that is seen along the unit vector d; per_distance: 0 for far drops. */
-static inline int raindrop__glint_of(raindrop__glint *out, const raindrop__lit *lit, const float d[3], int path,
-                                     const raindrop__water *water, int orders, float per_distance)
+static inline int raindrop__glint_of(raindrop__glint *out, const raindrop__lit *lit, int path,
+                                     const raindrop__water *water)
 {
+    const float *d = lit->along;
     float b, side[3], p[3], off, sign = path && water->n > 1 ? -1.0f : 1;
     raindrop__way way;
     int c;
-    if (!raindrop__find_way(&way, lit, path, water, orders, per_distance)) return 0;
+    if (!raindrop__find_way(&way, lit, path, water)) return 0;
     b = sqrtf(way.b2);
-    off = b * per_distance;
+    off = b * lit->per_distance;
     raindrop__combine(side, 1, lit->to, -lit->cosine, d);
     if (!(raindrop__dot(side, side) > 1e-12f)) raindrop__perpendicular(side, p, d);
     raindrop__normalise(side);
@@ -3058,11 +3126,13 @@ RAINDROP__APART void raindrop__far_lamps(float colour[3], const raindrop_render_
     raindrop__lit lit;
     raindrop__way way;
     int i, path, c;
+    raindrop__set(lit.along, d[0], d[1], d[2]);
+    lit.per_distance = 0;
     for (i = 0; i < o->lamp_count; i++) {
         float sum = 0;
-        if (!raindrop__light(&lit, &o->lamps[i], drop, d)) continue;
+        if (!raindrop__light(&lit, &o->lamps[i], drop)) continue;
         for (path = 0; path < RAINDROP__GLINTS; path++)
-            if (raindrop__find_way(&way, &lit, path, water, o->orders, 0)) sum += way.share * way.g;
+            if (raindrop__find_way(&way, &lit, path, water)) sum += way.share * way.g;
         for (c = 0; c < 3; c++) colour[c] += lit.irradiance[c] * sum * (float)(1 / RAINDROP__PI);
     }
 }
@@ -3101,7 +3171,8 @@ enum { RAINDROP__BAND = 16, RAINDROP__BATCH = 128 };
 #define RAINDROP__LEAST_RADIUS 1.4f /* pixels; smaller drops are far in every look but the sprites; and those that are
                                        blurred less than this are not round */
 #define RAINDROP__LEAST_BLUR 0.61f  /* pixels; such a disc cancels what a lattice of pixels would add */
-#define RAINDROP__SHORT 2.5f        /* pixels; shorter streaks are two still drops */
+#define RAINDROP__SHORT 2.5f        /* pixels; shorter streaks are two still drops, */
+#define RAINDROP__GAUSS 0.288675f   /* of their length to each side of the middle: 1/(2 sqrt(3)) */
 #define RAINDROP__FAR_BIT 0x80000000u
 
 typedef struct raindrop__frame {
@@ -3215,7 +3286,7 @@ static inline raindrop__shape raindrop__far_shape(const raindrop__visible *v)
     raindrop__shape shape;
     float a, across, along, height2, way = fabsf(v->streak[0]) + fabsf(v->streak[1]) + v->blur;
     if (!(way > 0)) { /* the usual case: a square */
-        shape.half_height = shape.half_width = 0.886227f * v->radius; /* sqrt(pi)/2 */
+        shape.half_height = shape.half_width = RAINDROP__SQUARE * v->radius;
         shape.slope = 0;
         shape.opacity = 1;
         shape.swapped = 0;
@@ -3241,7 +3312,7 @@ static inline float raindrop__path_radius(const raindrop__visible *v)
     return v->blur > 0.25f ? sqrtf(v->radius * v->radius + v->blur * v->blur) : v->radius;
 }
 
-/* The pixels a drop may touch. */
+/* The pixels a drop may touch; placed: not looked at for far drops. */
 static inline raindrop__box raindrop__bounds(const raindrop__frame *frame, const raindrop__visible *v,
                                              const raindrop__placed *placed)
 {
@@ -3343,7 +3414,7 @@ static inline void raindrop__to_world(float out[3], const raindrop_camera *camer
 /* Far drops whose light changes along their streak. */
 static inline int raindrop__flickers(const raindrop__frame *frame, const raindrop_drop *drop)
 {
-    return frame->options.oscillation > 0 && drop->radius > 0.0004f;
+    return frame->options.oscillation > 0 && drop->radius > RAINDROP__SWINGS;
 }
 
 static inline raindrop__fate raindrop__cull(raindrop__visible *v, const raindrop__frame *frame, uint32_t index,
@@ -3455,9 +3526,9 @@ typedef struct raindrop__batch {
     const raindrop__frame *frame;
     raindrop__tally *tally;
     int count, samples; /* fragments; consecutive ones that are averaged before they are blended */
+    int y0, y1;           /* rows of the band */
     float focal_in_radii; /* of the drop being drawn: z / (focal radius), so that q = pixels times this */
-    float width, blur;    /* footprint of a pixel in b, and its widening */
-    int orders;           /* -1: the short way without orders */
+    raindrop__gaze gaze;  /* of a pixel; its orders -1: the short way without orders */
     float flatness;       /* of the drop being drawn */
     int slow;             /* flattened or swinging: no sphere */
     const raindrop__swing *swing; /* NULL: it does not change along the streak */
@@ -3520,7 +3591,7 @@ static inline raindrop__v raindrop__half_plane_v(raindrop__v s, raindrop__v gx, 
 static inline void raindrop__batch_rays(raindrop__batch *batch, int keep_alpha)
 {
     const raindrop_camera *camera = &batch->frame->camera;
-    const raindrop__v one = raindrop__splat(1), rim = raindrop__splat(batch->slow ? 1e9f : 0.999f);
+    const raindrop__v one = raindrop__splat(1), rim = raindrop__splat(batch->slow ? 1e9f : RAINDROP__INNER);
     const raindrop__v k = raindrop__splat(batch->focal_in_radii), per_focal = raindrop__splat(1 / batch->frame->focal);
     int at, i;
     for (at = 0; at < batch->count; at += RAINDROP__LANES) {
@@ -3552,7 +3623,7 @@ static inline void raindrop__batch_rays(raindrop__batch *batch, int keep_alpha)
         }
         inward = raindrop__min(one, raindrop__div(rim, b));
         raindrop__store(batch->one_minus_b2 + at,
-                        raindrop__max(raindrop__sub(one, b2), raindrop__splat(1 - 0.999f * 0.999f)));
+                        raindrop__max(raindrop__sub(one, b2), raindrop__splat(1 - RAINDROP__INNER * RAINDROP__INNER)));
         px = raindrop__mul(px, inward);
         py = raindrop__mul(py, inward);
         pz = raindrop__mul(pz, inward);
@@ -3571,10 +3642,10 @@ static inline void raindrop__batch_rays(raindrop__batch *batch, int keep_alpha)
 /* The two lookups' directions, weights and cones. */
 static inline void raindrop__batch_trace(raindrop__batch *batch)
 {
-    const raindrop__v width = raindrop__splat(batch->width), pixel = raindrop__splat(1 / batch->frame->focal),
-                      blur = raindrop__splat(batch->blur);
-    const int exit_fresnel = batch->frame->options.exit_fresnel;
-    const float n = batch->frame->environment->n;
+    const raindrop__v width = raindrop__splat(batch->gaze.width), pixel = raindrop__splat(batch->gaze.pixel),
+                      blur = raindrop__splat(batch->gaze.blur);
+    const int exit_fresnel = batch->gaze.exit_fresnel;
+    const float n = batch->gaze.environment->n;
     int at, i;
     for (at = 0; at < batch->count; at += RAINDROP__LANES) {
         raindrop__v d[3], p[3];
@@ -3599,9 +3670,14 @@ static inline void raindrop__batch_trace(raindrop__batch *batch)
     }
 }
 
-/* Square coordinates and mip scale of a block of directions: raindrop__fold without branches. */
-static inline void raindrop__batch_fold(float *u, float *v, float *texels, float (*direction)[RAINDROP__BATCH],
-                                        const float *cone, int at, float half_resolution)
+/* Places in the octahedral square, and widths in texels. */
+typedef struct raindrop__lookups {
+    float u[RAINDROP__BATCH], v[RAINDROP__BATCH], texels[RAINDROP__BATCH];
+} raindrop__lookups;
+
+/* Those of a block of directions: raindrop__fold without branches. */
+static inline void raindrop__batch_fold(raindrop__lookups *out, float (*direction)[RAINDROP__BATCH], const float *cone,
+                                        int at, float half_resolution)
 {
     const raindrop__v one = raindrop__splat(1), zero = raindrop__splat(0), half = raindrop__splat(0.5f);
     raindrop__v x = raindrop__load(direction[0] + at), y = raindrop__load(direction[1] + at),
@@ -3618,23 +3694,23 @@ static inline void raindrop__batch_fold(float *u, float *v, float *texels, float
     a = raindrop__add(raindrop__mul(a, half), half);
     b = raindrop__add(raindrop__mul(b, half), half);
     wide = raindrop__mul(raindrop__load(cone + at), raindrop__splat(half_resolution));
-    raindrop__store(u + at, raindrop__min(raindrop__max(a, zero), one));
-    raindrop__store(v + at, raindrop__min(raindrop__max(b, zero), one));
-    raindrop__store(texels + at, raindrop__div(wide, raindrop__mul(sum, raindrop__sqrt(sum))));
+    raindrop__store(out->u + at, raindrop__min(raindrop__max(a, zero), one));
+    raindrop__store(out->v + at, raindrop__min(raindrop__max(b, zero), one));
+    raindrop__store(out->texels + at, raindrop__div(wide, raindrop__mul(sum, raindrop__sqrt(sum))));
 }
 
 /* Colours by two lookups each; colour[i] gets red, green, blue, and a lane that means nothing. */
 static inline void raindrop__batch_lookup(float (*colour)[4], raindrop__batch *batch)
 {
-    const raindrop_environment *environment = batch->frame->environment;
+    const raindrop_environment *environment = batch->gaze.environment;
     const raindrop__sphere *sphere = &environment->near_sphere;
-    float u[2][RAINDROP__BATCH], v[2][RAINDROP__BATCH], texels[2][RAINDROP__BATCH], mirrored[4], through[4],
-        half = 0.5f * (float)sphere->resolution;
+    raindrop__lookups at[2];
+    float mirrored[4], through[4], uv[2], half = 0.5f * (float)sphere->resolution;
     int i, c;
     if (!environment->table) {
         for (i = 0; i < batch->count; i += RAINDROP__LANES) {
-            raindrop__batch_fold(u[0], v[0], texels[0], batch->reflected, batch->reflect_cone, i, half);
-            raindrop__batch_fold(u[1], v[1], texels[1], batch->refracted, batch->refract_cone, i, half);
+            raindrop__batch_fold(&at[0], batch->reflected, batch->reflect_cone, i, half);
+            raindrop__batch_fold(&at[1], batch->refracted, batch->refract_cone, i, half);
         }
     }
     for (i = 0; i < batch->count; i++) {
@@ -3649,13 +3725,12 @@ static inline void raindrop__batch_lookup(float (*colour)[4], raindrop__batch *b
             raindrop__set(d, batch->refracted[0][i], batch->refracted[1][i], batch->refracted[2][i]);
             raindrop__sample_table(through, environment, d, batch->refract_cone[i]);
         } else {
-            float at[2];
-            at[0] = u[0][i];
-            at[1] = v[0][i];
-            raindrop__trilinear(mirrored, sphere, at, texels[0][i]);
-            at[0] = u[1][i];
-            at[1] = v[1][i];
-            raindrop__trilinear(through, sphere, at, texels[1][i]);
+            uv[0] = at[0].u[i];
+            uv[1] = at[0].v[i];
+            raindrop__trilinear(mirrored, sphere, uv, at[0].texels[i]);
+            uv[0] = at[1].u[i];
+            uv[1] = at[1].v[i];
+            raindrop__trilinear(through, sphere, uv, at[1].texels[i]);
         }
         for (c = 0; c < 4; c++) colour[i][c] = batch->fresnel[i] * mirrored[c] + batch->pass[i] * through[c];
     }
@@ -3675,7 +3750,7 @@ static inline float raindrop__flat_cover(const raindrop__batch *batch, float fla
     gx = q[0] * camera->right[0] + q[1] * stretch * camera->right[1] + q[2] * camera->right[2];
     gy = q[0] * camera->up[0] + q[1] * stretch * camera->up[1] + q[2] * camera->up[2];
     slope = sqrtf(gx * gx + gy * gy) + 1e-20f;
-    if (b > 0.999f) raindrop__combine(q, 0.999f / b, q, 0, q);
+    if (b > RAINDROP__INNER) raindrop__combine(q, RAINDROP__INNER / b, q, 0, q);
     raindrop__set(p, q[0], q[1] * flatness, q[2]);
     gx /= slope;
     gy /= slope;
@@ -3686,40 +3761,12 @@ static inline float raindrop__flat_cover(const raindrop__batch *batch, float fla
 /* One fragment of a flattened drop. */
 static inline void raindrop__flat_colour(float colour[4], raindrop__batch *batch, int i, const float d[3], float p[3])
 {
-    const raindrop_environment *environment = batch->frame->environment;
-    float pixel = 1 / batch->frame->focal, v[4], flatness = batch->swing ? batch->ratio[i] : batch->flatness,
+    float flatness = batch->swing ? batch->ratio[i] : batch->flatness,
           cover = raindrop__flat_cover(batch, flatness, d, p);
     raindrop_ray ray;
-    int c;
-    if (batch->samples == 1 && !(batch->blur > 1)) batch->alpha[i] = cover;
-    if (!raindrop_trace_spheroid(&ray, d, p, flatness, environment->n)) return;
-    raindrop__sample(v, environment, ray.reflected, batch->blur * (ray.footprint_reflected * batch->width + pixel));
-    for (c = 0; c < 3; c++) colour[c] = ray.fresnel * v[c];
-    raindrop__sample(v, environment, ray.refracted,
-                     batch->blur * fabsf(ray.footprint_refracted * batch->width - pixel));
-    for (c = 0; c < 3; c++) colour[c] += (batch->frame->options.exit_fresnel ? ray.transmit : 1 - ray.fresnel) * v[c];
-}
-
-/* Adds one ray's orders. */
-static inline void raindrop__add_orders(float colour[4], const raindrop__batch *batch, const float d[3],
-                                        const float p[3], float one_minus_b2)
-{
-    const raindrop_environment *environment = batch->frame->environment;
-    const int exit_fresnel = batch->frame->options.exit_fresnel;
-    float pixel = 1 / batch->frame->focal, v[4];
-    raindrop_order order;
-    raindrop_ray ray;
-    int k, c;
-    raindrop_trace(&ray, d, p, one_minus_b2, environment->n);
-    raindrop__sample(v, environment, ray.reflected, batch->blur * (ray.footprint_reflected * batch->width + pixel));
-    for (c = 0; c < 3; c++) colour[c] += ray.fresnel * v[c];
-    for (k = 0; k <= batch->orders; k++) {
-        float share;
-        raindrop_trace_order(&order, d, p, one_minus_b2, environment->n, k);
-        share = k == batch->orders && !exit_fresnel ? order.rest : order.weight;
-        raindrop__sample(v, environment, order.direction, batch->blur * fabsf(order.footprint * batch->width - pixel));
-        for (c = 0; c < 3; c++) colour[c] += share * v[c];
-    }
+    if (batch->samples == 1 && !(batch->gaze.blur > 1)) batch->alpha[i] = cover;
+    if (raindrop_trace_spheroid(&ray, d, p, flatness, batch->gaze.environment->n))
+        raindrop__add_ray(colour, &batch->gaze, &ray);
 }
 
 /* One fragment of a large drop. At the rim the angles change so fast along the radius that one lookup, however wide, is
@@ -3730,15 +3777,15 @@ static inline void raindrop__large_colour(float colour[4], raindrop__batch *batc
     const int taps = 4;
     float b = sqrtf(1 - batch->one_minus_b2[i]), tap[3];
     int j, c, n = 0;
-    if (1 - b > 3 * batch->width || batch->width > 0.25f) {
-        raindrop__add_orders(colour, batch, d, p, batch->one_minus_b2[i]);
+    if (1 - b > 3 * batch->gaze.width || batch->gaze.width > 0.25f) {
+        raindrop__add_orders(colour, &batch->gaze, d, p, batch->one_minus_b2[i]);
         return;
     }
     for (j = 0; j < taps; j++) {
-        float at = b + (((float)j + 0.5f) / (float)taps - 0.5f) * batch->width;
+        float at = b + (((float)j + 0.5f) / (float)taps - 0.5f) * batch->gaze.width;
         if (at >= 1 || at <= 0) continue;
         raindrop__combine(tap, at / b, p, 0, p);
-        raindrop__add_orders(colour, batch, d, tap, (1 - at) * (1 + at));
+        raindrop__add_orders(colour, &batch->gaze, d, tap, (1 - at) * (1 + at));
         n++;
     }
     for (c = 0; c < 3; c++) colour[c] /= (float)n;
@@ -3757,7 +3804,7 @@ static inline void raindrop__batch_slow(float (*colour)[4], raindrop__batch *bat
         if (batch->slow) raindrop__flat_colour(colour[i], batch, i, d, p);
         else {
             raindrop__large_colour(colour[i], batch, i, d, p);
-            batch->tally->order_fragments += batch->orders > 0;
+            batch->tally->order_fragments += batch->gaze.orders > 0;
         }
     }
 }
@@ -3807,7 +3854,7 @@ static inline void raindrop__flush_rays(raindrop__batch *batch, int keep_alpha)
     if (!batch->count) return;
     raindrop__batch_pad(batch);
     raindrop__batch_rays(batch, keep_alpha);
-    if (batch->orders >= 0 || batch->slow) raindrop__batch_slow(colour, batch);
+    if (batch->gaze.orders >= 0 || batch->slow) raindrop__batch_slow(colour, batch);
     else {
         raindrop__batch_trace(batch);
         raindrop__batch_lookup(colour, batch);
@@ -3832,14 +3879,14 @@ static inline void raindrop__begin_drop(raindrop__batch *batch, const raindrop__
 {
     const raindrop_render_options *o = &batch->frame->options;
     batch->focal_in_radii = placed->z / (batch->frame->focal * placed->radius);
-    batch->width =
+    batch->gaze.width =
         1 / (batch->frame->focal * placed->radius / sqrtf(placed->distance2 - placed->radius * placed->radius));
-    batch->blur = 1;
+    batch->gaze.blur = 1;
     batch->samples = 1;
     batch->flatness = placed->flatness;
     batch->slow = placed->flatness < 1 || placed->flatness > 1;
     batch->swing = NULL;
-    batch->orders = v->radius >= o->orders_radius && !raindrop__is_sprite(batch->frame) ? o->orders : -1;
+    batch->gaze.orders = v->radius >= o->orders_radius && !raindrop__is_sprite(batch->frame) ? o->orders : -1;
 }
 
 static inline void raindrop__draw_still(raindrop__batch *batch, const raindrop__visible *v, const raindrop__box *box)
@@ -3915,7 +3962,7 @@ static inline float raindrop__path_cover(float span[2], const raindrop__path *pa
     span[0] = raindrop__clamp(u - h, -half, half);
     span[1] = raindrop__clamp(u + h, -half, half);
     if (path->length < RAINDROP__SHORT) {
-        float x = 0.288675f * path->length * path->along[0], y = 0.288675f * path->length * path->along[1];
+        float apart = RAINDROP__GAUSS * path->length, x = apart * path->along[0], y = apart * path->along[1];
         return 0.5f * (raindrop__disc_cover(path->radius, dx - x, dy - y) +
                        raindrop__disc_cover(path->radius, dx + x, dy + y));
     }
@@ -3979,7 +4026,7 @@ static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__v
     raindrop__swing swing;
     const float focal_in_radii = batch->focal_in_radii;
     batch->samples = samples;
-    batch->orders = -1;
+    batch->gaze.orders = -1;
     if (moving && frame->options.oscillation > 0) {
         swing = raindrop__swing_of(frame->rain, v->drop, frame->options.oscillation);
         if (swing.amplitude > 0) {
@@ -3988,7 +4035,7 @@ static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__v
         }
     }
     spacing = moving ? (2 * v->radius < path.length ? 2 * v->radius : path.length) / (float)samples : 0;
-    batch->blur = 1 + 2 * v->blur + (spacing > 1 ? spacing - 1 : 0);
+    batch->gaze.blur = 1 + 2 * v->blur + (spacing > 1 ? spacing - 1 : 0);
     for (y = box->y0; y < box->y1; y++) {
         for (x = box->x0; x < box->x1; x++) {
             float dx = (float)x + 0.5f - v->x, dy = (float)y + 0.5f - v->y, cover;
@@ -4023,7 +4070,7 @@ static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__v
 static inline void raindrop__far_colour(float colour[3], const raindrop__batch *batch, const raindrop__visible *v,
                                         const raindrop__shape *shape, int major)
 {
-    float along, per_pixel, flicker = 1;
+    float along, per_pixel, flicker;
     raindrop__set(colour, v->colour[0], v->colour[1], v->colour[2]);
     if (!batch->flicker) return;
     along = (float)major + 0.5f - (shape->swapped ? v->x : v->y);
@@ -4033,24 +4080,27 @@ static inline void raindrop__far_colour(float colour[3], const raindrop__batch *
     raindrop__set(colour, flicker * colour[0], flicker * colour[1], flicker * colour[2]);
 }
 
-/* One row of a far drop's pixels (a column where x and y have changed places), at y0..y1 of its parallelogram: `x` is
-   the first, seen from the middle of the part of the path that is in this row, which moves by w. */
+/* One row of a far drop's pixels, a column where x and y have changed places: its number, the first pixel and the
+   one behind the last, the share of the light that falls into it; x: where the first begins, seen from the middle of
+   the part of the path that is in this row, which moves by w. */
+typedef struct raindrop__row { int major, first, last; float opacity, x, w; } raindrop__row;
+
 static inline void raindrop__far_row(raindrop__batch *batch, const raindrop__visible *v, const raindrop__shape *shape,
-                                     float opacity, float x, float w, int major, int first, int last)
+                                     const raindrop__row *row)
 {
     const raindrop__frame *frame = batch->frame;
-    float scale = 0.5f / w, left = shape->half_width - 0.5f * w, right = shape->half_width + 0.5f * w, right_of = 0,
-          colour[3];
+    float scale = 0.5f / row->w, left = shape->half_width - 0.5f * row->w, right = shape->half_width + 0.5f * row->w,
+          right_of = 0, x = row->x, colour[3];
     int at;
-    raindrop__far_colour(colour, batch, v, shape, major);
-    for (at = first; at <= last; at++, x += 1) {
+    raindrop__far_colour(colour, batch, v, shape, row->major);
+    for (at = row->first; at <= row->last; at++, x += 1) {
         /* the mean over the way w of what lies right of x: of ramps, whose integrals are squares */
         float a = left - x > 0 ? left - x : 0, b = right - x > 0 ? right - x : 0, c = -right - x > 0 ? -right - x : 0,
               d = -left - x > 0 ? -left - x : 0, more = scale * ((b - a) * (b + a) - (d - c) * (d + c)),
-              alpha = opacity * (right_of - more);
-        int px = shape->swapped ? major : at - 1, py = shape->swapped ? at - 1 : major;
+              alpha = row->opacity * (right_of - more);
+        int px = shape->swapped ? row->major : at - 1, py = shape->swapped ? at - 1 : row->major;
         right_of = more;
-        if (at == first || !(alpha > 0) ||
+        if (at == row->first || !(alpha > 0) ||
             raindrop__occluded(frame, (size_t)py * (size_t)frame->width + (size_t)px, v->depth))
             continue;
         raindrop__blend(raindrop__pixel(frame, px, py), alpha < 1 ? alpha : 1, colour, batch->covers);
@@ -4063,7 +4113,7 @@ static inline void raindrop__draw_far_still(raindrop__batch *batch, const raindr
                                             const raindrop__box *box)
 {
     const raindrop__frame *frame = batch->frame;
-    float half = 0.886227f * v->radius;
+    float half = RAINDROP__SQUARE * v->radius;
     int x, y;
     for (y = box->y0; y < box->y1; y++) {
         float low = v->y - half > (float)y ? v->y - half : (float)y,
@@ -4086,21 +4136,23 @@ static inline void raindrop__draw_far(raindrop__batch *batch, const raindrop__vi
 {
     const raindrop__shape shape = raindrop__far_shape(v);
     float middle = shape.swapped ? v->y : v->x, across = shape.swapped ? v->x : v->y;
-    int row = shape.swapped ? box->x0 : box->y0, end = shape.swapped ? box->x1 : box->y1;
+    int end = shape.swapped ? box->x1 : box->y1;
     int low = shape.swapped ? box->y0 : box->x0, high = shape.swapped ? box->y1 : box->x1;
-    for (; row < end; row++) {
-        float from = (float)row - across, to = from + 1, w, at, reach;
-        int first, last;
+    raindrop__row row;
+    for (row.major = shape.swapped ? box->x0 : box->y0; row.major < end; row.major++) {
+        float from = (float)row.major - across, to = from + 1, at, reach;
         from = from > -shape.half_height ? from : -shape.half_height;
         to = to < shape.half_height ? to : shape.half_height;
         if (!(to > from)) continue;
-        w = fabsf(shape.slope) * (to - from);
-        w = w > 0.01f ? w : 0.01f;
+        row.w = fabsf(shape.slope) * (to - from);
+        row.w = row.w > 0.01f ? row.w : 0.01f;
         at = middle + shape.slope * 0.5f * (from + to);
-        reach = shape.half_width + 0.5f * w;
-        first = sat__max_int(raindrop__pixel_down(at - reach, high), low);
-        last = sat__min_int(raindrop__pixel_up(at + reach, high), high);
-        raindrop__far_row(batch, v, &shape, shape.opacity * (to - from), (float)first - at, w, row, first, last);
+        reach = shape.half_width + 0.5f * row.w;
+        row.first = sat__max_int(raindrop__pixel_down(at - reach, high), low);
+        row.last = sat__min_int(raindrop__pixel_up(at + reach, high), high);
+        row.x = (float)row.first - at;
+        row.opacity = shape.opacity * (to - from);
+        raindrop__far_row(batch, v, &shape, &row);
     }
 }
 
@@ -4116,17 +4168,26 @@ static inline void raindrop__draw_far_any(raindrop__batch *batch, const raindrop
    >> glints   lamps seen in drops, and far drops that swing
    ------------------------------------------------------------------------------------------------ */
 
+/* The pixels of the band that a drop may touch; placed: NULL for far drops. */
+static inline raindrop__box raindrop__band_box(const raindrop__batch *batch, const raindrop__visible *v,
+                                               const raindrop__placed *placed)
+{
+    raindrop__box box = raindrop__bounds(batch->frame, v, placed);
+    box.y0 = sat__max_int(box.y0, batch->y0);
+    box.y1 = sat__min_int(box.y1, batch->y1);
+    return box;
+}
+
 /* The glint of a lamp by one path as a far drop of its own: in a near drop at its place, in a far one all over it. */
 static inline int raindrop__glint_seen(raindrop__visible *out, float normal[3], const raindrop__frame *frame,
-                                       const raindrop__visible *v, const raindrop__lit *lit, const float d[3],
-                                       float per_distance, int path)
+                                       const raindrop__visible *v, const raindrop__lit *lit, int path)
 {
     const raindrop_camera *camera = &frame->camera;
     const int is_far = (v->drop & RAINDROP__FAR_BIT) != 0;
     raindrop__glint glint;
     float z, scale;
     int c;
-    if (!raindrop__glint_of(&glint, lit, d, path, &frame->water, frame->options.orders, per_distance)) return 0;
+    if (!raindrop__glint_of(&glint, lit, path, &frame->water)) return 0;
     *out = *v;
     out->drop |= RAINDROP__FAR_BIT;
     if (!is_far) {
@@ -4134,7 +4195,7 @@ static inline int raindrop__glint_seen(raindrop__visible *out, float normal[3], 
         if (!(z > 0)) return 0;
         out->x = frame->half_width + frame->focal * raindrop__dot(glint.seen, camera->right) / z;
         out->y = frame->half_height - frame->focal * raindrop__dot(glint.seen, camera->up) / z;
-        out->radius = raindrop__clamp(v->radius * glint.radius, 0.3f, v->radius);
+        out->radius = raindrop__clamp(v->radius * glint.radius, RAINDROP__LEAST_GLINT, v->radius);
     }
     scale = v->radius * v->radius / ((float)RAINDROP__PI * out->radius * out->radius);
     for (c = 0; c < 3; c++) out->colour[c] = glint.light[c] * scale;
@@ -4142,34 +4203,31 @@ static inline int raindrop__glint_seen(raindrop__visible *out, float normal[3], 
     return 1;
 }
 
-RAINDROP__APART void raindrop__draw_glints(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
+RAINDROP__APART void raindrop__draw_glints(raindrop__batch *batch, const raindrop__visible *v)
 {
     const raindrop__frame *frame = batch->frame;
     const uint32_t index = v->drop & ~RAINDROP__FAR_BIT;
     const raindrop_drop *drop = &frame->rain->drops[index];
     const raindrop__swing swing = raindrop__swing_of(frame->rain, index, frame->options.oscillation);
-    raindrop__placed placed = {0, 0, 0, 0, 0, 0, 0};
     raindrop__visible glint;
     raindrop__box box;
     raindrop__lit lit;
-    float normal[3], flicker[2], d[3], per_distance;
+    float normal[3], flicker[2], *d = lit.along;
     int i, path;
     raindrop__combine(d, 1, drop->position, -1, frame->camera.position);
-    per_distance = v->drop & RAINDROP__FAR_BIT
-                       ? 0
-                       : raindrop__clamp(drop->radius / sqrtf(raindrop__dot(d, d)), 0, 0.25f);
+    lit.per_distance = v->drop & RAINDROP__FAR_BIT
+                           ? 0
+                           : raindrop__clamp(drop->radius / sqrtf(raindrop__dot(d, d)), 0, RAINDROP__NEAREST);
     raindrop__normalise(d);
     batch->covers = 0;
     batch->swing = &swing;
     for (i = 0; i < frame->options.lamp_count; i++) {
-        if (!raindrop__light(&lit, &frame->options.lamps[i], drop, d)) continue;
+        if (!raindrop__light(&lit, &frame->options.lamps[i], drop)) continue;
         for (path = 0; path < RAINDROP__GLINTS; path++) {
-            if (!raindrop__glint_seen(&glint, normal, frame, v, &lit, d, per_distance, path)) continue;
+            if (!raindrop__glint_seen(&glint, normal, frame, v, &lit, path)) continue;
             raindrop__flicker_at(flicker, &swing, normal);
             batch->flicker = swing.amplitude > 0 ? flicker : NULL;
-            box = raindrop__bounds(frame, &glint, &placed);
-            box.y0 = sat__max_int(box.y0, y0);
-            box.y1 = sat__min_int(box.y1, y1);
+            box = raindrop__band_box(batch, &glint, NULL);
             raindrop__draw_far_any(batch, &glint, &box);
         }
     }
@@ -4180,26 +4238,23 @@ RAINDROP__APART void raindrop__draw_glints(raindrop__batch *batch, const raindro
 
 /* A far drop that swings: the environment's light by what its prefilter knows of it, the transverse mode's curvature
    swings 10/4 times as much; then each lamp's. */
-RAINDROP__APART void raindrop__draw_flickering(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
+RAINDROP__APART void raindrop__draw_flickering(raindrop__batch *batch, const raindrop__visible *v)
 {
     const raindrop__frame *frame = batch->frame;
     const uint32_t index = v->drop & ~RAINDROP__FAR_BIT;
     const raindrop__swing swing = raindrop__swing_of(frame->rain, index, frame->options.oscillation);
-    const raindrop__placed placed = {0, 0, 0, 0, 0, 0, 0};
-    raindrop__box box = raindrop__bounds(frame, v, &placed);
+    const raindrop__box box = raindrop__band_box(batch, v, NULL);
     float d[3], colour[4], flicker[2];
-    box.y0 = sat__max_int(box.y0, y0);
-    box.y1 = sat__min_int(box.y1, y1);
     raindrop__combine(d, 1, frame->rain->drops[index].position, -1, frame->camera.position);
     raindrop__far(colour, frame->environment, d);
-    flicker[0] = raindrop__clamp(swing.amplitude * colour[3], -0.6f, 0.6f);
-    flicker[1] = 2.5f * flicker[0];
+    flicker[0] = raindrop__clamp(swing.amplitude * colour[3], -RAINDROP__FLICKERS, RAINDROP__FLICKERS);
+    flicker[1] = RAINDROP__FLICKERS_MORE * flicker[0];
     batch->swing = &swing;
     batch->flicker = fabsf(flicker[0]) > 0 ? flicker : NULL;
     raindrop__draw_far_any(batch, v, &box);
     batch->swing = NULL;
     batch->flicker = NULL;
-    if (frame->options.lamp_count > 0) raindrop__draw_glints(batch, v, y0, y1);
+    if (frame->options.lamp_count > 0) raindrop__draw_glints(batch, v);
 }
 
 /* ------------------------------------------------------------------------------------------------
@@ -4259,8 +4314,8 @@ static inline int raindrop__push_map(raindrop__batch *batch, int at, float s, fl
     batch->fresnel[at] = texel[3];
     batch->pass[at] = 1 - texel[3];
     raindrop__surface(&ray, sqrtf(1 - b2), sqrtf(n * n - b2) / n, n);
-    batch->reflect_cone[at] = 2 * batch->width + pixel;
-    batch->refract_cone[at] = fabsf(ray.footprint_refracted * batch->width - pixel);
+    batch->reflect_cone[at] = 2 * batch->gaze.width + pixel;
+    batch->refract_cone[at] = fabsf(ray.footprint_refracted * batch->gaze.width - pixel);
     return 1;
 }
 #endif
@@ -4270,11 +4325,11 @@ static inline int raindrop__push_sprite(raindrop__batch *batch, int at, float s,
 {
     float d[3], p[3], turned[3], rho = sqrtf(s * s + t * t);
     int i;
-    batch->alpha[at] = raindrop__clamp((1 - rho) / batch->width + 0.5f, 0, 1);
+    batch->alpha[at] = raindrop__clamp((1 - rho) / batch->gaze.width + 0.5f, 0, 1);
     if (!(batch->alpha[at] > 0)) return 0;
-    if (rho > 0.999f) {
-        s *= 0.999f / rho;
-        t *= 0.999f / rho;
+    if (rho > RAINDROP__INNER) {
+        s *= RAINDROP__INNER / rho;
+        t *= RAINDROP__INNER / rho;
     }
     raindrop_sprite_ray(d, p, &batch->one_minus_b2[at], s, t, distance);
     raindrop__rotate(turned, frame[0], frame[1], frame[2], d);
@@ -4317,29 +4372,27 @@ static inline void raindrop__draw_sprite(raindrop__batch *batch, const raindrop_
 
 /* ---- one drop, one band, one picture */
 
-static inline void raindrop__draw(raindrop__batch *batch, const raindrop__visible *v, int y0, int y1)
+static inline void raindrop__draw(raindrop__batch *batch, const raindrop__visible *v)
 {
     const raindrop__frame *frame = batch->frame;
-    raindrop__placed placed = {0, 0, 0, 0, 0, 0, 0};
+    const int is_far = (v->drop & RAINDROP__FAR_BIT) != 0;
+    raindrop__placed placed;
     raindrop__box box;
-    if (!(v->drop & RAINDROP__FAR_BIT)) {
+    if (!is_far) {
         raindrop__place_drop(&placed, frame, v->drop);
         raindrop__begin_drop(batch, v, &placed);
+    } else if (raindrop__flickers(frame, &frame->rain->drops[v->drop & ~RAINDROP__FAR_BIT])) {
+        raindrop__draw_flickering(batch, v);
+        return;
     }
-    box = raindrop__bounds(frame, v, &placed);
-    box.y0 = sat__max_int(box.y0, y0);
-    box.y1 = sat__min_int(box.y1, y1);
-    if (raindrop__is_sprite(frame)) raindrop__draw_sprite(batch, v, &placed, &box);
-    else if (v->drop & RAINDROP__FAR_BIT) {
-        if (raindrop__flickers(frame, &frame->rain->drops[v->drop & ~RAINDROP__FAR_BIT]))
-            raindrop__draw_flickering(batch, v, y0, y1);
-        else raindrop__draw_far_any(batch, v, &box);
-    }
+    box = raindrop__band_box(batch, v, is_far ? NULL : &placed);
+    if (is_far) raindrop__draw_far_any(batch, v, &box);
+    else if (raindrop__is_sprite(frame)) raindrop__draw_sprite(batch, v, &placed, &box);
 #ifndef RAINDROP_NO_STREAK
     else if (!raindrop__is_still(v)) raindrop__draw_soft(batch, v, &box);
 #endif
     else raindrop__draw_still(batch, v, &box);
-    if (frame->options.lamp_count > 0 && !(v->drop & RAINDROP__FAR_BIT)) raindrop__draw_glints(batch, v, y0, y1);
+    if (frame->options.lamp_count > 0 && !is_far) raindrop__draw_glints(batch, v);
 }
 
 /* Records lie in the order of the array, not of the depths: those of the next drops are asked for before they are
@@ -4355,10 +4408,22 @@ static inline void raindrop__fetch(const raindrop__visible *v)
 #endif
 }
 
-static inline void raindrop__draw_queue(raindrop__batch *batch, const uint32_t *queue, int count, int y0, int y1)
+static inline void raindrop__draw_queue(raindrop__batch *batch, const uint32_t *queue, int count)
 {
     int i;
-    for (i = 0; i < count; i++) raindrop__draw(batch, &batch->frame->rain->visible[queue[i]], y0, y1);
+    for (i = 0; i < count; i++) raindrop__draw(batch, &batch->frame->rain->visible[queue[i]]);
+}
+
+/* What all drops of a picture share. */
+static inline void raindrop__begin_batch(raindrop__batch *batch, const raindrop__frame *frame, raindrop__tally *tally)
+{
+    memset(batch, 0, sizeof *batch);
+    batch->frame = frame;
+    batch->tally = tally;
+    batch->covers = 1;
+    batch->gaze.environment = frame->environment;
+    batch->gaze.exit_fresnel = frame->options.exit_fresnel;
+    batch->gaze.pixel = 1 / frame->focal;
 }
 
 static void raindrop__draw_bands(int begin, int end, int worker, void *context)
@@ -4368,22 +4433,20 @@ static void raindrop__draw_bands(int begin, int end, int worker, void *context)
     raindrop__batch batch;
     uint32_t queue[QUEUE];
     int band, i, n;
-    memset(&batch, 0, sizeof batch);
-    batch.frame = frame;
-    batch.covers = 1;
-    batch.tally = &frame->rain->tally[worker];
+    raindrop__begin_batch(&batch, frame, &frame->rain->tally[worker]);
     for (band = begin; band < end; band++) {
-        int y0 = band * RAINDROP__BAND, y1 = sat__min_int(y0 + RAINDROP__BAND, frame->height);
+        batch.y0 = band * RAINDROP__BAND;
+        batch.y1 = sat__min_int(batch.y0 + RAINDROP__BAND, frame->height);
         for (i = n = 0; i < frame->visible; i++) {
             uint32_t rows = frame->rain->rows[i];
-            if ((int)(rows >> 16) >= y1 || (int)(rows & 0xffffu) <= y0) continue;
+            if ((int)(rows >> 16) >= batch.y1 || (int)(rows & 0xffffu) <= batch.y0) continue;
             queue[n] = (uint32_t)frame->order[i];
             raindrop__fetch(&frame->rain->visible[queue[n]]);
             if (++n < QUEUE) continue;
-            raindrop__draw_queue(&batch, queue, n, y0, y1);
+            raindrop__draw_queue(&batch, queue, n);
             n = 0;
         }
-        raindrop__draw_queue(&batch, queue, n, y0, y1);
+        raindrop__draw_queue(&batch, queue, n);
     }
 }
 
@@ -4399,7 +4462,7 @@ static inline int raindrop__frame_is_valid(raindrop__frame *frame)
 
 static inline void raindrop__set_frame(raindrop__frame *frame)
 {
-    if (frame->environment) frame->water = raindrop__water_of(frame->environment->n);
+    if (frame->environment) frame->water = raindrop__water_of(frame->environment->n, frame->options.orders);
     if (raindrop__is_sprite(frame)) { /* still spheres under the environment alone, as published */
         frame->options.oscillation = 0;
         frame->options.lamp_count = 0;
@@ -4611,17 +4674,30 @@ RAINDROP_DEF const char *raindrop_gl_glsl(void)
 
 /* The constants that the shaders share with the code above, as it has them. */
 #define RAINDROP__TEXT(value) #value
-#define RAINDROP__CONSTANT(name, value) "const float " name " = " RAINDROP__TEXT(value) ";\n"
+#define RAINDROP__WORD(name) RAINDROP__TEXT(name)
+#define RAINDROP__FLOAT(name, value) "const float " name " = " RAINDROP__TEXT(value) ";\n"
 static const char raindrop__glsl_constants[] =
-    RAINDROP__CONSTANT("LEAST_RADIUS", RAINDROP__LEAST_RADIUS)
-    RAINDROP__CONSTANT("LEAST_BLUR", RAINDROP__LEAST_BLUR)
-    RAINDROP__CONSTANT("SHORT", RAINDROP__SHORT)
-    RAINDROP__CONSTANT("GRAVITY", RAINDROP__GRAVITY)
-    RAINDROP__CONSTANT("VISCOSITY", RAINDROP__VISCOSITY)
-    RAINDROP__CONSTANT("DENSITY", RAINDROP__DENSITY)
-    RAINDROP__CONSTANT("TENSION", RAINDROP__TENSION)
-    RAINDROP__CONSTANT("PERIOD", RAINDROP__PERIOD)
-    RAINDROP__CONSTANT("LEAST_LAMP", RAINDROP__LEAST_LAMP);
+    RAINDROP__FLOAT("PI", RAINDROP__PI)
+    RAINDROP__FLOAT("INNER", RAINDROP__INNER)
+    RAINDROP__FLOAT("FINER", RAINDROP__FINER)
+    RAINDROP__FLOAT("LOG2_STEP", RAINDROP__LOG2_STEP)
+    RAINDROP__FLOAT("LOG2_BIAS", RAINDROP__LOG2_BIAS)
+    RAINDROP__FLOAT("LEAST_RADIUS", RAINDROP__LEAST_RADIUS)
+    RAINDROP__FLOAT("LEAST_BLUR", RAINDROP__LEAST_BLUR)
+    RAINDROP__FLOAT("SHORT", RAINDROP__SHORT)
+    RAINDROP__FLOAT("GAUSS", RAINDROP__GAUSS)
+    RAINDROP__FLOAT("TENSION", RAINDROP__TENSION)
+    RAINDROP__FLOAT("DENSITY", RAINDROP__DENSITY)
+    RAINDROP__FLOAT("PERIOD", RAINDROP__PERIOD)
+    RAINDROP__FLOAT("LEAST_LAMP", RAINDROP__LEAST_LAMP)
+    RAINDROP__FLOAT("LEAST_GLINT", RAINDROP__LEAST_GLINT)
+    RAINDROP__FLOAT("NEAREST", RAINDROP__NEAREST)
+    RAINDROP__FLOAT("SWINGS", RAINDROP__SWINGS)
+    RAINDROP__FLOAT("SWINGS_RISE", RAINDROP__SWINGS_RISE)
+    RAINDROP__FLOAT("OVERTONE", RAINDROP__OVERTONE)
+    RAINDROP__FLOAT("LEAN", RAINDROP__LEAN)
+    RAINDROP__FLOAT("FLICKERS", RAINDROP__FLICKERS)
+    RAINDROP__FLOAT("FLICKERS_MORE", RAINDROP__FLICKERS_MORE);
 
 /* raindrop__hash and its like. */
 static const char raindrop__glsl_random[] =
@@ -4655,9 +4731,9 @@ static const char raindrop__glsl_environment[] =
     SAT__GLSL(
         vec3 look(vec3 d, float cone) {
             vec3 at = fold(d);
-            float texels = 0.6 * cone * 0.5 * environment_size.x / (at.z * sqrt(at.z));
+            float texels = FINER * cone * 0.5 * environment_size.x / (at.z * sqrt(at.z));
             /* raindrop__rough_log2 */
-            float lod = texels > 1.0 ? float(floatBitsToUint(texels)) * 1.1920929e-7 - 126.957 : 0.0;
+            float lod = texels > 1.0 ? float(floatBitsToUint(texels)) * LOG2_STEP - LOG2_BIAS : 0.0;
             lod = clamp(lod, 0.0, environment_size.y - 1.0);
             float level = floor(lod);
             vec3 fine = atlas(at.xy, level);
@@ -4682,7 +4758,7 @@ static const char raindrop__glsl_veil[] =
             vec3 d = vec3((vec2(sat_pixel()) + 0.5 - view.xy) / view.z, 1.0);
             float way = rain.z;
             if (view.w > 0.5) {
-                float at = texelFetch(depth, sat_pixel(), 0).r;
+                float at = texelFetch(depth, sat_pixel() + sat_from, 0).r;
                 bool is_empty = planes.y > 0.0 ? at <= 0.0 : at >= 1.0;
                 if (!is_empty) way = min(way, length(d) * planes.y / (planes.z * at + planes.w - planes.x));
             }
@@ -4694,7 +4770,7 @@ static const char raindrop__glsl_veil[] =
     "#ifdef BOW\n"
     SAT__GLSL(
             int side = textureSize(bow, 0).x, count = side * side;
-            float x = acos(clamp(dot(d, sun) / length(d), -1.0, 1.0)) * float(count) / 3.14159265 - 0.5;
+            float x = acos(clamp(dot(d, sun) / length(d), -1.0, 1.0)) * float(count) / PI - 0.5;
             int bin = clamp(int(x), 0, count - 2), after = bin + 1;
             vec3 a = texelFetch(bow, ivec2(bin % side, bin / side), 0).rgb,
                 b = texelFetch(bow, ivec2(after % side, after / side), 0).rgb;
@@ -4727,16 +4803,16 @@ static const char raindrop__glsl_draw_vertex[] =
         void swing_of(uint index) { /* raindrop__swing_of */
             beat = wobble = vec4(0.0, 0.0, 0.0, 0.0);
             wobble.y = motion.w;
-            if (drop.w <= 0.0004) return;
+            if (drop.w <= SWINGS) return;
             uint a = hash(8u, index), b = hash(9u, index);
-            vec2 rate = sqrt(8.0 * TENSION / DENSITY / (drop.w * drop.w * drop.w)) / 6.28318531 * vec2(1.0, 1.9364917);
+            vec2 rate = sqrt(8.0 * TENSION / DENSITY / (drop.w * drop.w * drop.w)) / (2.0 * PI) * vec2(1.0, OVERTONE);
             rate = floor(rate * PERIOD) / PERIOD;
-            wobble.x = swings.x * clamp((drop.w - 0.0004) * 5000.0, 0.0, 1.0);
+            wobble.x = swings.x * clamp((drop.w - SWINGS) * SWINGS_RISE, 0.0, 1.0);
             beat = vec4(vec2(uniform_of(a), uniform_of(b)) + fract(rate * swings.y), rate);
-            float turn = 6.28318531 * uniform_of(mix_bits(a));
+            float turn = 2.0 * PI * uniform_of(mix_bits(a));
             lean = vec2(cos(turn), sin(turn));
         }
-        float sine_of(float turns) { return sin(6.28318531 * fract(turns)); })
+        float sine_of(float turns) { return sin(2.0 * PI * fract(turns)); })
     "#endif\n"
     "#ifdef SOFT\n"
     SAT__GLSL(
@@ -4792,7 +4868,7 @@ static const char raindrop__glsl_draw_place[] =
     SAT__GLSL(
             bool kept = motion.w > 0.0 && motion.w <= 1.0 && drop.w > 0.0 && d2 > 1.0001 * ball * ball
                 && v.z - ball > view.w && v.z > 1.0001 * ball && v.z >= slice.x && v.z < slice.y;
-            if (kept && 3.14159265 * area_radius * area_radius >= limits.y) {
+            if (kept && PI * area_radius * area_radius >= limits.y) {
                 vec2 middle = view.xy + view.z * v.xy / v.z;
                 seen = vec4(v / r, ratio);
                 place = vec4(middle, area_radius, v.z / (view.z * r));)
@@ -4843,19 +4919,19 @@ static const char raindrop__glsl_draw_place[] =
     "#ifdef GLINT\n"
     SAT__GLSL(far_colour.rgb = light;)
     "#elif defined SWING\n"
-    SAT__GLSL(wobble.zw = clamp(wobble.x * far_colour.a, -0.6, 0.6) * vec2(1.0, 2.5);)
+    SAT__GLSL(wobble.zw = clamp(wobble.x * far_colour.a, -FLICKERS, FLICKERS) * vec2(1.0, FLICKERS_MORE);)
     "#endif\n"
     SAT__GLSL(far_colour.a = 1.0;)
     /* raindrop__far_shape */
     SAT__GLSL(
                     bool swapped = abs(blurred.x) > abs(blurred.y);
                     vec2 way = swapped ? blurred.yx : blurred.xy;
-                    float a = 3.14159265 * (area_radius * area_radius + blurred.z * blurred.z), h2 = way.y * way.y + a,
+                    float a = PI * (area_radius * area_radius + blurred.z * blurred.z), h2 = way.y * way.y + a,
                         slope = way.x * way.y / h2;
                     vec2 half_size = 0.5 * sqrt(vec2(a * (1.0 + way.x * way.x / h2), h2));
                     seen = vec4(half_size.y, slope, half_size.x, swapped ? 1.0 : 0.0);
                     middle = place.xy;
-                    place.w = 3.14159265 * area_radius * area_radius / (4.0 * half_size.x * half_size.y);
+                    place.w = PI * area_radius * area_radius / (4.0 * half_size.x * half_size.y);
                     if (blurred.z <= LEAST_RADIUS) { /* one more pixel on all sides, whose squares it may touch */
                         right_reach = vec2(half_size.x + 0.51 + 0.5 * abs(slope), 0.0);
                         up_reach = vec2(slope, 1.0) * (half_size.y + 0.51);
@@ -4907,7 +4983,7 @@ static const char raindrop__glsl_lamp[] =
             float b = clamp(bow + (cone.z < 2.5 ? -1.0 : 1.0) * sqrt(2.0 * e / max(bend, 0.1)), range.x, range.y);
             for (int i = 0; i < 6; i++) {
                 float slope = 2.0 / (sqrt((1.0 - b) * (1.0 + b)) + 1e-4) - 4.0 / sqrt(n * n - b * b);
-                b = clamp(b - (3.14159265 + 2.0 * asin(b) - 4.0 * asin(b / n) - angle) / slope, range.x, range.y);
+                b = clamp(b - (PI + 2.0 * asin(b) - 4.0 * asin(b / n) - angle) / slope, range.x, range.y);
             }
             return b * b;
         }
@@ -4926,7 +5002,7 @@ static const char raindrop__glsl_glint[] =
             float b2 = turned_b2(angle);
             for (int i = 0; per_distance > 0.0 && i < 8; i++) {
                 float off = asin(sqrt(b2) * per_distance);
-                b2 = 0.5 * (b2 + turned_b2(clamp(cone.z > 0.5 ? angle + off : angle - off, 0.0, 3.14159265)));
+                b2 = 0.5 * (b2 + turned_b2(clamp(cone.z > 0.5 ? angle + off : angle - off, 0.0, PI)));
             }
             return b2;
         }
@@ -4939,13 +5015,13 @@ static const char raindrop__glsl_glint[] =
     SAT__GLSL(
         bool glint(out vec3 light, inout vec2 middle, inout float radius, bool is_far) {
             vec3 d = drop.xyz - eye, to = lamp.xyz - drop.xyz;
-            float away = length(to), distance = length(d) / drop.w, per = is_far ? 0.0 : min(1.0 / distance, 0.25);
+            float away = length(to), distance = length(d) / drop.w, per = is_far ? 0.0 : min(1.0 / distance, NEAREST);
             light = vec3(0.0);
             if (away <= drop.w) return false;
             d = normalize(d);
             to /= away;
             float cosine = clamp(dot(d, to), -1.0, 1.0), angle = acos(cosine), wide = max(lamp.w / max(away, lamp.w),
-                LEAST_LAMP), low = max(angle - wide, 0.0), high = min(angle + wide, 3.14159265);
+                LEAST_LAMP), low = max(angle - wide, 0.0), high = min(angle + wide, PI);
             if (cone.z > 1.5 && high + 1.02 * per < cone.w) return false;
             float low_b2 = glint_b2(low, per), high_b2 = glint_b2(high, per), b2 = glint_b2(angle, per), b = sqrt(b2);
             float g = abs(high_b2 - low_b2) / (4.0 * sin(0.5 * (low + high)) * sin(0.5 * (high - low)) + 1e-9);
@@ -4958,12 +5034,12 @@ static const char raindrop__glsl_glint[] =
                 normal = turn * b * sqrt(1.0 - off * off) * side - b * off * d - sqrt((1.0 - b) * (1.0 + b)) * ray;
             float y2 = normal.y * normal.y, e = wobble.x / 1.5, old = radius;
             wobble.zw = e * vec2(-4.0 * (1.5 * y2 - 0.5),
-                -15.0 * (5.0 * y2 - 1.0) * (normal.x * lean.x + normal.z * lean.y) / 2.07);
+                -15.0 * (5.0 * y2 - 1.0) * (normal.x * lean.x + normal.z * lean.y) / LEAN);
             if (!is_far) {
                 middle = view.xy + view.z * vec2(dot(ray, right), dot(ray, up)) / -dot(ray, back);
-                radius = clamp(radius * wide * sqrt(g), 0.3, radius);
+                radius = clamp(radius * wide * sqrt(g), LEAST_GLINT, radius);
             }
-            light *= old * old / (3.14159265 * radius * radius);
+            light *= old * old / (PI * radius * radius);
             return g > 0.0 && light.r + light.g + light.b > 0.0;
         });
 
@@ -5045,7 +5121,7 @@ static const char raindrop__glsl_draw_sprite[] =
             float rho = length(st), alpha = clamp((1.0 - rho) * view.z / sqrt(d2 - 1.0) + 0.5, 0.0, 1.0),
                 dist = sqrt(d2);
             if (alpha <= 0.0) discard;
-            if (rho > 0.999) st *= 0.999 / rho;
+            if (rho > INNER) st *= INNER / rho;
             vec2 xy = st / sqrt(d2 - 1.0);
             float c2 = 1.0 / (1.0 + dot(xy, xy));
             vec3 d = vec3(xy, -1.0) * sqrt(c2), p = dist * vec3(xy * c2, 1.0 - c2);
@@ -5099,14 +5175,14 @@ static const char raindrop__glsl_flat[] =
         flat in vec4 beat;
         flat in vec4 wobble;
         float bent, radii; /* axis ratio of the moment, and pixels in radii */
-        float sine_of(float turns) { return sin(6.28318531 * fract(turns)); }
+        float sine_of(float turns) { return sin(2.0 * PI * fract(turns)); }
         float bessel(float x) {
             float q = 0.25 * x * x;
             return 1.0 + q * (1.0 + q * (1.0 / 4.0 + q * (1.0 / 36.0 + q * (1.0 / 576.0 + q / 14400.0))));
         }
         float flicker(float along) {
             float span = shutter.w / (2.0 * seen.x), dt = along * span;
-            vec2 turn = 3.14159265 * beat.zw * span, x = wobble.zw;
+            vec2 turn = PI * beat.zw * span, x = wobble.zw;
             if (turn.x > 0.01) x.x *= sin(turn.x) / turn.x;
             if (turn.y > 0.01) x.y *= sin(turn.y) / turn.y;
             return exp(x.x * sine_of(beat.x + beat.z * dt) + x.y * sine_of(beat.y + beat.w * dt))
@@ -5128,7 +5204,7 @@ static const char raindrop__glsl_flat[] =
             q -= dot(q, unit) / d2 * unit;
             vec2 rim = vec2(dot(q * s, right), dot(q * s, up));
             float b = length(q) + 1e-9, length_of_rim = length(rim) + 1e-20, slope = radii * length_of_rim / b + 1e-9;
-            q *= min(1.0, 0.999 / b);
+            q *= min(1.0, INNER / b);
             vec3 hit = q - sqrt((1.0 - dot(q, q)) / d2) * unit, normal = normalize(hit * s),
                 inner = refract(d, normal, 1.0 / n);
             bool total = dot(inner, inner) < 0.5; /* refract then gives 0 */
@@ -5185,8 +5261,8 @@ static const char raindrop__glsl_draw_trace[] =
             })
     "#endif\n"
     SAT__GLSL(
-            f.p *= min(1.0, 0.999 / b);
-            f.one_minus_b2 = max(1.0 - b2, 0.001999);
+            f.p *= min(1.0, INNER / b);
+            f.one_minus_b2 = max(1.0 - b2, 1.0 - INNER * INNER);
             f.ray = raindrop_trace(f.d, f.p, f.one_minus_b2, optics.x);
             f.cover = half_plane((1.0 - b) / slope - slope / max(24.0 * b, 12.0 * slope),
                 p.xy / max(length(p.xy), 1e-20));
@@ -5204,7 +5280,7 @@ static const char raindrop__glsl_draw_soft[] =
             float x = clamp((apart * apart + r * r - c * c) / (2.0 * apart * r), -1.0, 1.0);
             float y = clamp((apart * apart + c * c - r * r) / (2.0 * apart * c), -1.0, 1.0);
             float k = (r + c - apart) * (apart + r - c) * (apart - r + c) * (apart + r + c);
-            return (r * r * acos(x) + c * c * acos(y) - 0.5 * sqrt(max(k, 0.0))) / (3.14159265 * c * c);
+            return (r * r * acos(x) + c * c * acos(y) - 0.5 * sqrt(max(k, 0.0))) / (PI * c * c);
         })
     /* raindrop__mean_chord, raindrop__mean_clamp, raindrop__path_cover */
     SAT__GLSL(
@@ -5220,7 +5296,7 @@ static const char raindrop__glsl_draw_soft[] =
         })
     SAT__GLSL(
         float path_cover(vec2 at, vec2 along, float way, float u, float w) {
-            vec2 apart = 0.288675 * way * along;
+            vec2 apart = GAUSS * way * along;
             if (way < SHORT) return 0.5 * (disc_cover(path.w, at - apart) + disc_cover(path.w, at + apart));
             float width = 1.0 / max(abs(along.x), abs(along.y)), h = mean_chord(path.w, w, width);
             return h > 0.0 ? (mean_clamp(u + h, way, width) - mean_clamp(u - h, way, width)) / way : 0.0;
@@ -5304,13 +5380,23 @@ static const char raindrop__glsl_draw_ray[] =
    >> rain shader   raindrop__step and raindrop__reenter in floats
    ------------------------------------------------------------------------------------------------ */
 
+#ifndef RAINDROP_NO_RAIN
+#define RAINDROP__FUNCTION(head, value) "float " head " { return " RAINDROP__TEXT(value) "; }\n"
 static const char raindrop__glsl_step[] =
+    RAINDROP__FLOAT("GRAVITY", RAINDROP__GRAVITY)
+    RAINDROP__FLOAT("VISCOSITY", RAINDROP__VISCOSITY)
+    RAINDROP__FLOAT("BEST_SPEED", RAINDROP__BEST_SPEED)
+    RAINDROP__FLOAT("BEST_MM", RAINDROP__BEST_MM)
+    RAINDROP__FLOAT("BEST_POWER", RAINDROP__BEST_POWER)
+    RAINDROP__FLOAT("FORGETS", RAINDROP__FORGETS)
+    RAINDROP__FUNCTION("oblate(float d)", RAINDROP__OBLATE(d))
+    "const uint TURN = " RAINDROP__WORD(RAINDROP__TURN) ";\n"
     SAT__GLSL(float decay(float x) { return x < 1e-3 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x); })
     SAT__GLSL(float log_1p(float x) { return abs(x) < 1e-3 ? x * (1.0 - x * (0.5 - x / 3.0)) : log(1.0 + x); })
     SAT__GLSL(
         float terminal(float mm) {
             float stokes = GRAVITY * DENSITY * mm * mm * 1e-6 / (18.0 * VISCOSITY),
-                best = 9.32 * decay(pow(mm / 1.77, 1.147));
+                best = BEST_SPEED * decay(pow(mm / BEST_MM, BEST_POWER));
             float slow = min(stokes, best), s = slow / stokes, t = slow / best;
             return slow * inversesqrt(sqrt(s * s * s * s + t * t * t * t));
         })
@@ -5381,7 +5467,6 @@ static const char raindrop__glsl_advance[] =
         uniform vec4 step_and; /* dt, settled, own drops, published speed */
         uniform vec2 fastest; /* terminal velocity of the largest, oblate */
         uniform uint stream;
-        const uint TURN = 0x2545f491u; /* RAINDROP__TURN */
         out vec4 next_drop, next_motion;
         float diameter(uint stream, uint i, bool at_plane) {
             float span = sizes.z - sizes.y, all = 1.0 - exp(-sizes.x * span), d = sizes.y;
@@ -5391,10 +5476,6 @@ static const char raindrop__glsl_advance[] =
                 if (!at_plane || step_and.w > 0.0 || uniform_of(mix_bits(bits)) * fastest.x < terminal(d)) break;
             }
             return d;
-        })
-    SAT__GLSL(
-        float oblateness(float d) {
-            return min(1.0, 1.0048 + d * (5.7e-4 + d * (-2.628e-2 + d * (3.682e-3 - d * 1.677e-4))));
         })
     SAT__GLSL(
         void main() {
@@ -5409,7 +5490,7 @@ static const char raindrop__glsl_advance[] =
                     uint i = uint(gl_VertexID);
                     uint s = stream;
                     float mm, speed, left = velocity.y < 0.0 ? below / -velocity.y : 0.0;
-                    if (left > 64.0 * box.y / (step_and.w > 0.0 ? step_and.w : fastest.x)) { /* raindrop__forgets */
+                    if (left > FORGETS * box.y / (step_and.w > 0.0 ? step_and.w : fastest.x)) { /* raindrop__forgets */
                         mm = diameter(s, i, false);
                         below = uniform_of(hash(s + 1u, i)) * box.y;
                     } else {
@@ -5422,7 +5503,7 @@ static const char raindrop__glsl_advance[] =
                         below = max(left * speed, 0.0);
                     }
                     radius = 0.5e-3 * mm;
-                    ratio = fastest.y > 0.5 ? oblateness(mm) : 1.0;
+                    ratio = fastest.y > 0.5 ? min(1.0, oblate(mm)) : 1.0;
                     velocity = wind - vec3(0.0, step_and.w > 0.0 ? step_and.w : terminal(mm), 0.0);
                     at.x = centre.x + (uniform_of(hash(s, i)) - 0.5) * box.x;
                     at.z = centre.z + (uniform_of(hash(s + 2u, i)) - 0.5) * box.z;
@@ -5436,6 +5517,7 @@ static const char raindrop__glsl_advance[] =
             gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
             gl_PointSize = 1.0;
         });
+#endif
 
 /* ------------------------------------------------------------------------------------------------
    >> OpenGL   the object and its calls
@@ -5448,7 +5530,7 @@ enum { RAINDROP__GL_TEXTURE_MIN_LOD_LINEAR = 0x2703 }; /* GL_LINEAR_MIPMAP_LINEA
 enum { RAINDROP__GL_SOFT = 1, RAINDROP__GL_FLAT = 2 };
 enum {
     RAINDROP__GL_MAP, RAINDROP__GL_SPRITE, RAINDROP__GL_RAYS, RAINDROP__GL_SWING = RAINDROP__GL_RAYS + 4,
-    RAINDROP__GL_GLINT, RAINDROP__GL_VEIL, RAINDROP__GL_BOWS, RAINDROP__GL_ADVANCE, RAINDROP__GL_PROGRAMS
+    RAINDROP__GL_GLINT, RAINDROP__GL_VEIL, RAINDROP__GL_BOWS, RAINDROP__GL_PROGRAMS
 };
 
 /* What a program is made for: bits in the order of the names. */
@@ -5459,46 +5541,51 @@ enum {
 static const char *const raindrop__gl_needs[8] = {"map", "sprites", "motion", "oblate", "orders", "veil", "oscillation",
                                                   "lamps"};
 
-/* As sat__gl_program, with vertices of several texts. */
-typedef struct raindrop__program {
-    int when;
-    const char *defines, *vertex[6], *fragment[8];
-} raindrop__program;
+static const char *const raindrop__vertices[] = {raindrop__glsl_draw_vertex, raindrop__glsl_draw_place, NULL},
+                         *const raindrop__vertices_swing[] = {raindrop__glsl_random, raindrop__glsl_draw_vertex,
+                                                              raindrop__glsl_draw_place, NULL},
+                         *const raindrop__vertices_glint[] = {raindrop__glsl_random, raindrop__glsl_draw_vertex,
+                                                              raindrop__glsl_lamp, raindrop__glsl_glint,
+                                                              raindrop__glsl_draw_place, NULL};
 
-#define RAINDROP__DROPS {raindrop__glsl_draw_vertex, raindrop__glsl_draw_place}
+#define RAINDROP__SKY "environment far_drops reflections refractions"
 #define RAINDROP__SPRITES {SAT__GL_PIXEL, raindrop__glsl_shade, raindrop__glsl_draw_sprite}
 #define RAINDROP__RAYS                                                                                                 \
     {SAT__GL_PIXEL, raindrop__glsl_shade, raindrop__glsl_orders, raindrop__glsl_flat, raindrop__glsl_draw_trace,       \
      raindrop__glsl_draw_soft, raindrop__glsl_draw_ray}
-#define RAINDROP__SWINGS "#define LOOK 3\n#define SOFT 1\n#define FLAT 1\n#define SWING 1\n"
+#define RAINDROP__SWINGING "#define LOOK 3\n#define SOFT 1\n#define FLAT 1\n#define SWING 1\n"
 
-static const raindrop__program raindrop__programs[RAINDROP__GL_PROGRAMS] = {
-    {RAINDROP__IF_MAP, "#define LOOK 0\n#define FLAT 1\n", RAINDROP__DROPS, RAINDROP__SPRITES},
-    {RAINDROP__IF_SPRITES, "#define LOOK 1\n#define FLAT 1\n", RAINDROP__DROPS, RAINDROP__SPRITES},
-    {0, "#define LOOK 3\n", RAINDROP__DROPS, RAINDROP__RAYS},
-    {RAINDROP__IF_MOTION, "#define LOOK 3\n#define SOFT 1\n", RAINDROP__DROPS, RAINDROP__RAYS},
-    {RAINDROP__IF_OBLATE, "#define LOOK 3\n#define FLAT 1\n", RAINDROP__DROPS, RAINDROP__RAYS},
-    {RAINDROP__IF_MOTION | RAINDROP__IF_OBLATE, "#define LOOK 3\n#define SOFT 1\n#define FLAT 1\n", RAINDROP__DROPS,
+static const sat__gl_program raindrop__programs[RAINDROP__GL_PROGRAMS] = {
+    {"raindrop: map", RAINDROP__IF_MAP, RAINDROP__SKY, "#define LOOK 0\n#define FLAT 1\n", raindrop__vertices,
+     RAINDROP__SPRITES},
+    {"raindrop: sprites", RAINDROP__IF_SPRITES, RAINDROP__SKY, "#define LOOK 1\n#define FLAT 1\n", raindrop__vertices,
+     RAINDROP__SPRITES},
+    {"raindrop: rays", 0, RAINDROP__SKY, "#define LOOK 3\n", raindrop__vertices, RAINDROP__RAYS},
+    {"raindrop: motion", RAINDROP__IF_MOTION, RAINDROP__SKY, "#define LOOK 3\n#define SOFT 1\n", raindrop__vertices,
      RAINDROP__RAYS},
-    {RAINDROP__IF_SWING, RAINDROP__SWINGS,
-     {raindrop__glsl_random, raindrop__glsl_draw_vertex, raindrop__glsl_draw_place}, RAINDROP__RAYS},
-    {RAINDROP__IF_LAMPS, RAINDROP__SWINGS "#define GLINT 1\n",
-     {raindrop__glsl_random, raindrop__glsl_draw_vertex, raindrop__glsl_lamp, raindrop__glsl_glint,
-      raindrop__glsl_draw_place}, RAINDROP__RAYS},
-    {RAINDROP__IF_VEIL, "", {NULL}, {SAT__GL_PIXEL, raindrop__glsl_veil}},
-    {RAINDROP__IF_VEIL, "#define BOW 1\n", {NULL}, {SAT__GL_PIXEL, raindrop__glsl_veil}},
-    {0, "", {raindrop__glsl_random, raindrop__glsl_step, raindrop__glsl_advance}, {NULL}},
+    {"raindrop: oblate", RAINDROP__IF_OBLATE, RAINDROP__SKY, "#define LOOK 3\n#define FLAT 1\n", raindrop__vertices,
+     RAINDROP__RAYS},
+    {"raindrop: oblate, motion", RAINDROP__IF_MOTION | RAINDROP__IF_OBLATE, RAINDROP__SKY,
+     "#define LOOK 3\n#define SOFT 1\n#define FLAT 1\n", raindrop__vertices, RAINDROP__RAYS},
+    {"raindrop: oscillation", RAINDROP__IF_SWING, RAINDROP__SKY, RAINDROP__SWINGING, raindrop__vertices_swing,
+     RAINDROP__RAYS},
+    {"raindrop: glints", RAINDROP__IF_LAMPS, RAINDROP__SKY, RAINDROP__SWINGING "#define GLINT 1\n",
+     raindrop__vertices_glint, RAINDROP__RAYS},
+    {"raindrop: veil", RAINDROP__IF_VEIL, "far_drops depth", NULL, NULL, {SAT__GL_FROM SAT__GL_PIXEL, raindrop__glsl_veil}},
+    {"raindrop: veil with bows", RAINDROP__IF_VEIL, "far_drops depth bow", "#define BOW 1\n", NULL,
+     {SAT__GL_FROM SAT__GL_PIXEL, raindrop__glsl_veil}},
 };
 
 struct raindrop_gl {
     sat__gl gl;
     raindrop_gl_options options;
     unsigned programs[RAINDROP__GL_PROGRAMS]; /* 0: not among those that create's options ask for */
+    unsigned advance;                 /* the program of the rain's step */
     int made;                         /* RAINDROP__IF_... of create */
     unsigned environment, far_drops, bow, map[2];
     float sun_direction[3], sun_irradiance[3];
     unsigned drops[2], arrays[2];     /* ping-pong buffers and their vertex arrays */
-    unsigned scratch, target;         /* a texture of one texel: transform feedback needs a framebuffer of ours */
+    sat__gl_target scratch;           /* of one texel: transform feedback needs a framebuffer of ours */
     int resolution, levels, count, front, settled, own;
     float low[3], high[3];            /* where the caller's drops were in set_rain */
     int flat;                         /* some drops are, or will be when they come back on top */
@@ -5552,30 +5639,25 @@ static inline int raindrop__gl_given(const raindrop_gl_options *o)
 
 static inline sat_result raindrop__gl_programs(raindrop_gl *g)
 {
-    static const char *const varyings[] = {"next_drop", "next_motion", NULL};
     const char *const library[4] = {raindrop_gl_glsl(), raindrop__glsl_constants, raindrop__glsl_environment, NULL};
-    sat_result result = SAT_OK;
-    int i;
+    sat_result result;
     g->made = raindrop__gl_given(&g->options);
-    for (i = 0; i < RAINDROP__GL_PROGRAMS && result == SAT_OK; i++) {
-        const raindrop__program *row = &raindrop__programs[i];
+    if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
+    if (g->options.orders) sat__gl_define(&g->gl, "ORDERS", 1);
+    result = sat__gl_build_table(&g->gl, g->programs, raindrop__programs, RAINDROP__GL_PROGRAMS, g->made, library);
+#ifndef RAINDROP_NO_RAIN
+    if (result == SAT_OK) {
+        static const char *const step[] = {raindrop__glsl_random, raindrop__glsl_step, raindrop__glsl_advance, NULL},
+                                *const varyings[] = {"next_drop", "next_motion", NULL};
         sat__gl_shaders shaders;
-        size_t used;
-        if ((row->when & g->made) != row->when) continue;
         memset(&shaders, 0, sizeof shaders);
-        shaders.name = i == RAINDROP__GL_ADVANCE ? "raindrop: advance"
-                       : row->vertex[0]          ? "raindrop: drops"
-                                                 : "raindrop: veil";
+        shaders.name = "raindrop: advance";
         shaders.library = library;
-        if (row->vertex[0]) shaders.vertex = row->vertex;
-        if (row->fragment[0]) shaders.fragment = row->fragment;
-        else shaders.varyings = varyings;
-        if (g->options.quads) sat__gl_define(&g->gl, "QUADS", 1);
-        if (g->options.orders) sat__gl_define(&g->gl, "ORDERS", 1);
-        used = strlen(g->gl.defines);
-        snprintf(g->gl.defines + used, sizeof g->gl.defines - used, "%s", row->defines);
-        result = sat__gl_build(&g->gl, &g->programs[i], &shaders);
+        shaders.vertex = step;
+        shaders.varyings = varyings;
+        result = sat__gl_build(&g->gl, &g->advance, &shaders);
     }
+#endif
     return result;
 }
 
@@ -5632,8 +5714,7 @@ RAINDROP_DEF sat_result raindrop_gl_create(raindrop_gl **out, sat_gl_get_proc *g
     if (result != SAT_OK) return result;
     sat__gl_begin(&g->gl, &state, 1);
     result = raindrop__gl_programs(g);
-    if (result == SAT_OK) result = sat__gl_texture(&g->gl, &g->scratch, SAT__GL_RGBA8, 1, 1, NULL);
-    if (result == SAT_OK) result = sat__gl_framebuffer(&g->gl, &g->target, &g->scratch, 1, 0);
+    if (result == SAT_OK) result = sat__gl_make_target(&g->gl, &g->scratch, SAT__GL_RGBA8, 1, 1);
 #ifndef RAINDROP_NO_MAP
     if (result == SAT_OK && o.map) {
         size_t bytes = (size_t)o.map->base * (size_t)o.map->base * 4 * sizeof(float);
@@ -5654,15 +5735,13 @@ RAINDROP_DEF void raindrop_gl_destroy(raindrop_gl *g)
 {
     sat_allocator memory;
     sat__gl *gl;
-    int i;
     if (!g) return;
     gl = &g->gl;
     memory = g->allocator;
     if (gl->vertex_array) { /* the context was good enough to open */
-        for (i = 0; i < RAINDROP__GL_PROGRAMS; i++)
-            if (g->programs[i]) gl->DeleteProgram(g->programs[i]);
-        if (g->target) gl->DeleteFramebuffers(1, &g->target);
-        gl->DeleteTextures(1, &g->scratch);
+        sat__gl_delete_programs(gl, g->programs, RAINDROP__GL_PROGRAMS);
+        gl->DeleteProgram(g->advance);
+        sat__gl_free_target(gl, &g->scratch);
         gl->DeleteTextures(1, &g->environment);
         gl->DeleteTextures(1, &g->far_drops);
         gl->DeleteTextures(1, &g->bow);
@@ -5847,24 +5926,26 @@ RAINDROP_DEF sat_result raindrop_gl_set_centre(raindrop_gl *g, const float centr
 static inline void raindrop__gl_set_advance(raindrop_gl *g, double dt)
 {
     sat__gl *gl = &g->gl;
+    const unsigned program = g->advance;
     const raindrop_rain_options *o = &g->rain;
     float v[4];
-    sat__gl_set_float3(gl, g->programs[RAINDROP__GL_ADVANCE], "wind", o->wind);
-    sat__gl_set_float3(gl, g->programs[RAINDROP__GL_ADVANCE], "centre", o->centre);
-    sat__gl_set_float3(gl, g->programs[RAINDROP__GL_ADVANCE], "box", o->box_size);
+    sat__gl_set_float3(gl, program, "wind", o->wind);
+    sat__gl_set_float3(gl, program, "centre", o->centre);
+    sat__gl_set_float3(gl, program, "box", o->box_size);
     v[0] = (float)raindrop__lambda(o->rate_mm_h);
     v[1] = (float)o->diameter_min_mm;
     v[2] = (float)o->diameter_max_mm;
     v[3] = (float)o->diameter_mm;
-    sat__gl_set_float4(gl, g->programs[RAINDROP__GL_ADVANCE], "sizes", v);
+    sat__gl_set_float4(gl, program, "sizes", v);
     v[0] = (float)dt;
     v[1] = (float)g->settled;
     v[2] = (float)g->own;
     v[3] = o->speed;
-    sat__gl_set_float4(gl, g->programs[RAINDROP__GL_ADVANCE], "step_and", v);
-    sat__gl_set_float2(gl, g->programs[RAINDROP__GL_ADVANCE], "fastest", (float)raindrop_terminal_velocity(o->diameter_max_mm), (float)(o->oblate != 0));
-    sat__gl_set_uint(gl, g->programs[RAINDROP__GL_ADVANCE], "seed", o->seed);
-    sat__gl_set_uint(gl, g->programs[RAINDROP__GL_ADVANCE], "stream", g->step * 512u);
+    sat__gl_set_float4(gl, program, "step_and", v);
+    sat__gl_set_float2(gl, program, "fastest", (float)raindrop_terminal_velocity(o->diameter_max_mm),
+                       (float)(o->oblate != 0));
+    sat__gl_set_uint(gl, program, "seed", o->seed);
+    sat__gl_set_uint(gl, program, "stream", g->step * 512u);
 }
 
 RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt)
@@ -5877,8 +5958,8 @@ RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt)
     g->step++;
     g->time = fmod(g->time + fmod(dt, RAINDROP__PERIOD), RAINDROP__PERIOD);
     sat__gl_begin(gl, &state, 1);
-    gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, g->target);
-    gl->UseProgram(g->programs[RAINDROP__GL_ADVANCE]);
+    gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, g->scratch.framebuffer);
+    gl->UseProgram(g->advance);
     raindrop__gl_set_advance(g, dt);
     gl->BindBuffer(SAT__GL_ARRAY_BUFFER, 0);
     gl->BindVertexArray(g->arrays[g->front]);
@@ -5932,12 +6013,7 @@ static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const
     sat__gl_set_float2(gl, program, "swings", frame->options.oscillation, (float)g->time);
     sat__gl_set_uint(gl, program, "seed", g->rain.seed);
     sat__gl_set_float2(gl, program, "environment_size", (float)g->resolution, (float)g->levels);
-    sat__gl_set_texture(gl, program, "environment", 0, g->environment);
-    sat__gl_set_texture(gl, program, "far_drops", 1, g->far_drops);
-    if (frame->options.look == RAINDROP_LOOK_MAP) {
-        sat__gl_set_texture(gl, program, "reflections", 2, g->map[0]);
-        sat__gl_set_texture(gl, program, "refractions", 3, g->map[1]);
-    }
+    SAT__GL_INPUTS(gl, g->environment, g->far_drops, g->map[0], g->map[1]);
 }
 
 /* What a picture needs, and the object was not made for. */
@@ -6070,7 +6146,7 @@ static inline void raindrop__gl_draw_glints(raindrop_gl *g, const raindrop__fram
         sat__gl_set_float3(gl, program, "axis", lamp->direction);
         v[0] = lamp->inner;
         v[1] = lamp->outer;
-        v[3] = raindrop__water_of(g->n).bow;
+        v[3] = raindrop__water_of(g->n, frame->options.orders).bow;
         for (path = 0; path < (frame->options.orders ? RAINDROP__GLINTS : 2); path++) {
             v[2] = (float)path;
             sat__gl_set_float4(gl, program, "cone", v);
@@ -6148,9 +6224,7 @@ static inline void raindrop__gl_set_veil(raindrop_gl *g, unsigned program, const
     v[2] = o->clip_zero_to_one ? 1.0f : 2;
     v[3] = o->clip_zero_to_one ? 0 : -1.0f;
     sat__gl_set_float4(gl, program, "planes", v);
-    sat__gl_set_texture(gl, program, "far_drops", 0, g->far_drops);
-    sat__gl_set_texture(gl, program, "depth", 1, depth ? depth : g->far_drops);
-    if (g->bow) sat__gl_set_texture(gl, program, "bow", 2, g->bow);
+    SAT__GL_INPUTS(gl, g->far_drops, depth ? depth : g->far_drops, g->bow);
 }
 
 static inline int raindrop__gl_veil_is_valid(raindrop_gl *g, const raindrop__frame *frame,
@@ -6188,6 +6262,7 @@ RAINDROP_DEF sat_result raindrop_gl_veil(raindrop_gl *g, const sat_gl_target *to
     sat__gl_begin(&g->gl, &state, 3);
     result = sat__gl_pass_to(&g->gl, program, to, (unsigned)state.draw_framebuffer, width, height);
     if (result == SAT_OK) {
+        sat__gl_set_from(&g->gl, program, to);
         raindrop__gl_set_veil(g, program, &frame, depth, planes, &o);
         raindrop__gl_blend(g, none);
         sat__gl_draw(&g->gl);

@@ -1942,8 +1942,8 @@ typedef struct sat__gl_program {
     int when;                /* bits of the header's own: it is made where all of them are given; 0: always */
     const char *samplers;    /* "luminance state": those of the units 0, 1, ... */
     const char *defines;     /* #define lines of its own, or NULL */
-    const char *vertex;      /* NULL: a triangle over the whole viewport */
-    const char *fragment[8]; /* texts, one behind the other */
+    const char *const *vertex; /* texts, NULL behind the last; NULL: a triangle over the whole viewport */
+    const char *fragment[8];   /* texts, one behind the other */
 } sat__gl_program;
 
 /* The samplers of a program read the units 0, 1, ..., for good. */
@@ -1972,17 +1972,16 @@ static inline sat_result sat__gl_build_table(sat__gl *gl, unsigned *programs, co
     int i, wanted = given | (gl->has_compute ? SAT__GL_COMPUTE : 0);
     memcpy(defines, gl->defines, sizeof defines);
     for (i = 0; i < count && result == SAT_OK; i++) {
-        const char *fragment[9], *vertex[2];
+        const char *fragment[9];
         sat__gl_shaders shaders;
         programs[i] = 0;
         if ((table[i].when & wanted) != table[i].when) continue;
         memset(&shaders, 0, sizeof shaders);
         memcpy(fragment, table[i].fragment, sizeof table[i].fragment);
-        fragment[8] = vertex[1] = NULL;
-        vertex[0] = table[i].vertex;
+        fragment[8] = NULL;
         shaders.name = table[i].name;
         shaders.library = library;
-        if (vertex[0]) shaders.vertex = vertex;
+        shaders.vertex = table[i].vertex;
         if (table[i].when & SAT__GL_COMPUTE) shaders.compute = fragment;
         else shaders.fragment = fragment;
         snprintf(gl->defines, sizeof gl->defines, "%s%s", defines, table[i].defines ? table[i].defines : "");

@@ -3189,11 +3189,13 @@ enum {
     TONEMAP__GL_PROGRAMS
 };
 
+static const char *const tonemap__points[] = {tonemap__glsl_scatter, NULL};
+
 static const sat__gl_program tonemap__programs[TONEMAP__GL_PROGRAMS] = {
     {"tonemap: luminance", 0, "hdr", NULL, NULL, {SAT__GL_FROM, tonemap__glsl_luminance}},
     {"tonemap: log-average", 0, "source mask", "#define TONEMAP_FIRST\n", NULL, {tonemap__glsl_reduce}},
     {"tonemap: reduction", 0, "source", NULL, NULL, {tonemap__glsl_reduce}},
-    {"tonemap: histogram", TONEMAP__IF_BLENDED, "luminance mask", NULL, tonemap__glsl_scatter, {tonemap__glsl_count}},
+    {"tonemap: histogram", TONEMAP__IF_BLENDED, "luminance mask", NULL, tonemap__points, {tonemap__glsl_count}},
     {"tonemap: no counts", TONEMAP__IF_COUNTED, "", NULL, NULL, {tonemap__glsl_nothing}},
     {"tonemap: counts", TONEMAP__IF_COUNTED | SAT__GL_COMPUTE, "luminance mask", NULL, NULL, {tonemap__glsl_squares}},
     {"tonemap: rows", TONEMAP__IF_HISTOGRAM, "histogram", NULL, NULL, {tonemap__glsl_rows}},

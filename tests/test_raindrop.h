@@ -1917,7 +1917,7 @@ TEST(raindrop_lamps_all_around_are_a_white_sky)
             raindrop_lamp lamp = raindrop_lamp_defaults();
             raindrop_render_options o = raindrop_render_defaults();
             float colour[3] = {0, 0, 0};
-            raindrop__water water = raindrop__water_of(indices[k]);
+            raindrop__water water = raindrop__water_of(indices[k], orders);
             double bubble = 0;
             if (k == 2 && orders) continue; /* a bubble shows no bow of order 1 */
             o.lamps = &lamp;
@@ -2102,7 +2102,7 @@ TEST(raindrop_lamps_refuse_nonsense)
     float spot[3] = {0, 0, 0}, all[3] = {0, 0, 0};
     raindrop_drop drop = rt_drop(0, -5, 0, 0.001f);
     const float d[3] = {0, 0, -1};
-    const raindrop__water water = raindrop__water_of(1.33f);
+    const raindrop__water water = raindrop__water_of(1.33f, o.orders);
     lamps[0] = lamps[1] = raindrop_lamp_defaults();
     EXPECT(strcmp(raindrop_explain_lamp(text, sizeof text, &lamps[0]), "") == 0);
     EXPECT(strcmp(raindrop_explain_lamp(text, sizeof text, NULL), "lamp is NULL") == 0);

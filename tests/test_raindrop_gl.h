@@ -69,28 +69,50 @@ static void rg_close(rg_scene *s)
     free(s->gpu);
 }
 
-/* Drops of the CPU's rain over the background, both ways; returns the RMSE after tone mapping. */
-static double rg_compare(rg_scene *s, raindrop_gl *g, const raindrop_rain *rain, const raindrop_render_options *options)
+/* An object that knows the scene's environment; options: NULL for the defaults. */
+static raindrop_gl *rg_make(rg_scene *s, const raindrop_gl_options *options)
+{
+    raindrop_gl *g = NULL;
+    if (!EXPECT_EQ(raindrop_gl_create(&g, s->context.get_proc, options), SAT_OK)) puts(raindrop_gl_message(g));
+    EXPECT_EQ(raindrop_gl_set_environment(g, s->environment), SAT_OK);
+    return g;
+}
+
+/* The picture that is drawn over: rgb, or black. */
+static void rg_fill(rg_scene *s, const float *rgb)
 {
     sat__gl_state state;
     int x, y, c;
-    memcpy(s->cpu, s->background, sizeof(float) * 3 * RG_W * RG_H);
-    EXPECT_EQ(raindrop_render(s->cpu, RG_W * 12, RG_W, RG_H, NULL, &s->camera, rain, s->environment, options, NULL),
-              SAT_OK);
     for (y = 0; y < RG_H; y++)
-        for (x = 0; x < RG_W; x++) {
-            for (c = 0; c < 3; c++) s->gpu[4 * ((RG_H - 1 - y) * RG_W + x) + c] = s->background[3 * (y * RG_W + x) + c];
-            s->gpu[4 * ((RG_H - 1 - y) * RG_W + x) + 3] = 1;
-        }
+        for (x = 0; x < RG_W; x++)
+            for (c = 0; c < 4; c++)
+                s->gpu[4 * ((RG_H - 1 - y) * RG_W + x) + c] = c == 3 ? 1 : rgb ? rgb[3 * (y * RG_W + x) + c] : 0;
     sat__gl_begin(&s->gl, &state, 1);
     sat__gl_upload(&s->gl, s->texture, SAT__GL_RGBA32F, RG_W, RG_H, s->gpu);
     sat__gl_end(&s->gl, &state);
     s->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s->framebuffer);
-    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
-    EXPECT_EQ(raindrop_gl_render(g, NULL, RG_W, RG_H, &s->camera, NULL, options), SAT_OK);
+}
+
+/* It back into gpu, four floats a pixel, the bottom row first. */
+static void rg_read(rg_scene *s)
+{
+    sat__gl_state state;
     sat__gl_begin(&s->gl, &state, 1);
     EXPECT_EQ(sat__gl_read(&s->gl, s->gpu, s->texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
     sat__gl_end(&s->gl, &state);
+}
+
+/* Drops of the CPU's rain over the background, both ways; returns the RMSE after tone mapping. */
+static double rg_compare(rg_scene *s, raindrop_gl *g, const raindrop_rain *rain, const raindrop_render_options *options)
+{
+    int x, y, c;
+    memcpy(s->cpu, s->background, sizeof(float) * 3 * RG_W * RG_H);
+    EXPECT_EQ(raindrop_render(s->cpu, RG_W * 12, RG_W, RG_H, NULL, &s->camera, rain, s->environment, options, NULL),
+              SAT_OK);
+    rg_fill(s, s->background);
+    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    EXPECT_EQ(raindrop_gl_render(g, NULL, RG_W, RG_H, &s->camera, NULL, options), SAT_OK);
+    rg_read(s);
     for (y = 0; y < RG_H / 2; y++) /* top row first, packed */
         for (x = 0; x < RG_W; x++)
             for (c = 0; c < 4; c++) {
@@ -126,8 +148,7 @@ TEST(raindrop_gl_draws_the_picture_of_the_cpu)
         raindrop_rain *few = rg_rain(300, 0.1f, 2), *many = rg_rain(20000, 1, 2);
         raindrop_render_options o = raindrop_render_defaults();
         g_options.quads = quads;
-        if (!EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &g_options), SAT_OK)) puts(raindrop_gl_message(g));
-        EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+        g = rg_make(&s, &g_options);
         o.map = s.map;
         o.orders_radius = 1e9f;
         o.sort = 0;
@@ -168,8 +189,7 @@ static void rg_compare_soft(rg_scene *s, double exposure, double aperture, const
     s->camera.velocity[0] = 1.5f;
     s->camera.velocity[2] = -2;
     s->camera.focus_distance = 0.06f;
-    EXPECT_EQ(raindrop_gl_create(&g, s->context.get_proc, &g_options), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s->environment), SAT_OK);
+    g = rg_make(s, &g_options);
     for (look = RAINDROP_LOOK_RAY; look <= RAINDROP_LOOK_AUTO; look++) {
         double near_error, error, sharp;
         o.look = (raindrop_look)look;
@@ -213,19 +233,11 @@ TEST(raindrop_gl_focuses_as_on_the_cpu)
     rg_close(&s);
 }
 
-/* Flattened drops, and among them spheres and such as are no drops; seen by a tilted camera. */
 static void rg_draw_on_black(rg_scene *s, raindrop_gl *g, const raindrop_render_options *options)
 {
-    sat__gl_state state;
-    memset(s->gpu, 0, sizeof(float) * 4 * RG_W * RG_H);
-    sat__gl_begin(&s->gl, &state, 1);
-    sat__gl_upload(&s->gl, s->texture, SAT__GL_RGBA32F, RG_W, RG_H, s->gpu);
-    sat__gl_end(&s->gl, &state);
-    s->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s->framebuffer);
+    rg_fill(s, NULL);
     EXPECT_EQ(raindrop_gl_render(g, NULL, RG_W, RG_H, &s->camera, NULL, options), SAT_OK);
-    sat__gl_begin(&s->gl, &state, 1);
-    EXPECT_EQ(sat__gl_read(&s->gl, s->gpu, s->texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
-    sat__gl_end(&s->gl, &state);
+    rg_read(s);
 }
 
 /* The light of one drop before black under a white sky over its area, wherever it stands and moves: within 2 %. */
@@ -290,6 +302,7 @@ TEST(raindrop_gl_streaks_do_not_shimmer)
     rg_close(&s);
 }
 
+/* Flattened drops, and among them spheres and such as are no drops; seen by a tilted camera. */
 TEST(raindrop_gl_flattens_as_the_cpu)
 {
     static const float ratios[6] = {0.5f, 0.75f, 1, 0.95f, 0, 1.5f};
@@ -316,8 +329,7 @@ TEST(raindrop_gl_flattens_as_the_cpu)
     g_options.map = o.map = s.map;
     o.sort = 0;
     o.orders_radius = 1e9f;
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &g_options), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    g = rg_make(&s, &g_options);
     for (look = 0; look < 4; look++)
         for (soft = 0; soft < (look < RAINDROP_LOOK_RAY ? 1 : 3); soft++) {
             double error;
@@ -354,8 +366,7 @@ TEST(raindrop_gl_reflects_inside_as_the_cpu)
     g_options.quads = 1;
     s.camera.depth_near = 0.001f;
     o.sort = 0;
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &g_options), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    g = rg_make(&s, &g_options);
     for (orders = 1; orders <= 3; orders++)
         for (exit = 0; exit < 2; exit++) {
             double error;
@@ -393,8 +404,7 @@ TEST(raindrop_gl_bubbles_as_on_the_cpu)
     s.environment = rg_environment(1 / RAINDROP_WATER);
     g_options.quads = 1;
     o.sort = 0;
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &g_options), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    g = rg_make(&s, &g_options);
     for (kind = 0; kind < 3; kind++) {
         double error;
         for (i = 0; i < rain->count; i++) rain->drops[i].axis_ratio = kind == 1 ? 0.7f : 1;
@@ -415,8 +425,7 @@ TEST(raindrop_gl_respects_the_depth_buffer)
     raindrop_drop drops[2];
     raindrop_rain_options o = raindrop_rain_defaults();
     raindrop_rain *rain = NULL;
-    float black[4] = {0, 0, 0, 1}, depth, *left, *right, near = 0.1f, far = 10;
-    sat__gl_state state;
+    float depth, *left, *right, near = 0.1f, far = 10;
     if (!rg_open(&s)) return;
     memset(drops, 0, sizeof drops);
     drops[0].position[0] = -0.5f;
@@ -429,19 +438,15 @@ TEST(raindrop_gl_respects_the_depth_buffer)
     o.drops = drops;
     o.count = 2;
     EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK);
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    g = rg_make(&s, NULL);
     EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
-    s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, s.framebuffer);
-    s.gl.ClearBufferfv(SAT__GL_COLOR, 0, black);
+    rg_fill(&s, NULL);
     depth = ((far + near) - 2 * far * near / 2.0f) / (far - near) * 0.5f + 0.5f; /* a wall at 2 m */
     s.gl.ClearBufferfv(0x1801, 0, &depth);
     s.camera.depth_near = near;
     s.camera.depth_far = far;
     EXPECT_EQ(raindrop_gl_render(g, NULL, RG_W, RG_H, &s.camera, NULL, NULL), SAT_OK);
-    sat__gl_begin(&s.gl, &state, 1);
-    EXPECT_EQ(sat__gl_read(&s.gl, s.gpu, s.texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
-    sat__gl_end(&s.gl, &state);
+    rg_read(&s);
     {
         double focal = 0.5 * RG_H / tan(0.65);
         left = s.gpu + 4 * (RG_H / 2 * RG_W + (int)(RG_W / 2 - focal * 0.5));
@@ -594,8 +599,7 @@ TEST(raindrop_gl_restores_the_state)
     s.gl.PixelStorei(SAT__GL_UNPACK_ALIGNMENT, 8);
     sat__gl_begin(&s.gl, &before, 8);
     sat__gl_end(&s.gl, &before);
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &o), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    g = rg_make(&s, &o);
     EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
     EXPECT_EQ(raindrop_gl_advance(g, 0.01), SAT_OK);
     s.camera.depth_near = 0.1f;
@@ -671,19 +675,11 @@ TEST(raindrop_gl_veils_as_the_cpu)
         EXPECT_EQ(raindrop_gl_set_environment(g, environment), SAT_OK);
         memcpy(s.cpu, s.background, sizeof(float) * 3 * RG_W * RG_H);
         EXPECT_EQ(raindrop_veil(s.cpu, 0, RG_W, RG_H, depth, &s.camera, environment, &o), SAT_OK);
-        for (y = 0; y < RG_H; y++)
-            for (x = 0; x < RG_W; x++)
-                for (c = 0; c < 4; c++)
-                    s.gpu[4 * ((RG_H - 1 - y) * RG_W + x) + c] = c < 3 ? s.background[3 * (y * RG_W + x) + c] : 1;
-        sat__gl_begin(&s.gl, &state, 1);
-        sat__gl_upload(&s.gl, s.texture, SAT__GL_RGBA32F, RG_W, RG_H, s.gpu);
-        sat__gl_end(&s.gl, &state);
+        rg_fill(&s, s.background);
         s.gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, kind ? 0 : target);
         EXPECT_EQ(raindrop_gl_veil(g, kind ? &to : NULL, RG_W, RG_H, texture, &s.camera, kind ? reversed : NULL, &o),
                   SAT_OK);
-        sat__gl_begin(&s.gl, &state, 1);
-        EXPECT_EQ(sat__gl_read(&s.gl, s.gpu, s.texture, SAT__GL_RGBA32F, RG_W, RG_H), SAT_OK);
-        sat__gl_end(&s.gl, &state);
+        rg_read(&s);
         for (y = 0; y < RG_H; y++)
             for (x = 0; x < RG_W; x++)
                 for (c = 0; c < 3; c++) {
@@ -709,6 +705,74 @@ TEST(raindrop_gl_veils_as_the_cpu)
     rg_close(&s);
 }
 
+/* Another size each frame, and a place in the target and in the depth: the picture of the CPU, nothing beside it. */
+TEST(raindrop_gl_takes_another_size_a_frame)
+{
+    static const int sizes[7][4] = {{RG_W, RG_H, 0, 0}, {97, 53, 31, 7}, {1, 1, 5, 5}, {40, 30, 120, 90},
+                                    {3, 119, 20, 1}, {159, 2, 1, 60}, {80, 60, 40, 0}};
+    static float depth[RG_W * RG_H], window[RG_W * RG_H], cpu[3 * RG_W * RG_H];
+    static const float projection[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, -1, 0, 0, 0.1f, 0}; /* reversed, infinite */
+    raindrop_rain *rain = rg_rain(3000, 0.5f, 2);
+    raindrop_veil_options veil = raindrop_veil_defaults();
+    raindrop_render_options o = raindrop_render_defaults();
+    unsigned texture = 0;
+    sat__gl_state state;
+    raindrop_gl *g;
+    rg_scene s;
+    int i, x, y, c, flip;
+    if (!rg_open(&s)) {
+        raindrop_rain_destroy(rain);
+        return;
+    }
+    for (i = 0; i < RG_W * RG_H; i++) window[i] = 0.1f / (1 + (float)(i * 7919 % 1000)); /* the bottom row first */
+    sat__gl_begin(&s.gl, &state, 1);
+    EXPECT_EQ(sat__gl_texture(&s.gl, &texture, SAT__GL_R32F, RG_W, RG_H, window), SAT_OK);
+    sat__gl_end(&s.gl, &state);
+    o.sort = 0;
+    veil.clip_zero_to_one = 1;
+    veil.extinction = 0.01f;
+    g = rg_make(&s, NULL);
+    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    for (i = 0; i < 14; i++) {
+        const int *size = sizes[i % 7], w = size[0], h = size[1];
+        sat_gl_target to = sat_gl_to_texture(s.texture);
+        double worst = 0;
+        int beside = 0;
+        flip = i / 7;
+        to.x = size[2];
+        to.y = size[3];
+        to.from_x = RG_W - w - size[2]; /* somewhere else in the depth */
+        to.from_y = RG_H - h - size[3];
+        to.flip = flip;
+        for (y = 0; y < h; y++)
+            for (x = 0; x < w; x++) depth[(h - 1 - y) * w + x] = 0.1f / window[(to.from_y + y) * RG_W + to.from_x + x];
+        memset(cpu, 0, sizeof cpu);
+        EXPECT_EQ(raindrop_veil(cpu, 0, w, h, depth, &s.camera, s.environment, &veil), SAT_OK);
+        EXPECT_EQ(raindrop_render(cpu, 0, w, h, NULL, &s.camera, rain, s.environment, &o, NULL), SAT_OK);
+        rg_fill(&s, NULL);
+        EXPECT_EQ(raindrop_gl_veil(g, &to, w, h, texture, &s.camera, projection, &veil), SAT_OK);
+        EXPECT_EQ(raindrop_gl_render(g, &to, w, h, &s.camera, NULL, &o), SAT_OK);
+        rg_read(&s);
+        for (y = 0; y < RG_H; y++)
+            for (x = 0; x < RG_W; x++)
+                for (c = 0; c < 3; c++) {
+                    int px = x - to.x, py = flip ? y - to.y : to.y + h - 1 - y; /* rows of the CPU's picture */
+                    double got = (double)s.gpu[4 * (y * RG_W + x) + c], want;
+                    if (px < 0 || px >= w || py < 0 || py >= h) {
+                        beside += got != 0;
+                        continue;
+                    }
+                    want = (double)cpu[3 * (py * w + px) + c];
+                    if (fabs(got - want) / (1 + want) > worst) worst = fabs(got - want) / (1 + want);
+                }
+        if (!EXPECT(worst < 5e-3 && beside == 0)) printf("%d x %d: %g, %d beside it\n", w, h, worst, beside);
+    }
+    s.gl.DeleteTextures(1, &texture);
+    raindrop_gl_destroy(g);
+    raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
+
 /* Slices of depth bring the picture to that of sorted drops: in rain a hundred times as dense as the heaviest. */
 TEST(raindrop_gl_slices_sort)
 {
@@ -722,8 +786,7 @@ TEST(raindrop_gl_slices_sort)
         raindrop_rain_destroy(rain);
         return;
     }
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    g = rg_make(&s, NULL);
     for (i = 0; i < 4; i++) {
         raindrop_render_options o = raindrop_render_defaults();
         o.slices = slices[i];
@@ -845,7 +908,7 @@ static void rg_set(rg_scene *s, raindrop_render_options *o, raindrop_rain *rain,
 TEST(raindrop_gl_takes_options_in_pairs)
 {
     rg_scene s;
-    raindrop_gl *g = NULL;
+    raindrop_gl *g;
     raindrop_gl_options options = raindrop_gl_defaults();
     raindrop_rain *rain = rg_rain(150, 0.8f, 6);
     double worst = 0;
@@ -856,8 +919,7 @@ TEST(raindrop_gl_takes_options_in_pairs)
     }
     rg_set_lamps();
     options.lamps = options.oscillation = 1;
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &options), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    g = rg_make(&s, &options);
     for (a = 0; a < RG_OPTIONS; a++)
         for (b = a; b < RG_OPTIONS; b++) {
             raindrop_render_options o = raindrop_render_defaults();
@@ -890,8 +952,7 @@ TEST(raindrop_gl_has_lamps_and_oscillation)
     if (!rg_open(&s)) return;
     rg_set_lamps();
     options.lamps = options.oscillation = 1;
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &options), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    g = rg_make(&s, &options);
     for (kind = 0; kind < 16; kind++) {
         raindrop_render_options o = raindrop_render_defaults();
         raindrop_rain *rain = rg_rain(kind & 8 ? 3000 : 60, kind & 8 ? 4.0f : 0.3f, 3);
@@ -958,8 +1019,7 @@ TEST(raindrop_gl_refuses_what_it_was_not_made_for)
     }
     rg_set_lamps();
     o.sprites = o.motion = o.oblate = o.orders = o.veil = 0;
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, &o), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    g = rg_make(&s, &o);
     for (i = 0; i < 8; i++) {
         sat_result result;
         int k;
@@ -1019,8 +1079,7 @@ TEST(raindrop_gl_says_what_is_wrong)
     EXPECT(g == NULL && raindrop_gl_message(NULL) != NULL);
     raindrop_gl_destroy(NULL);
     if (!rg_open(&s)) return;
-    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
-    EXPECT_EQ(raindrop_gl_set_environment(g, s.environment), SAT_OK);
+    g = rg_make(&s, NULL);
     EXPECT_EQ(raindrop_gl_render(g, NULL, 10, 10, NULL, NULL, NULL), SAT_ERR_ARGUMENT); /* no rain yet */
     EXPECT(strcmp(raindrop_gl_message(g), "there was no raindrop_gl_set_rain") == 0);
     EXPECT_EQ(raindrop_gl_advance(g, 1), SAT_ERR_ARGUMENT);

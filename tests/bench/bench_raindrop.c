@@ -579,7 +579,7 @@ typedef struct single { raindrop__frame frame; raindrop__batch batch; float *ove
 static void draw_single(single *s, const raindrop__visible *v, int white)
 {
     s->frame.rgb = (unsigned char *)s->over[white];
-    raindrop__draw(&s->batch, v, 0, SIZE);
+    raindrop__draw(&s->batch, v);
 }
 
 static raindrop__box box_of(const single *s, const raindrop__visible *v)
@@ -636,7 +636,7 @@ static void blend_slices(single *s, const uint64_t *order, int n, double farthes
         for (i = 0; i < n; i++) {
             const raindrop__visible *v = &s->frame.rain->visible[(uint32_t)order[i]];
             int at = (int)(sqrt((double)v->depth / farthest) * slices);
-            if ((at < slices ? at : slices - 1) == k) raindrop__draw(&s->batch, v, 0, SIZE);
+            if ((at < slices ? at : slices - 1) == k) raindrop__draw(&s->batch, v);
         }
 }
 
@@ -676,9 +676,8 @@ static void bench_order(void)
         s.frame.stride = SIZE * 12;
         s.frame.width = s.frame.height = SIZE;
         raindrop__set_frame(&s.frame);
-        s.batch.frame = &s.frame;
-        s.batch.tally = &tally;
-        s.batch.covers = 1;
+        raindrop__begin_batch(&s.batch, &s.frame, &tally);
+        s.batch.y1 = SIZE;
         s.over[0] = pixels_of();
         s.over[1] = pixels_of();
         n = raindrop__gather_pairs(f.rain);
