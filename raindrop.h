@@ -586,8 +586,8 @@ RAINDROP_DEF sat_result raindrop_gl_set_centre(raindrop_gl *gl, const float cent
 /* The drops back from the GPU, which waits for it; count as in the rain. */
 RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *drops, int count);
 
-/* Blends the drops over a picture of this size in the target `to`, which should hold floats; NULL: in the framebuffer
-   that is bound. Row 0 is the bottom one, as OpenGL has it. Unsorted, as published, or in slices; else as
+/* Blends the drops over a picture of this size, another one in each frame as you like, in the target `to`, which should
+   hold floats; NULL: in the framebuffer that is bound. Row 0 is the bottom one, as OpenGL has it. Unsorted, as published, or in slices; else as
    raindrop_render, lamps' glints last. What a picture does not need, its program does not know.
 
    projection: the perspective matrix (column-major) that drew the framebuffer's depth buffer: the depth test is on,
@@ -6077,6 +6077,18 @@ static inline int raindrop__gl_depth(float v[2], const raindrop_camera *camera, 
     return 1;
 }
 
+/* Whether the target takes the picture; how the projection keeps depth. */
+static inline sat_result raindrop__gl_aim(float depth[2], raindrop_gl *g, const sat_gl_target *to,
+                                          const raindrop__frame *frame, const float *projection)
+{
+    if (!sat__gl_target_is_valid(to)) return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "the target is none", NULL);
+    if (to && to->width && (to->width != frame->width || to->height != frame->height))
+        return sat__gl_fail(&g->gl, SAT_ERR_MISMATCH, "the target has another width or height than the call", NULL);
+    if (!raindrop__gl_depth(depth, &frame->camera, projection))
+        return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "projection is no perspective", NULL);
+    return SAT_OK;
+}
+
 /* Everything that a blended draw needs beside the program's uniforms. */
 static inline void raindrop__gl_blend(raindrop_gl *g, const float depth[2])
 {
@@ -6169,10 +6181,8 @@ RAINDROP_DEF sat_result raindrop_gl_render(raindrop_gl *g, const sat_gl_target *
     frame.options = options ? *options : raindrop_render_defaults();
     if (!g || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
     if (!raindrop__gl_frame_is_valid(g, &frame)) return SAT_ERR_ARGUMENT;
-    if (!sat__gl_target_is_valid(to)) return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "the target is none", NULL);
-    if (!raindrop__gl_depth(depth, &frame.camera, projection))
-        return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "projection is no perspective", NULL);
-    if (!g->count) return SAT_OK;
+    result = raindrop__gl_aim(depth, g, to, &frame, projection);
+    if (result != SAT_OK || !g->count) return result;
     gl = &g->gl;
     program = g->programs[raindrop__gl_program_of(g, &frame)];
     raindrop__set_frame(&frame);
@@ -6252,9 +6262,8 @@ RAINDROP_DEF sat_result raindrop_gl_veil(raindrop_gl *g, const sat_gl_target *to
     if (!g || !g->gl.vertex_array) return SAT_ERR_ARGUMENT;
     frame = raindrop__frame_of(NULL, 0, width, height, camera);
     if (!raindrop__gl_veil_is_valid(g, &frame, &o)) return SAT_ERR_ARGUMENT;
-    if (!sat__gl_target_is_valid(to)) return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "the target is none", NULL);
-    if (!raindrop__gl_depth(planes, &frame.camera, projection))
-        return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "projection is no perspective", NULL);
+    result = raindrop__gl_aim(planes, g, to, &frame, projection);
+    if (result != SAT_OK) return result;
     if (depth && !(fabsf(planes[1]) > 0))
         return sat__gl_fail(&g->gl, SAT_ERR_ARGUMENT, "depth needs a projection or a depth_far", NULL);
     program = g->programs[g->bow ? RAINDROP__GL_BOWS : RAINDROP__GL_VEIL];

@@ -767,6 +767,15 @@ TEST(raindrop_gl_takes_another_size_a_frame)
                 }
         if (!EXPECT(worst < 5e-3 && beside == 0)) printf("%d x %d: %g, %d beside it\n", w, h, worst, beside);
     }
+    {
+        sat_gl_target to = sat_gl_to_texture(s.texture); /* its size, where it names one, is the call's */
+        to.width = 40;
+        to.height = 30;
+        EXPECT_EQ(raindrop_gl_render(g, &to, 40, 30, &s.camera, NULL, &o), SAT_OK);
+        EXPECT_EQ(raindrop_gl_veil(g, &to, 40, 30, texture, &s.camera, projection, &veil), SAT_OK);
+        EXPECT_EQ(raindrop_gl_render(g, &to, 40, 31, &s.camera, NULL, &o), SAT_ERR_MISMATCH);
+        EXPECT_EQ(raindrop_gl_veil(g, &to, 41, 30, texture, &s.camera, projection, &veil), SAT_ERR_MISMATCH);
+    }
     s.gl.DeleteTextures(1, &texture);
     raindrop_gl_destroy(g);
     raindrop_rain_destroy(rain);
