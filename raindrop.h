@@ -587,8 +587,9 @@ RAINDROP_DEF sat_result raindrop_gl_set_centre(raindrop_gl *gl, const float cent
 RAINDROP_DEF sat_result raindrop_gl_read_drops(raindrop_gl *gl, raindrop_drop *drops, int count);
 
 /* Blends the drops over a picture of this size, another one in each frame as you like, in the target `to`, which should
-   hold floats; NULL: in the framebuffer that is bound. Row 0 is the bottom one, as OpenGL has it. Unsorted, as published, or in slices; else as
-   raindrop_render, lamps' glints last. What a picture does not need, its program does not know.
+   hold floats; NULL: in the framebuffer that is bound. Row 0 is the bottom one, as OpenGL has it. Unsorted, as
+   published, or in slices; else as raindrop_render, lamps' glints last. What a picture does not need, its program does
+   not know.
 
    projection: the perspective matrix (column-major) that drew the framebuffer's depth buffer: the depth test is on,
    depth is not written. It may be reversed, infinite, or made for glClipControl's [0,1]. NULL: no test, or where
@@ -2938,7 +2939,8 @@ static inline raindrop__swing raindrop__swing_of(const raindrop_rain *rain, uint
     for (k = 0; k < 2; k++) {
         uint32_t bits = raindrop__hash(rain->options.seed, 8 + (uint32_t)k, index);
         double turns;
-        s.rate[k] = floorf(frequency * (k ? RAINDROP__OVERTONE : 1) * (float)RAINDROP__PERIOD) / (float)RAINDROP__PERIOD;
+        s.rate[k] = floorf(frequency * (float)RAINDROP__PERIOD) / (float)RAINDROP__PERIOD;
+        frequency *= RAINDROP__OVERTONE;
         turns = (double)s.rate[k] * rain->time;
         s.cycles[k] = raindrop__uniform(bits) + (float)(turns - floor(turns));
         if (k) continue;
