@@ -4,7 +4,7 @@
 
 all: examples
 .PHONY: all examples demo web check-view test bench report size check check-strict check-house check-variants check-asan check-tsan \
-        check-analyze check-compilers check-report check-install check-glsl format-check fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
+        check-analyze check-compilers check-report check-install check-doors check-glsl format-check fuzz data docs install dist gpu-bench deps help clean build-tests run-tests run-demo
 .DELETE_ON_ERROR:
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
@@ -206,6 +206,10 @@ check-report:
 check-install:
 	@RUNNER='bash tests/check_install.sh' JOBS=1 tests/run.sh install
 
+# the steps of README.md and docs/, line by line, without packages
+check-doors:
+	@RUNNER='bash tests/check_doors.sh' TEST_TIMEOUT=600 tests/run.sh README photo mosaic engine
+
 # every shader of every combination of options through glslangValidator
 check-glsl:
 	@RUNNER='bash tests/check_glsl.sh' tests/run.sh $(LIBS)
@@ -289,6 +293,7 @@ help:
 	@echo 'make check-analyze    gcc -fanalyzer, clang --analyze; check-compilers: aarch64, mingw-w64, tcc, 32 bit'
 	@echo 'make check-report     every bench once, with all packages and with none: the report is whole'
 	@echo 'make check-install    what make install writes, by pkg-config, CMake and Meson'
+	@echo 'make check-doors      the steps of README.md and docs/, line by line, without packages'
 	@echo 'make check-glsl       every shader, in every combination of options, through glslangValidator'
 	@echo 'make format-check     columns, tabs and blanks of all sources'
 	@echo 'make fuzz             libFuzzer on each header          [FUZZ_SECONDS=20]'
@@ -316,8 +321,8 @@ dist/%.h: %.h sat.h tests/make_dist.awk
 # README.md and docs/*.md: programs from tests/test_readme.h, plots from the tables of the last `make bench` or `make report`
 docs:
 	@mkdir -p build
-	for page in README.md docs/*.md; do sh tests/readme.sh $$page out/bench >build/page.md && cp build/page.md $$page; done
 	PLOTS=docs bash tests/report.sh $(wildcard $(FAMILY:%=out/bench/%.tsv)) >build/report.html
+	for page in README.md docs/*.md; do sh tests/readme.sh $$page out/bench >build/page.md && cp build/page.md $$page; done
 
 # inputs for examples, into data/
 data:

@@ -2,7 +2,8 @@
 # One self-contained HTML page from benchmark tables; tests/bench/bench.h states their form. Plots by gnuplot, inside.
 # First the answers, a line and then a table and a plot for each technique; then where the errors are, error against run time, extreme
 # cases, what is left out; all tables at the end.
-# usage: [PLOTS=docs] tests/report.sh TABLE.tsv... >index.html; PLOTS: plots that have a name (picture=name) go there too
+# usage: [PLOTS=docs] tests/report.sh TABLE.tsv... >index.html; PLOTS: plots that have a name (picture=name) go there too,
+# and the summary goes beside the tables, as answers.tsv
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 plotting=1
@@ -176,13 +177,14 @@ pick() {
         END { if (best != "") print best }' "$1"
 }
 
-# compare A B WORD: "a third of the WORD", "1.3 times the WORD"
+# compare A B WORD: "WORD 3 times smaller", "1.3 times the WORD", "3 times faster"
 compare() {
     awk -v a="$1" -v b="$2" -v word="$3" 'BEGIN {
         if (a == "" || b == "" || b + 0 <= 0) exit
         r = a / b
-        if (r < 1e-6) printf "%s %.2g million times smaller", word, 1e-6 / (r > 1e-30 ? r : 1e-30)
-        else if (r < 1e-3) printf "%s %.0f thousand times smaller", word, 1e-3 / r
+        if (r < 0.5 && word == "time") printf "%.3g times faster", 1 / r
+        else if (r < 1e-6) printf "%s %.2g million times smaller", word, 1e-6 / (r > 1e-30 ? r : 1e-30)
+        else if (r < 1e-3) printf "%s %.2g thousand times smaller", word, 1e-3 / r
         else if (r < 0.5) printf "%s %.3g times smaller", word, 1 / r
         else if (r < 0.97) printf "%.0f %% of the %s", 100 * r, word
         else if (r < 1.03) printf "the same %s", word
@@ -212,12 +214,16 @@ answer() {
     printf '<tr><td><a href="#answer-%s">%s</a><td>%s<td>%s<td class=text>%s<td class=text>%s</tr>\n' "$id" "$id.h" \
         "$(said "$de") $(words "$e" | sed 's/^[^(]*//')" "$dt $(words "$t" | sed 's/^[^(]*//')" "${p:-&ndash;}" \
         "${q:-${9:-&ndash;}}${q:+ ($(escape <<<"$qname"))}" >>"$work/summary"
+    printf '%s\t%s\t%s\t%s\n' "[\`$id.h\`]($id.h)" "$(short "$(said "$de")") $(words "$e" | sed 's/^[^(]*//')" "$(short "$dt") $(words "$t" | sed 's/^[^(]*//')" \
+        "$(tr '\n' ' ' <<<"${p:+published method: $p. }${q:+$qname: $q. }$9" | sed 's/ *$//')" >>"$work/summary.tsv"
     printf '<p class=said>%s %s</p></div><div class=plots>' "$text" "$9"
     line=$(grep -h 'picture=' "${file%.rows}.plots" 2>/dev/null | head -1)
     plot_id=answer_$id
     [ -z "$line" ] || [ -z "$plotting" ] || figure "$file" "$line"
     echo "</div></section>"
 }
+
+short() { awk -v v="$1" 'BEGIN { if (v ~ /^[-+.0-9]/) printf "%.3g", v; else print v }'; }
 
 # A case: header, what breaks, how the usual way does, how this does, the bound that must hold; judged here.
 case_row() {
@@ -233,6 +239,7 @@ percent() { [ -z "$1" ] || awk -v v="$1" 'BEGIN { printf "%.3g %%", 100 * v }'; 
 for file; do [ ! -s "$file" ] || split "$file" >/dev/null; done
 first=
 for file; do [ ! -s "$file" ] || { first=$file; break; }; done
+folder_of_tables=$(dirname "$first")
 missing=$(cat "$@" 2>/dev/null | sed -n 's/^# missing: \(.*\) is not installed (\([^)]*\)).*/\1 (\2)/p' | sort -u | paste -sd';')
 present=
 for peer in OpenCV:sat Embree:fiv pfstools:tonemap scipy:softassign; do
@@ -299,6 +306,8 @@ answer softassign "Photographs as mosaics of tiles: who goes where, at proven co
     "Error against time, fig" "size:100x100" excess time_ms "method:published" "method:~^(LAPJV|annealing|ants)" "" "" 1e-7
 } >"$work/answers"
 echo '<h2 id=answers>What each default costs and errs</h2><p>Measured in this run, one thread. Red is the default; a ring marks it in the plots; a value shows where the pointer rests. Smaller is better, in the plots down and left.</p>'
+[ -z "$PLOTS" ] || [ ! -s "$work/summary.tsv" ] || # for the README
+    { printf 'header\terror of the default\ttime\tagainst the published method and the best peer measured\n'; cat "$work/summary.tsv"; } >"$folder_of_tables/answers.tsv"
 if [ -s "$work/summary" ]; then
     echo '<div class=wide><table class=summary><tr><th>header<th>error<th>time<th class=text>the default against the published method<th class=text>against the best peer measured</tr>'
     cat "$work/summary"
@@ -309,7 +318,7 @@ cat "$work/answers"
 if [ -n "$(find "$work" -name pictures -type f)" ]; then
     echo '<h2 id=where>Where the errors are</h2><p>White: none. Blue: too dark, red: too bright. The first of each row is the reference.</p>'
     where() { [ ! -s "$work/$1/pictures" ] || { echo "<h3>$1.h: $2</h3><div class=pictures>"; pictures "$1" "$folder"; echo '</div>'; }; }
-    folder=$(dirname "$first")
+    folder=$folder_of_tables
     where sat 'relative error of boxes of 3 x 3 in a picture of 14 decades, powers of ten'
     where tonemap 'local operators against the exact Gaussian one, 8-bit codes'
     where ssao_sat 'ambient occlusion of a room, radius 0.25, against rays'
