@@ -722,6 +722,13 @@ enum {
     SOFTASSIGN__DONE
 };
 
+/* Index of the smallest value of a row, -1: none is finite; the second smallest value, and where it is. Ties go to the
+   smaller index. */
+typedef struct softassign__pair_of_least {
+    int at, second_at;
+    double least, second;
+} softassign__pair_of_least;
+
 typedef struct softassign__fixed softassign__fixed;
 
 /* Slots are the columns, followed by one mandatory slot for each column with a minimum use: same costs, but its
@@ -755,7 +762,7 @@ struct softassign {
     double *top;
 
     double *price;
-    float *price_f;
+    float *price_f;        /* the same as floats, never below */
     int *used, *first_row; /* per slot: how many rows it holds, and the first of them */
     int *slot_of_row, *next_row;
     double *cost_of_row;   /* cost of the row's slot, with the switching bonus */
@@ -777,7 +784,12 @@ struct softassign {
 
     double *distance, *row_distance; /* path search: per slot, per row */
     double *bid;           /* auction: what the row pays for its place */
-    double *dense_price, *closed_distance; /* the same on the matrix: prices of open slots, distances of closed ones */
+    double *dense_price, *closed_distance; /* the same on the matrix: prices of open slots, distances of closed ones, */
+    softassign__pair_of_least *seen; /* of each row at prices of 0, */
+    int has_seen;          /* where costs were checked */
+    double dearest;        /* no |price| is above it */
+    double *block_distance; /* the smallest distance of SOFTASSIGN__STEP slots, */
+    float *reach;          /* and distance + price of a slot, not below it */
     int *parent, *stamp, *row_stamp, *touched, *closed, *heap, *heap_at;
     double *parent_cost;
     int epoch, heap_size;
@@ -800,10 +812,18 @@ static inline int softassign__column(const softassign *s, int slot)
     return slot < s->columns ? slot : s->slot_column[slot];
 }
 
+/* The float at x, or the next one above. */
+static inline float softassign__round_up(double x)
+{
+    float f = (float)x;
+    return (double)f < x ? f + (fabsf(f) * 1.2e-7f + 1e-44f) : f;
+}
+
 static inline void softassign__set_price(softassign *s, int slot, double price)
 {
     s->price[slot] = price;
-    s->price_f[slot] = (float)price;
+    s->price_f[slot] = softassign__round_up(price);
+    if (fabs(price) > s->dearest) s->dearest = fabs(price);
 }
 
 /* ------------------------------------------------------------------------------------------------
@@ -1786,38 +1806,160 @@ static inline int softassign__eight_below(softassign__row cost, int j, const dou
 #endif
 }
 
-/* The smallest and the second smallest cost - price of a row; ties go to the smaller index. Returns the index. Few
-   eights hold one that is below the second smallest so far. */
-static int softassign__two_smallest(softassign__row cost, const double *price, int n, double *smallest, double *second)
+/* One bit of four for each lane of a comparison. */
+static inline int softassign__lanes(sat__i32x4 mask)
 {
-    double m1 = (double)SOFTASSIGN__INFINITY, m2 = m1;
-    int j = 0, end, best = -1;
-    while (j < n) {
-        for (end = j + 8; end <= n && j > 0 && !softassign__eight_below(cost, j, price, m2); end += 8) j += 8;
-        if (end > n) end = n;
-        for (; j < end; j++) {
-            double value = softassign__row_cost(cost, j) - price[j];
-            if (value < m1) {
-                m2 = m1;
-                m1 = value;
-                best = j;
-            } else if (value < m2) m2 = value;
-        }
+#ifdef SAT__SSE2
+    return _mm_movemask_ps(_mm_castsi128_ps(mask));
+#else
+    return sat__i32x4_any(mask) ? 15 : 0; /* those that are not are looked at for nothing */
+#endif
+}
+
+/* Looks for values cost - price of a row at or below a limit, sixteen at a time. Floats come first: what they round is
+   a lower bound, as their prices are not below the prices, and rounding keeps the order. Where they find too much for
+   nothing, as among ties, doubles go on alone, and look for what is below it. */
+typedef struct softassign__scan {
+    softassign__row cost;
+    const double *price;
+    const float *price_f;
+    double limit;
+    float most;   /* not below limit */
+    int patience;
+} softassign__scan;
+
+static inline softassign__scan softassign__scan_row(const softassign *s, int row, double limit)
+{
+    softassign__scan q;
+    q.cost = softassign__matrix_row(s, row);
+    q.price = s->price;
+    q.price_f = s->price_f;
+    q.limit = limit;
+    q.most = softassign__round_up(limit);
+    q.patience = q.cost.f ? 4 : 0;
+    return q;
+}
+
+static inline double softassign__scan_value(const softassign__scan *q, int j)
+{
+    return softassign__row_cost(q->cost, j) - q->price[j];
+}
+
+static inline void softassign__load_reduced(const softassign__scan *q, int j, sat__f32x4 *v)
+{
+    const float *c = q->cost.f + j, *p = q->price_f + j;
+    v[0] = sat__f32x4_sub(sat__f32x4_load(c), sat__f32x4_load(p));
+    v[1] = sat__f32x4_sub(sat__f32x4_load(c + 4), sat__f32x4_load(p + 4));
+    v[2] = sat__f32x4_sub(sat__f32x4_load(c + 8), sat__f32x4_load(p + 8));
+    v[3] = sat__f32x4_sub(sat__f32x4_load(c + 12), sat__f32x4_load(p + 12));
+}
+
+static inline sat__f32x4 softassign__least_of_four(const sat__f32x4 *v)
+{
+    return sat__f32x4_min(sat__f32x4_min(v[0], v[1]), sat__f32x4_min(v[2], v[3]));
+}
+
+/* Those of sixteen that may be within the limit, one bit each. */
+static inline int softassign__sixteen_within(const softassign__scan *q, int j)
+{
+    sat__f32x4 v[4], most;
+    if (q->patience <= 0)
+        return (softassign__eight_below(q->cost, j, q->price, q->limit) ? 0xff : 0) |
+               (softassign__eight_below(q->cost, j + 8, q->price, q->limit) ? 0xff00 : 0);
+    most = sat__f32x4_set1(q->most);
+    softassign__load_reduced(q, j, v);
+    if (!sat__i32x4_any(sat__f32x4_less_equal(softassign__least_of_four(v), most))) return 0;
+    return softassign__lanes(sat__f32x4_less_equal(v[0], most)) |
+           softassign__lanes(sat__f32x4_less_equal(v[1], most)) << 4 |
+           softassign__lanes(sat__f32x4_less_equal(v[2], most)) << 8 |
+           softassign__lanes(sat__f32x4_less_equal(v[3], most)) << 12;
+}
+
+/* At or above the second smallest value of a row: the second smallest of minima of different columns, and what floats
+   round. */
+static double softassign__second_at_most(const softassign *s, const softassign__scan *q, int n)
+{
+    float a[4], b[4], least = SOFTASSIGN__INFINITY, second = least;
+    sat__f32x4 v[4], m1 = sat__f32x4_set1(SOFTASSIGN__INFINITY), m2 = m1;
+    int j, k;
+    for (j = 0; j + 16 <= n; j += 16) {
+        softassign__load_reduced(q, j, v);
+        v[0] = softassign__least_of_four(v);
+        m2 = sat__f32x4_min(sat__f32x4_max(m1, v[0]), m2);
+        m1 = sat__f32x4_min(v[0], m1);
     }
-    *smallest = m1;
-    *second = m2;
-    return best;
+    sat__f32x4_store(a, m1);
+    sat__f32x4_store(b, m2);
+    for (k = 0; k < 8; k++) {
+        float x = k < 4 ? a[k] : b[k - 4];
+        second = x < least ? least : x < second ? x : second;
+        least = x < least ? x : least;
+    }
+    return (double)second + (fabs((double)second) + s->dearest) * 3e-7;
+}
+
+static inline void softassign__take_value(softassign__pair_of_least *two, int j, double value)
+{
+    if (value < two->least) {
+        two->second = two->least;
+        two->second_at = two->at;
+        two->least = value;
+        two->at = j;
+    } else if (value < two->second) {
+        two->second = value;
+        two->second_at = j;
+    }
+}
+
+static softassign__pair_of_least softassign__look_at_row(const softassign *s, int row)
+{
+    softassign__scan q = softassign__scan_row(s, row, (double)SOFTASSIGN__INFINITY);
+    softassign__pair_of_least two;
+    int j = 0, k, n = s->columns;
+    two.at = two.second_at = -1;
+    two.least = two.second = (double)SOFTASSIGN__INFINITY;
+    if (q.patience && n >= 32) {
+        q.limit = softassign__second_at_most(s, &q, n);
+        q.most = softassign__round_up(q.limit);
+    }
+    for (; j + 16 <= n; j += 16) {
+        double before = two.second;
+        int within = softassign__sixteen_within(&q, j);
+        if (!within) continue;
+        for (k = j; within; k++, within >>= 1)
+            if (within & 1) softassign__take_value(&two, k, softassign__scan_value(&q, k));
+        q.patience -= !(two.second < before);
+        if (!(two.second < q.limit)) continue;
+        q.limit = two.second;
+        q.most = softassign__round_up(q.limit);
+    }
+    for (; j < n; j++) softassign__take_value(&two, j, softassign__scan_value(&q, j));
+    return two;
+}
+
+/* What was seen when costs were checked holds as long as these two slots keep their price: prices only fall. */
+static softassign__pair_of_least softassign__two_smallest(const softassign *s, int row)
+{
+    const softassign__pair_of_least *seen = &s->seen[row];
+    if (s->has_seen && seen->at >= 0 && !(s->price[seen->at] < 0) &&
+        (seen->second_at < 0 || !(s->price[seen->second_at] < 0)))
+        return *seen;
+    return softassign__look_at_row(s, row);
 }
 
 /* The smallest cost - price of a row, which is known to be at most `known`. */
-static double softassign__smallest(softassign__row cost, const double *price, int n, double known)
+static double softassign__smallest(const softassign *s, int row, double known)
 {
-    int j = 0, k;
-    for (; j + 8 <= n; j += 8)
-        for (k = softassign__eight_below(cost, j, price, known) ? j : j + 8; k < j + 8; k++)
-            if (softassign__row_cost(cost, k) - price[k] < known) known = softassign__row_cost(cost, k) - price[k];
+    softassign__scan q = softassign__scan_row(s, row, known);
+    int j = 0, k, n = s->columns;
+    for (; j + 16 <= n; j += 16) {
+        int within = softassign__sixteen_within(&q, j);
+        q.patience -= within != 0;
+        for (k = j; within; k++, within >>= 1)
+            if (within & 1 && softassign__scan_value(&q, k) < known) known = softassign__scan_value(&q, k);
+    }
     for (; j < n; j++)
-        if (softassign__row_cost(cost, j) - price[j] < known) known = softassign__row_cost(cost, j) - price[j];
+        if (softassign__scan_value(&q, j) < known) known = softassign__scan_value(&q, j);
     return known;
 }
 
@@ -1829,7 +1971,7 @@ static double softassign__row_bound(softassign *s, int row)
     double least;
     if (s->dense_paths) { /* with the switching bonus, which only lowers it */
         least = own >= 0 ? s->cost_of_row[row] - s->price[own] : (double)SOFTASSIGN__INFINITY;
-        return softassign__smallest(softassign__matrix_row(s, row), s->price, s->columns, least);
+        return softassign__smallest(s, row, least);
     }
     if (s->phase == SOFTASSIGN__DONE && own >= 0 && s->list_limit[row] < s->cost_of_row[row] - s->price[own])
         softassign__relist(s, row);
@@ -1949,11 +2091,12 @@ static int softassign__auction(softassign *s, double eps, size_t budget)
 typedef struct softassign__dense_step {
     softassign__row cost;
     double base, own_cost, own_price; /* distance, cost and price of the row's own slot */
-    const double *price;              /* of open slots */
+    double *price;                    /* of open slots */
     double *distance, *block;         /* block: the smallest distance of SOFTASSIGN__STEP slots */
+    float *reach;
     int *pred;
     const int *first_row;
-    int row;
+    int row, plain;                   /* rows to come in which floats would leave out too little: reach stands still */
 } softassign__dense_step;
 
 static void softassign__dense_swap(softassign *s, int row, int slot)
@@ -1965,31 +2108,38 @@ static void softassign__dense_swap(softassign *s, int row, int slot)
     if (out >= 0) s->slot_of_row[out] = -1;
 }
 
+/* The row's best slot falls to what the second best is worth. */
+static void softassign__pay_second(softassign *s, const softassign__pair_of_least *two)
+{
+    if (two->second < (double)SOFTASSIGN__INFINITY && two->second > two->least)
+        softassign__set_price(s, two->at, s->price[two->at] - (two->second - two->least));
+}
+
 /* The least cost of every column goes to price, the row that has it to from. */
 static void softassign__least_of_columns(softassign *s, int *from)
 {
-    int n = s->columns, i, j;
-    float *least = s->column_sum; /* of floats: half the memory to go through */
+    int n = s->columns, i, j, k;
+    float *least = s->price_f; /* floats: half the memory to go through */
     for (j = 0; j < n; j++) {
         s->price[j] = (double)(least[j] = SOFTASSIGN__INFINITY);
         from[j] = -1;
     }
     for (i = 0; i < n; i++) {
         softassign__row cost = softassign__matrix_row(s, i);
-        for (j = 0; j < n; j++) {
-#ifdef SAT__SSE2
-            for (; cost.f && j + 4 <= n; j += 4)
-                if (_mm_movemask_ps(_mm_cmplt_ps(_mm_loadu_ps(cost.f + j), _mm_loadu_ps(least + j)))) break;
-            if (j >= n) break;
-#endif
-            if (!(softassign__row_cost(cost, j) < s->price[j])) continue;
-            s->price[j] = softassign__row_cost(cost, j);
-            least[j] = (float)s->price[j];
-            from[j] = i;
+        for (j = 0; j < n; j = k) {
+            k = sat__min_int(n, j + 4);
+            if (cost.f && k == j + 4 &&
+                !sat__i32x4_any(sat__f32x4_less(sat__f32x4_load(cost.f + j), sat__f32x4_load(least + j))))
+                continue;
+            for (; j < k; j++) {
+                if (!(softassign__row_cost(cost, j) < s->price[j])) continue;
+                softassign__set_price(s, j, softassign__row_cost(cost, j));
+                from[j] = i;
+            }
         }
     }
     for (j = 0; j < n; j++)
-        if (from[j] < 0) s->price[j] = 0;
+        if (from[j] < 0) softassign__set_price(s, j, 0);
 }
 
 /* Every column is used in a square problem, so its price may have any sign: it starts at the least cost, and the row of
@@ -2002,41 +2152,39 @@ static void softassign__reduce_columns(softassign *s)
     for (j = n - 1; j >= 0; j--)
         if (from[j] >= 0 && !times[from[j]]++) softassign__dense_swap(s, from[j], j);
     for (i = 0; i < n; i++) {
-        double m1, m2;
+        softassign__pair_of_least two;
         if (times[i] != 1) continue;
-        softassign__two_smallest(softassign__matrix_row(s, i), s->price, n, &m1, &m2);
-        if (m2 < (double)SOFTASSIGN__INFINITY) s->price[s->slot_of_row[i]] -= m2 - m1;
+        two = softassign__two_smallest(s, i);
+        two.at = s->slot_of_row[i];
+        softassign__pay_second(s, &two);
     }
 }
 
-/* Rows without a slot take their best one and pay down to the second best; returns how many are left in s->closed. */
+/* Rows without a slot take their best one and pay down to the second best; returns how many are left. */
 static int softassign__reduce_rows(softassign *s, int *rows, int count)
 {
-    int next = 0, left = 0, j, budget = 8 * count + 64;
+    int next = 0, left = 0, budget = 8 * count + 64;
     while (next < count) {
-        int row = rows[next++], best, other = -1, out;
-        softassign__row cost = softassign__matrix_row(s, row);
-        double m1, m2;
-        best = softassign__two_smallest(cost, s->price, s->slot_count, &m1, &m2);
-        for (j = 0; m2 <= m1 && other < 0 && j < s->slot_count; j++) /* a tie: another slot of that value */
-            if (j != best && softassign__row_cost(cost, j) - s->price[j] <= m1) other = j;
-        if (best < 0) {
+        int row = rows[next++], out, pays;
+        softassign__pair_of_least two = softassign__two_smallest(s, row);
+        if (two.at < 0) {
             rows[left++] = row;
             continue;
         }
-        out = s->first_row[best];
-        if (!(m2 < (double)SOFTASSIGN__INFINITY) && out >= 0) { /* its only choice is taken: leave it to the paths */
+        out = s->first_row[two.at];
+        if (two.second_at < 0 && out >= 0) { /* its only choice is taken: leave it to the paths */
             rows[left++] = row;
             continue;
         }
-        if (m2 > m1 && m2 < (double)SOFTASSIGN__INFINITY) s->price[best] -= m2 - m1;
-        else if (out >= 0 && other >= 0) {
-            best = other;
-            out = s->first_row[best];
+        pays = two.second > two.least;
+        if (pays) softassign__pay_second(s, &two);
+        else if (out >= 0 && two.second_at >= 0) { /* a tie */
+            two.at = two.second_at;
+            out = s->first_row[two.at];
         }
-        softassign__dense_swap(s, row, best);
+        softassign__dense_swap(s, row, two.at);
         if (out < 0) continue;
-        if (m2 > m1 && budget-- > 0) rows[--next] = out;
+        if (pays && budget-- > 0) rows[--next] = out;
         else rows[left++] = out;
     }
     return left;
@@ -2061,122 +2209,281 @@ static double softassign__least_distance(const double *distance, int n)
     return nearest;
 }
 
-/* Relaxes slots from a row; *changed says that a distance did. Returns a free slot that is no farther than `base`,
-   which ends the path, or -1. */
-static int softassign__relax_slots(const softassign__dense_step *q, int begin, int end, int *changed)
+/* A float above distance + price. cost + base - (own cost - own price) of a slot that comes nearer is below it. */
+static inline float softassign__reach_of(double distance, double price)
+{
+    float f = (float)(distance + price);
+    return f + (fabsf(f) * 1.2e-7f + 1e-37f);
+}
+
+#ifdef SAT__SSE2
+/* The same of four slots. */
+static inline void softassign__store_reach(const softassign__dense_step *q, int j, __m128d x, __m128d y)
+{
+    __m128 f = _mm_movelh_ps(_mm_cvtpd_ps(_mm_add_pd(x, _mm_loadu_pd(q->price + j))),
+                             _mm_cvtpd_ps(_mm_add_pd(y, _mm_loadu_pd(q->price + j + 2))));
+    __m128 more = _mm_mul_ps(sat__f32x4_abs(f), _mm_set1_ps(1.2e-7f));
+    _mm_storeu_ps(q->reach + j, _mm_add_ps(f, _mm_add_ps(more, _mm_set1_ps(1e-37f))));
+}
+
+/* Distances of four slots from the row of the step. */
+static inline void softassign__load_distances(const softassign__dense_step *q, int j, __m128d *x, __m128d *y)
+{
+    __m128d c0 = _mm_set1_pd(q->own_cost), p0 = _mm_set1_pd(q->own_price), from = _mm_set1_pd(q->base);
+    softassign__load4(q->cost, j, x, y);
+    *x = _mm_add_pd(from, _mm_sub_pd(_mm_sub_pd(*x, c0), _mm_sub_pd(_mm_loadu_pd(q->price + j), p0)));
+    *y = _mm_add_pd(from, _mm_sub_pd(_mm_sub_pd(*y, c0), _mm_sub_pd(_mm_loadu_pd(q->price + j + 2), p0)));
+}
+#endif
+
+static inline double softassign__slot_distance(const softassign__dense_step *q, int j)
+{
+    return q->base + ((softassign__row_cost(q->cost, j) - q->own_cost) - (q->price[j] - q->own_price));
+}
+
+/* Relaxes some slots from a row. *least: the smallest distance. */
+static inline void softassign__relax_few(const softassign__dense_step *q, int j, int end, double *least)
+{
+    for (; j < end; j++) {
+        double w = softassign__slot_distance(q, j);
+        if (!(w < q->distance[j])) continue;
+        q->distance[j] = w;
+        q->reach[j] = softassign__reach_of(w, q->price[j]);
+        q->pred[j] = q->row;
+        *least = w < *least ? w : *least;
+    }
+}
+
+#ifdef SAT__SSE2
+/* The same for four. */
+static inline void softassign__relax_four(const softassign__dense_step *q, int j, int keep_reach, __m128d *least)
+{
+    __m128d x, y, d = _mm_loadu_pd(q->distance + j), e = _mm_loadu_pd(q->distance + j + 2), lower, lower2;
+    __m128i less, old, row = _mm_set1_epi32(q->row);
+    softassign__load_distances(q, j, &x, &y);
+    lower = _mm_cmplt_pd(x, d);
+    lower2 = _mm_cmplt_pd(y, e);
+    less = _mm_castps_si128(_mm_shuffle_ps(_mm_castpd_ps(lower), _mm_castpd_ps(lower2), _MM_SHUFFLE(2, 0, 2, 0)));
+    if (!sat__i32x4_any(less)) return;
+    x = _mm_min_pd(x, d);
+    y = _mm_min_pd(y, e);
+    _mm_storeu_pd(q->distance + j, x);
+    _mm_storeu_pd(q->distance + j + 2, y);
+    if (keep_reach) softassign__store_reach(q, j, x, y);
+    *least = _mm_min_pd(_mm_min_pd(x, y), *least);
+    old = _mm_loadu_si128((const __m128i *)(const void *)(q->pred + j));
+    old = _mm_or_si128(_mm_and_si128(less, row), _mm_andnot_si128(less, old));
+    _mm_storeu_si128((__m128i *)(void *)(q->pred + j), old);
+}
+#endif
+
+/* All distances from the root. */
+static void softassign__relax_root(const softassign__dense_step *q, int n)
+{
+    int b, j, end;
+    for (b = j = 0; j < n; b++) {
+        end = sat__min_int(n, j + SOFTASSIGN__STEP);
+#ifdef SAT__SSE2
+        for (; j + 4 <= end; j += 4) {
+            __m128d x, y;
+            softassign__load_distances(q, j, &x, &y);
+            _mm_storeu_pd(q->distance + j, x);
+            _mm_storeu_pd(q->distance + j + 2, y);
+            softassign__store_reach(q, j, x, y);
+            _mm_storeu_si128((__m128i *)(void *)(q->pred + j), _mm_set1_epi32(q->row));
+        }
+#endif
+        for (; j < end; j++) {
+            q->distance[j] = softassign__slot_distance(q, j);
+            q->reach[j] = softassign__reach_of(q->distance[j], q->price[j]);
+            q->pred[j] = q->row;
+        }
+        j = b * SOFTASSIGN__STEP;
+        q->block[b] = softassign__least_distance(q->distance + j, end - j);
+        j = end;
+    }
+}
+
+/* Which fours of sixteen slots may come nearer: bits. */
+static inline int softassign__sixteen_nearer(const float *cost, const float *reach, sat__f32x4 shift)
+{
+    sat__i32x4 a = sat__f32x4_less(sat__f32x4_add(sat__f32x4_load(cost), shift), sat__f32x4_load(reach));
+    sat__i32x4 b = sat__f32x4_less(sat__f32x4_add(sat__f32x4_load(cost + 4), shift), sat__f32x4_load(reach + 4));
+    sat__i32x4 c = sat__f32x4_less(sat__f32x4_add(sat__f32x4_load(cost + 8), shift), sat__f32x4_load(reach + 8));
+    sat__i32x4 d = sat__f32x4_less(sat__f32x4_add(sat__f32x4_load(cost + 12), shift), sat__f32x4_load(reach + 12));
+    if (!sat__i32x4_any(sat__i32x4_or(sat__i32x4_or(a, b), sat__i32x4_or(c, d)))) return 0;
+    return sat__i32x4_any(a) | sat__i32x4_any(b) << 1 | sat__i32x4_any(c) << 2 | sat__i32x4_any(d) << 3;
+}
+
+/* Relaxes slots from a row; floats leave out sixteen at a time. Returns how many fours they did not leave out. */
+static int softassign__relax_coarsely(const softassign__dense_step *q, int begin, int end, double *least)
+{
+    int j = begin, k, quads, hits = 0;
+    sat__f32x4 shift = sat__f32x4_set1(softassign__float_below(q->base - (q->own_cost - q->own_price)));
+#ifdef SAT__SSE2
+    double lanes[2];
+    __m128d lower = _mm_set1_pd(*least);
+#endif
+    for (; j + 16 <= end; j += 16) {
+        quads = softassign__sixteen_nearer(q->cost.f + j, q->reach + j, shift);
+        for (k = j; quads; k += 4, quads >>= 1) {
+            if (!(quads & 1)) continue;
+            hits++;
+#ifdef SAT__SSE2
+            softassign__relax_four(q, k, 1, &lower);
+#else
+            softassign__relax_few(q, k, k + 4, least);
+#endif
+        }
+    }
+#ifdef SAT__SSE2
+    _mm_storeu_pd(lanes, lower);
+    *least = lanes[0] < lanes[1] ? lanes[0] : lanes[1];
+#endif
+    softassign__relax_few(q, j, end, least);
+    return hits;
+}
+
+/* The same where most come nearer. */
+static void softassign__relax_plainly(const softassign__dense_step *q, int begin, int end, double *least)
 {
     int j = begin;
 #ifdef SAT__SSE2
-    __m128d c0 = _mm_set1_pd(q->own_cost), p0 = _mm_set1_pd(q->own_price), from = _mm_set1_pd(q->base);
-    __m128i row = _mm_set1_epi32(q->row);
+    double lanes[2];
+    __m128d lower = _mm_set1_pd(*least);
+    for (; j + 4 <= end; j += 4) softassign__relax_four(q, j, 0, &lower);
+    _mm_storeu_pd(lanes, lower);
+    *least = lanes[0] < lanes[1] ? lanes[0] : lanes[1];
+#endif
+    softassign__relax_few(q, j, end, least);
+}
+
+/* A free slot that is no farther than `nearest`, or -1; slots so near that are taken are appended to a list. */
+static int softassign__free_within(const softassign__dense_step *q, int j, int end, double nearest, int *list,
+                                   int *count)
+{
+#ifdef SAT__SSE2
+    __m128d most = _mm_set1_pd(nearest);
     for (; j + 4 <= end; j += 4) {
-        __m128d x, y, d = _mm_loadu_pd(q->distance + j), e = _mm_loadu_pd(q->distance + j + 2), lower, lower2;
-        __m128i less, old;
-        int near_base, k;
-        softassign__load4(q->cost, j, &x, &y);
-        x = _mm_add_pd(from, _mm_sub_pd(_mm_sub_pd(x, c0), _mm_sub_pd(_mm_loadu_pd(q->price + j), p0)));
-        y = _mm_add_pd(from, _mm_sub_pd(_mm_sub_pd(y, c0), _mm_sub_pd(_mm_loadu_pd(q->price + j + 2), p0)));
-        lower = _mm_cmplt_pd(x, d);
-        lower2 = _mm_cmplt_pd(y, e);
-        if (!_mm_movemask_pd(_mm_or_pd(lower, lower2))) continue;
-        *changed = 1;
-        _mm_storeu_pd(q->distance + j, _mm_min_pd(x, d));
-        _mm_storeu_pd(q->distance + j + 2, _mm_min_pd(y, e));
-        less = _mm_castps_si128(_mm_shuffle_ps(_mm_castpd_ps(lower), _mm_castpd_ps(lower2), _MM_SHUFFLE(2, 0, 2, 0)));
-        old = _mm_loadu_si128((const __m128i *)(const void *)(q->pred + j));
-        old = _mm_or_si128(_mm_and_si128(less, row), _mm_andnot_si128(less, old));
-        _mm_storeu_si128((__m128i *)(void *)(q->pred + j), old);
-        near_base = _mm_movemask_pd(_mm_and_pd(lower, _mm_cmple_pd(x, from))) |
-                    _mm_movemask_pd(_mm_and_pd(lower2, _mm_cmple_pd(y, from))) << 2;
-        for (k = 0; near_base && k < 4; k++)
-            if (near_base & 1 << k && q->first_row[j + k] < 0) return j + k;
+        int k, within = _mm_movemask_pd(_mm_cmple_pd(_mm_loadu_pd(q->distance + j), most)) |
+                        _mm_movemask_pd(_mm_cmple_pd(_mm_loadu_pd(q->distance + j + 2), most)) << 2;
+        for (k = j; within; k++, within >>= 1) {
+            if (!(within & 1)) continue;
+            if (q->first_row[k] < 0) return k;
+            list[(*count)++] = k;
+        }
     }
 #endif
     for (; j < end; j++) {
-        double w = q->base + ((softassign__row_cost(q->cost, j) - q->own_cost) - (q->price[j] - q->own_price));
-        if (!(w < q->distance[j])) continue;
-        *changed = 1;
-        q->distance[j] = w;
-        q->pred[j] = q->row;
-        if (w <= q->base && q->first_row[j] < 0) return j;
+        if (q->distance[j] > nearest) continue;
+        if (q->first_row[j] < 0) return j;
+        list[(*count)++] = j;
     }
     return -1;
 }
 
-/* Relaxes all slots from a row and returns the nearest open one; free slots win ties. A closed slot has an infinite
-   distance here and a price of minus infinity, so that nothing is below either. */
-static int softassign__relax_dense(const softassign__dense_step *q, int n)
+/* Relaxes all slots from a row. Returns a free one that is no farther than `base`, which ends the path, or -1. A closed
+   slot has an infinite distance here and a price of minus infinity, so that nothing is below either. */
+static int softassign__relax_dense(softassign__dense_step *q, int n)
 {
-    double nearest = (double)SOFTASSIGN__INFINITY;
-    int j, b, end, at = -1, step = SOFTASSIGN__STEP;
+    int j, b, end, step = SOFTASSIGN__STEP, hits = 0, taken[SOFTASSIGN__STEP], ignored;
     for (b = 0; b * step < n; b++) {
-        int changed = 0;
+        double before = q->block[b];
         end = n - b * step < step ? n : (b + 1) * step;
-        if ((j = softassign__relax_slots(q, b * step, end, &changed)) >= 0) return j;
-        if (changed) q->block[b] = softassign__least_distance(q->distance + b * step, end - b * step);
-        nearest = q->block[b] < nearest ? q->block[b] : nearest;
+        if (q->plain) softassign__relax_plainly(q, b * step, end, &q->block[b]);
+        else hits += softassign__relax_coarsely(q, b * step, end, &q->block[b]);
+        ignored = 0;
+        if (q->block[b] < before && q->block[b] <= q->base &&
+            (j = softassign__free_within(q, b * step, end, q->base, taken, &ignored)) >= 0)
+            return j;
     }
-    if (!(nearest < (double)SOFTASSIGN__INFINITY)) return -1;
-    for (b = 0; b * step < n; b++) {
-        if (q->block[b] > nearest) continue;
-        end = n - b * step < step ? n : (b + 1) * step;
-        for (j = b * step; j < end; j++) {
-            if (q->distance[j] > nearest) continue;
-            if (q->first_row[j] < 0) return j;
-            if (at < 0) at = j;
-        }
-    }
-    return at;
+    if (hits * 12 > n) q->plain = 16;
+    else if (q->cost.f && q->plain > 0 && --q->plain == 0)
+        for (j = 0; j < n; j++) q->reach[j] = softassign__reach_of(q->distance[j], q->price[j]);
+    return -1;
 }
 
-/* A slot leaves the search. */
-static void softassign__close_dense(const softassign__dense_step *q, double *price, int slot, int n)
+/* The nearest open slots. A free one ends the path and is returned; else they leave the search, all at once, and go to
+   the end of s->closed. -1: there are none, or not a free one. */
+static int softassign__close_nearest(softassign *s, softassign__dense_step *q, int *closed)
 {
-    int b = slot / SOFTASSIGN__STEP, begin = b * SOFTASSIGN__STEP;
-    q->distance[slot] = (double)SOFTASSIGN__INFINITY;
-    price[slot] = -(double)SOFTASSIGN__INFINITY;
-    q->block[b] = softassign__least_distance(q->distance + begin, sat__min_int(n - begin, SOFTASSIGN__STEP));
+    int n = s->slot_count, step = SOFTASSIGN__STEP, b, j, k, first, blocks = (n + step - 1) / step, from = *closed;
+    double nearest = softassign__least_distance(q->block, blocks);
+    if (!(nearest < (double)SOFTASSIGN__INFINITY)) return -1;
+    if (nearest > q->base) q->base = nearest; /* else rounding */
+    for (b = 0; b < blocks; b++) {
+        if (q->block[b] > nearest) continue;
+        j = softassign__free_within(q, b * step, sat__min_int(n, (b + 1) * step), nearest, s->closed, closed);
+        if (j < 0) continue;
+        *closed = from; /* the others do not count */
+        return j;
+    }
+    for (k = from; k < *closed; k++) {
+        j = s->closed[k];
+        s->closed_distance[k] = q->base;
+        q->distance[j] = (double)SOFTASSIGN__INFINITY;
+        q->price[j] = -(double)SOFTASSIGN__INFINITY;
+        q->reach[j] = -SOFTASSIGN__INFINITY;
+        first = j / step * step;
+        if (k + 1 == *closed || s->closed[k + 1] / step != j / step)
+            q->block[j / step] = softassign__least_distance(q->distance + first, sat__min_int(n - first, step));
+    }
+    return -1;
+}
+
+/* A free slot that is as good for the row as its best one, or -1. */
+static int softassign__free_tie(const softassign__dense_step *q, int from, int n)
+{
+    int j;
+    for (j = from; j < n; j++)
+        if (q->first_row[j] < 0 && softassign__slot_distance(q, j) <= 0) return j;
+    return -1;
 }
 
 static int softassign__augment_dense(softassign *s, int root)
 {
     softassign__dense_step q;
-    double *d = s->distance, *open_price = s->dense_price, least, second;
-    int *pred = s->parent, closed = 0, row, j, k, end;
+    softassign__pair_of_least two = softassign__two_smallest(s, root);
+    int closed = 0, next = 0, row, j, k, end = two.at, n = s->slot_count;
     s->stats.paths++;
-    q.cost = softassign__matrix_row(s, root);
-    end = softassign__two_smallest(q.cost, s->price, s->slot_count, &least, &second);
     if (end < 0) return 0;
-    for (j = 0; j < s->slot_count; j++) d[j] = (double)SOFTASSIGN__INFINITY;
-    memcpy(open_price, s->price, (size_t)s->slot_count * sizeof *open_price);
+    memset(&q, 0, sizeof q);
+    q.cost = softassign__matrix_row(s, root);
     q.row = root;
-    q.base = 0;
     q.own_cost = softassign__row_cost(q.cost, end);
     q.own_price = s->price[end];
-    q.price = open_price;
-    q.distance = d;
-    q.block = s->closed_distance + s->slot_count;
-    for (k = 0; k <= s->slot_count / SOFTASSIGN__STEP; k++) q.block[k] = (double)SOFTASSIGN__INFINITY;
-    q.pred = pred;
+    q.price = s->price;
+    q.distance = s->distance;
+    q.reach = s->reach;
+    q.block = s->block_distance;
+    q.pred = s->parent;
     q.first_row = s->first_row;
-    for (;;) {
-        s->stats.work++;
-        end = softassign__relax_dense(&q, s->slot_count);
-        if (end < 0) return 0;
-        if (d[end] > q.base) q.base = d[end]; /* else rounding */
-        if (s->first_row[end] < 0) break;
-        q.row = s->first_row[end];
-        s->closed[closed] = end;
-        s->closed_distance[closed++] = q.base;
-        softassign__close_dense(&q, open_price, end, s->slot_count);
-        q.cost = softassign__matrix_row(s, q.row);
-        q.own_cost = softassign__row_cost(q.cost, end);
-        q.own_price = s->price[end];
+    q.plain = !q.cost.f;
+    s->stats.work++;
+    end = softassign__free_tie(&q, end, two.second > two.least ? end + 1 : n);
+    if (end >= 0) {
+        q.pred[end] = root;
+    } else {
+        q.price = s->dense_price;
+        memcpy(q.price, s->price, (size_t)n * sizeof *q.price);
+        softassign__relax_root(&q, n);
     }
-    for (k = 0; k < closed; k++) s->price[s->closed[k]] += s->closed_distance[k] - q.base;
+    while (end < 0) {
+        if (next == closed && ((end = softassign__close_nearest(s, &q, &closed)) >= 0 || next == closed)) break;
+        j = s->closed[next++];
+        q.row = s->first_row[j];
+        q.cost = softassign__matrix_row(s, q.row);
+        q.own_cost = softassign__row_cost(q.cost, j);
+        q.own_price = s->price[j];
+        s->stats.work++;
+        end = softassign__relax_dense(&q, n);
+    }
+    if (end < 0) return 0;
+    for (k = 0; k < closed; k++)
+        softassign__set_price(s, s->closed[k], s->price[s->closed[k]] + (s->closed_distance[k] - q.base));
     for (j = end;;) {
         int old;
-        row = pred[j];
+        row = q.pred[j];
         old = s->slot_of_row[row];
         s->slot_of_row[row] = j;
         s->first_row[j] = row;
@@ -2191,7 +2498,6 @@ static void softassign__dense_publish(softassign *s)
     int i, j;
     for (j = 0; j < s->slot_count; j++) {
         s->used[j] = s->first_row[j] >= 0;
-        s->price_f[j] = (float)s->price[j];
     }
     for (i = 0; i < s->rows; i++) {
         s->next_row[i] = -1;
@@ -2508,6 +2814,7 @@ static void softassign__reset_assignment(softassign *s)
 static void softassign__reset_prices(softassign *s)
 {
     int j;
+    s->dearest = 0;
     for (j = 0; j < s->max_slots; j++) softassign__set_price(s, j, j < s->slot_count ? s->top[j] : 0);
     for (; j < s->padded; j++) s->price_f[j] = 0;
 }
@@ -2614,14 +2921,15 @@ static int softassign__first_choices(softassign *s, int *count)
     int i, j, different = 0, left = 0;
     for (j = 0; j < s->columns; j++) s->holders[j] = 0;
     for (i = 0; i < s->rows; i++) {
-        double m1, m2;
+        softassign__pair_of_least two;
         if (s->slot_of_row[i] >= 0) continue;
-        j = softassign__two_smallest(softassign__matrix_row(s, i), s->price, s->columns, &m1, &m2);
-        different += m2 <= m1 || j < 0 || !s->holders[j]++;
+        two = softassign__two_smallest(s, i);
+        j = two.at;
+        different += two.second <= two.least || j < 0 || !s->holders[j]++;
         if (j < 0 || s->first_row[j] >= 0) s->kept[left++] = i;
         else {
             softassign__dense_swap(s, i, j);
-            if (m2 < (double)SOFTASSIGN__INFINITY) s->price[j] -= m2 - m1;
+            softassign__pay_second(s, &two);
         }
     }
     *count = left;
@@ -2740,8 +3048,10 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->row_largest = s->row_distance = (double *)sat__carve(a, rows, sizeof(double));
     s->bid = (double *)sat__carve(a, rows, sizeof(double));
     s->dense_price = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
-    s->closed_distance =
-        (double *)sat__carve(a, s->dense ? seats + seats / SOFTASSIGN__STEP + 1 : 0, sizeof(double));
+    s->closed_distance = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
+    s->block_distance = (double *)sat__carve(a, s->dense ? seats / SOFTASSIGN__STEP + 1 : 0, sizeof(double));
+    s->reach = (float *)sat__carve(a, s->dense ? seats : 0, sizeof(float));
+    s->seen = (softassign__pair_of_least *)sat__carve(a, s->dense ? rows : 0, sizeof *s->seen);
     s->list_limit = (double *)sat__carve(a, rows, sizeof(double));
     s->basis = (double *)sat__carve(a, (size_t)(2 * SOFTASSIGN__DIMS + 1) * (size_t)features, sizeof(double));
     s->price_f = (float *)sat__carve(a, padded, sizeof(float));
@@ -3644,26 +3954,17 @@ static sat_result softassign__check_cost(double cost)
     return fabs(cost) > (double)SOFTASSIGN__LARGEST_COST ? SAT_ERR_ARGUMENT : SAT_OK;
 }
 
-/* The largest |cost| as bits, in whose order infinities and NaN are above all numbers. */
-static uint32_t softassign__largest_bits(const float *cost, int n)
+/* 1 when all costs are between -1e30 and 1e30. */
+static int softassign__all_tame(const float *cost, int n)
 {
-    uint32_t largest = 0;
-    int j = 0;
-#ifdef SAT__SSE2
-    int lanes[4], k;
-    __m128i top = _mm_setzero_si128(), rest = _mm_set1_epi32(0x7fffffff);
-    for (; j + 4 <= n; j += 4) {
-        __m128i bits = _mm_and_si128(_mm_castps_si128(_mm_loadu_ps(cost + j)), rest), more = _mm_cmpgt_epi32(bits, top);
-        top = _mm_or_si128(_mm_and_si128(more, bits), _mm_andnot_si128(more, top));
-    }
-    _mm_storeu_si128((__m128i *)(void *)lanes, top);
-    for (k = 0; k < 4; k++) largest = (uint32_t)lanes[k] > largest ? (uint32_t)lanes[k] : largest;
-#endif
-    for (; j < n; j++) {
-        uint32_t size = sat__float_bits(cost[j]) & 0x7fffffffu;
-        largest = size > largest ? size : largest;
-    }
-    return largest;
+    int j = 0, tame = 1;
+    sat__f32x4 most = sat__f32x4_set1(SOFTASSIGN__LARGEST_COST);
+    sat__i32x4 all = sat__i32x4_set1(-1);
+    for (; j + 4 <= n; j += 4)
+        all = sat__i32x4_and(all, sat__f32x4_less_equal(sat__f32x4_abs(sat__f32x4_load(cost + j)), most));
+    if (!sat__i32x4_all(all)) return 0;
+    for (; j < n; j++) tame &= fabsf(cost[j]) <= SOFTASSIGN__LARGEST_COST;
+    return tame;
 }
 
 /* Into the copy of the matrix, or nowhere. */
@@ -3689,7 +3990,7 @@ static sat_result softassign__check_row(softassign *s, int row)
     sat_result result = SAT_OK;
     int j, k, plain = p->cost && !p->row_start && !p->maximise;
     const float *floats = plain ? p->cost + softassign__element(p, row, 0) : NULL;
-    if (plain && softassign__largest_bits(floats, p->columns) <= 0x7149f2cau) { /* 1e30 */
+    if (plain && softassign__all_tame(floats, p->columns)) {
         if (s->dense && !s->in_place)
             memcpy(s->matrix + (size_t)row * (size_t)s->columns, floats, (size_t)p->columns * sizeof(float));
     } else if (p->row_start) {
@@ -3722,9 +4023,11 @@ static void softassign__check_range(int begin, int end, int worker, void *contex
         s->row_largest[i] = 0;
         result = softassign__check_row(s, i);
         s->row_result[i] = (int)result;
-        if (stay < 0 || !s->dense || s->in_place) continue;
-        if (s->wide) s->wide_matrix[at] -= (double)s->bonus;
-        else s->matrix[at] -= s->bonus;
+        if (stay >= 0 && s->dense && !s->in_place) {
+            if (s->wide) s->wide_matrix[at] -= (double)s->bonus;
+            else s->matrix[at] -= s->bonus;
+        }
+        if (s->has_seen) s->seen[i] = softassign__look_at_row(s, i); /* while it is in the cache */
     }
 }
 
@@ -3894,6 +4197,9 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     if (result != SAT_OK) return result;
     s->bonus = softassign__switching_bonus(s);
     s->in_place = s->dense && softassign__stays(problem, &s->options);
+    s->dense_paths = s->dense && s->unit_capacities && s->options.method == SOFTASSIGN_AUTO;
+    s->has_seen = s->dense_paths && s->rows < s->columns && !known;
+    for (j = 0; s->has_seen && j < s->columns; j++) softassign__set_price(s, j, 0);
     result = softassign__check_costs(s);
     if (result != SAT_OK) return result;
     s->scale = s->wide ? (double)problem->unassigned_cost : 0;
@@ -3917,7 +4223,6 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
         s->list_limit[j] = s->projected ? 0 : -(double)SOFTASSIGN__INFINITY;
     }
     s->next = s->easy = 0;
-    s->dense_paths = s->dense && s->unit_capacities && s->options.method == SOFTASSIGN_AUTO;
     s->phase = s->dense_paths ? SOFTASSIGN__PATHS : SOFTASSIGN__LISTS;
     for (j = 0; known && !(s->dense_paths && s->rows == s->columns) && j < s->slot_count;
          j++) /* a square matrix lets prices rise above 0 */

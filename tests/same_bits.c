@@ -1,5 +1,6 @@
-/* Prints a hash of everything the lanes of sat.h, tonemap.h or fiv.h compute from inputs of all kinds. Compiled with
-   and without SAT_NO_SIMD it prints the same: vectors and plain C give the same bits. tests/check_house.sh compares. */
+/* Prints a hash of everything the lanes of sat.h, tonemap.h, raindrop.h, fiv.h or softassign.h compute from inputs of
+   all kinds. Compiled with and without SAT_NO_SIMD it prints the same: vectors and plain C give the same bits.
+   tests/check_house.sh compares. */
 #define LIGHTSCAN_IMPLEMENTATION
 #ifdef SAME_BITS_TONEMAP
 #include "tonemap.h"
@@ -7,6 +8,8 @@
 #include "raindrop.h"
 #elif defined(SAME_BITS_FIV)
 #include "fiv.h"
+#elif defined(SAME_BITS_SOFTASSIGN)
+#include "softassign.h"
 #else
 #define SAT_SIBLING
 #include "sat.h"
@@ -24,7 +27,8 @@ static void add(const void *p, size_t size)
     for (; size > 0; size--) hash = (hash ^ *c++) * 1099511628211u;
 }
 
-#if !defined(SAME_BITS_TONEMAP) && !defined(SAME_BITS_FIV) && !defined(SAME_BITS_RAINDROP)
+#if !defined(SAME_BITS_TONEMAP) && !defined(SAME_BITS_FIV) && !defined(SAME_BITS_RAINDROP) && \
+    !defined(SAME_BITS_SOFTASSIGN)
 /* NaN counts as NaN: its bits are the processor's. */
 static void add_floats(sat__f32x4 v)
 {
@@ -81,6 +85,77 @@ int main(void)
     int i;
     for (i = 0; i < 100000; i++) all_lanes();
     printf("lanes %016llx\n", (unsigned long long)hash);
+    return 0;
+}
+
+#elif defined(SAME_BITS_SOFTASSIGN)
+enum { ROWS = 150, COLUMNS = 290, FEATURES = 20 };
+
+static float draw_unit(void) { return (float)(draw() >> 8) / 16777216.0f; }
+
+/* Ties, forbidden pairs, wide ranges, products. */
+static float draw_cost(int kind, int i, int j)
+{
+    if (kind == 1) return (float)(draw() >> 30);
+    if (kind == 2) return draw() >> 28 ? draw_unit() : sat__float_from_bits(0x7f800000u);
+    if (kind == 3) return draw_unit() * (draw() >> 29 ? 1.0f : 1e12f) - 0.5f;
+    return kind == 4 ? (float)((i + 1) * (j * 7 % 290 + 1)) : draw_unit();
+}
+
+static void add_answer(const softassign_problem *p, softassign_method method)
+{
+    static double u[ROWS], v[COLUMNS];
+    int x[ROWS];
+    softassign_options o = softassign_method_defaults(method);
+    softassign_stats stats;
+    o.iterations[0] = o.iterations[0] < 6 ? o.iterations[0] : 6;
+    if (method == SOFTASSIGN_AUTO) o.row_price = u, o.column_price = v;
+    if (softassign_solve(x, p, &o, &stats) != SAT_OK) memset(x, 0, sizeof x);
+    add(x, (size_t)p->rows * sizeof *x);
+    add(&stats.cost, sizeof stats.cost), add(&stats.lower_bound, sizeof stats.lower_bound);
+    if (!o.row_price) return;
+    add(u, (size_t)p->rows * sizeof *u), add(v, (size_t)p->columns * sizeof *v);
+}
+
+static void all_costs(const softassign_problem *p, const float *cost, int kind)
+{
+    static double wide[ROWS * COLUMNS];
+    static int whole[ROWS * COLUMNS];
+    int i;
+    softassign_problem q = *p;
+    for (i = 0; i < ROWS * COLUMNS; i++) {
+        wide[i] = (double)cost[i] * 1.1;
+        whole[i] = cost[i] < 1e6f ? (int)(cost[i] * 1000) : 2147483647;
+    }
+    q.cost = cost;
+    add_answer(&q, SOFTASSIGN_AUTO);
+    if (kind < 2) add_answer(&q, SOFTASSIGN_EXACT), add_answer(&q, SOFTASSIGN_FAST);
+    if (kind < 2) add_answer(&q, SOFTASSIGN_ENTROPIC);
+    q.unassigned_cost = kind == 1 ? 1 : 0.25f;
+    add_answer(&q, SOFTASSIGN_AUTO);
+    q.unassigned_cost = 0, q.cost = NULL, q.cost_double = wide;
+    add_answer(&q, SOFTASSIGN_AUTO);
+    q.cost_double = NULL, q.cost_int = whole;
+    add_answer(&q, SOFTASSIGN_AUTO);
+}
+
+int main(void)
+{
+    static const int sizes[8][2] = {{3, 3}, {31, 31}, {33, 70}, {64, 64}, {99, 99}, {150, 150}, {60, 290}, {150, 290}};
+    static float cost[ROWS * COLUMNS], features[(ROWS + COLUMNS) * FEATURES];
+    int size, kind, i;
+    for (size = 0; size < 8; size++)
+        for (kind = 0; kind < 5; kind++) {
+            softassign_problem p = {0};
+            p.rows = sizes[size][0], p.columns = sizes[size][1];
+            for (i = 0; i < ROWS * COLUMNS; i++) cost[i] = draw_cost(kind, i / p.columns, i % p.columns);
+            all_costs(&p, cost, kind);
+            if (kind > 1) continue;
+            for (i = 0; i < (ROWS + COLUMNS) * FEATURES; i++) features[i] = draw_cost(kind, 0, 0);
+            p.row_features = features, p.column_features = features + ROWS * FEATURES, p.feature_count = FEATURES;
+            add_answer(&p, SOFTASSIGN_EXACT), add_answer(&p, SOFTASSIGN_GREEDY_2OPT), add_answer(&p, SOFTASSIGN_ANTS);
+        }
+    printf("softassign %016llx\n", (unsigned long long)hash);
     return 0;
 }
 
