@@ -255,7 +255,7 @@ examples() {
     for page in README.md docs/*.md; do
         empty "$page shows other programs than tests/test_readme.h (make docs)" "$(diff "$page" <(sh tests/readme.sh "$page"))"
         # every link to a file leads somewhere
-        empty "$page: links to nothing" "$(grep -oE '\]\([^)#]+' "$page" | sed 's/^](//' | grep -v '^http' | while read -r target; do
+        empty "$page: links to nothing" "$(grep -oE '(\]\(|src=")[^)#"]+' "$page" | sed -E 's/^(]\(|src=")//' | grep -v '^http' | while read -r target; do
             [ -e "$(dirname "$page")/$target" ] || echo "$target"; done)"
     done
     finish
