@@ -683,16 +683,23 @@ static inline uint32_t tonemap__mask_weight(float v)
     return v > 0 ? v < 1 ? (uint32_t)(int32_t)(v * 15 + 0.5f) : 15 : 0;
 }
 
-/* Pixels [x, end) of a row with whatever is in them and their weights. lane[x % 4] sums the luminances, so that four
-   pixels at a time give the same sum. */
-static inline void tonemap__measure_each(tonemap__worker *w, float *luminance, float *lane, const float *pixels,
-                                          int channels, int x, int end)
+/* A row that is measured. lane[x % 4] sums the luminances, so that four pixels at a time give the same sum. */
+typedef struct tonemap__line {
+    float *luminance, lane[4];
+    const float *pixels;
+    int channels;
+} tonemap__line;
+
+/* Pixels [x, end) of a row with whatever is in them and their weights. */
+static inline void tonemap__measure_each(tonemap__worker *w, tonemap__line *line, int x, int end)
 {
+    float *luminance = line->luminance;
+    const int channels = line->channels;
     int64_t log_sum = 0;
     uint64_t counted = 0;
     size_t positive = 0;
     for (; x < end; x++) {
-        const float *p = pixels + (size_t)x * (size_t)channels;
+        const float *p = line->pixels + (size_t)x * (size_t)channels;
         float y = channels == 1 ? p[0] : w->luma[0] * p[0] + w->luma[1] * p[1] + w->luma[2] * p[2], t;
         uint32_t bits, weight = w->mask ? tonemap__mask_weight(w->mask[x]) : 1;
         if (!(y >= TONEMAP__DARKEST && y <= TONEMAP__BRIGHTEST)) {
@@ -704,7 +711,7 @@ static inline void tonemap__measure_each(tonemap__worker *w, float *luminance, f
             }
         }
         luminance[x] = y;
-        lane[x & 3] += y;
+        line->lane[x & 3] += y;
         bits = sat__float_bits(y);
         t = sat__float_from_bits((bits & 0x007fffffu) | 0x3f800000u) - 1;
         log_sum += (int64_t)weight * (((int32_t)(bits >> 23) - 127) * 65536 +
@@ -744,9 +751,11 @@ static inline void tonemap__count4(uint32_t *histogram, sat__i32x4 bits)
 }
 
 /* Whole groups of four of a row of at most 2^16 pixels without a mask; returns where it stopped. */
-static inline int tonemap__measure_fours(tonemap__worker *w, float *luminance, float *lane, const float *pixels,
-                                          int channels, int x, int end)
+static inline int tonemap__measure_fours(tonemap__worker *w, tonemap__line *line, int x, int end)
 {
+    const float *pixels = line->pixels;
+    float *luminance = line->luminance, *lane = line->lane;
+    const int channels = line->channels;
     sat__f32x4 sum = sat__f32x4_load(lane), low = sat__f32x4_set1(TONEMAP__DARKEST),
                high = sat__f32x4_set1(TONEMAP__BRIGHTEST);
     sat__i32x4 exponents = sat__i32x4_set1(0), fractions = sat__i32x4_set1(0);
@@ -759,7 +768,7 @@ static inline int tonemap__measure_fours(tonemap__worker *w, float *luminance, f
         y = tonemap__luminance4(w->luma, channels, r, g, b);
         if (!sat__i32x4_all(sat__i32x4_and(sat__f32x4_less_equal(low, y), sat__f32x4_less_equal(y, high)))) {
             sat__f32x4_store(lane, sum);
-            tonemap__measure_each(w, luminance, lane, pixels, channels, x, x + 4);
+            tonemap__measure_each(w, line, x, x + 4);
             sum = sat__f32x4_load(lane);
             continue;
         }
@@ -784,15 +793,18 @@ static inline int tonemap__measure_fours(tonemap__worker *w, float *luminance, f
 static inline float tonemap__measure_row(tonemap__worker *w, float *luminance, const float *pixels, int channels,
                                          int width)
 {
-    float lane[4] = {0, 0, 0, 0};
+    tonemap__line line = {NULL, {0, 0, 0, 0}, NULL, 0};
     int x = 0, end;
+    line.luminance = luminance;
+    line.pixels = pixels;
+    line.channels = channels;
     while (x < width) {
         end = width - x > 65536 ? x + 65536 : width;
-        if (!w->mask) x = tonemap__measure_fours(w, luminance, lane, pixels, channels, x, end);
-        tonemap__measure_each(w, luminance, lane, pixels, channels, x, end);
+        if (!w->mask) x = tonemap__measure_fours(w, &line, x, end);
+        tonemap__measure_each(w, &line, x, end);
         x = end;
     }
-    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
+    return (line.lane[0] + line.lane[1]) + (line.lane[2] + line.lane[3]);
 }
 
 /* A row of the input as packed floats: the input's own where it is that. */
@@ -1241,8 +1253,12 @@ static inline void tonemap__add_ring_row(const tonemap *map, tonemap__worker *w,
     for (; x < end; x++) row[x] = row[map->width - 1];
 }
 
-/* The boxes around the pixels of one row: sums above and below, and the number of rows between them. */
+/* A row that is searched: its luminances, where La goes, and the boxes around its pixels: sums above and below, and the
+   number of rows between them. */
 typedef struct tonemap__window {
+    const tonemap__frame *frame;
+    const float *luminance;
+    float *local;
     const uint32_t *top[TONEMAP__BOXES], *bottom[TONEMAP__BOXES]; /* both at x = 0 */
     int rows[TONEMAP__BOXES];
     float inverse[TONEMAP__BOXES]; /* 1 / (area quantum) of an unclipped row */
@@ -1253,6 +1269,9 @@ static inline void tonemap__open_window(tonemap__window *window, const tonemap *
 {
     const tonemap__frame *f = &map->frame;
     int k;
+    window->frame = f;
+    window->luminance = map->luminance + (size_t)y * (size_t)map->row;
+    window->local = w->local;
     window->width = map->width;
     for (k = 1; k < f->boxes; k++) {
         int r = f->radius[k], y0 = sat__max_int(y - r, 0), y1 = sat__min_int(y + r + 1, map->height);
@@ -1264,8 +1283,9 @@ static inline void tonemap__open_window(tonemap__window *window, const tonemap *
 }
 
 /* The inverse areas of four boxes of which some are clipped. */
-static inline sat__f32x4 tonemap__inverse4(const tonemap__window *window, const tonemap__frame *f, int k, int x)
+static inline sat__f32x4 tonemap__inverse4(const tonemap__window *window, int k, int x)
 {
+    const tonemap__frame *f = window->frame;
     float inverse[4];
     int i, r = f->radius[k];
     for (i = 0; i < 4; i++) {
@@ -1275,9 +1295,9 @@ static inline sat__f32x4 tonemap__inverse4(const tonemap__window *window, const 
     return sat__f32x4_load(inverse);
 }
 
-static inline sat__f32x4 tonemap__box_sum4(const tonemap__window *window, const tonemap__frame *f, int k, int x)
+static inline sat__f32x4 tonemap__box_sum4(const tonemap__window *window, int k, int x)
 {
-    int r = f->radius[k];
+    int r = window->frame->radius[k];
     const int32_t *top = (const int32_t *)(const void *)(window->top[k] + x),
                   *bottom = (const int32_t *)(const void *)(window->bottom[k] + x);
     return sat__i32x4_to_f32(
@@ -1309,9 +1329,11 @@ static inline sat__i32x4 tonemap__step4(sat__f32x4 *c, sat__i32x4 *live, sat__f3
 }
 
 /* Sixteen pixels, spelt out to stay in registers; done when the last of them is. */
-static inline void tonemap__search_group(float *local, const float *luminance, const tonemap__window *window,
-                                         const tonemap__frame *f, sat__i32x4 *passed, int x)
+static inline void tonemap__search_group(const tonemap__window *window, sat__i32x4 *passed, int x)
 {
+    const tonemap__frame *f = window->frame;
+    const float *luminance = window->luminance;
+    float *local = window->local;
     sat__f32x4 factor = sat__f32x4_set1(f->scale), cap = sat__f32x4_set1(f->cap), epsilon = sat__f32x4_set1(f->epsilon);
     sat__f32x4 c0 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), factor), cap);
     sat__f32x4 c1 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x + 4), factor), cap);
@@ -1322,15 +1344,15 @@ static inline void tonemap__search_group(float *local, const float *luminance, c
     for (k = 0; k + 1 < f->boxes; k++) {
         sat__f32x4 inverse = sat__f32x4_set1(window->inverse[k + 1]), term = sat__f32x4_set1(f->term[k]);
         alive =
-            tonemap__step4(&c0, &live0, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), epsilon, term);
+            tonemap__step4(&c0, &live0, sat__f32x4_mul(tonemap__box_sum4(window, k + 1, x), inverse), epsilon, term);
         alive = sat__i32x4_add(
-            alive, tonemap__step4(&c1, &live1, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 4), inverse),
+            alive, tonemap__step4(&c1, &live1, sat__f32x4_mul(tonemap__box_sum4(window, k + 1, x + 4), inverse),
                                   epsilon, term));
         alive = sat__i32x4_add(
-            alive, tonemap__step4(&c2, &live2, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 8), inverse),
+            alive, tonemap__step4(&c2, &live2, sat__f32x4_mul(tonemap__box_sum4(window, k + 1, x + 8), inverse),
                                   epsilon, term));
         alive = sat__i32x4_add(
-            alive, tonemap__step4(&c3, &live3, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 12), inverse),
+            alive, tonemap__step4(&c3, &live3, sat__f32x4_mul(tonemap__box_sum4(window, k + 1, x + 12), inverse),
                                   epsilon, term));
         if (!sat__i32x4_any(alive)) break;
         passed[k] = sat__i32x4_sub(passed[k], alive);
@@ -1342,22 +1364,22 @@ static inline void tonemap__search_group(float *local, const float *luminance, c
 }
 
 /* Four pixels, where boxes are clipped or a run ends. */
-static inline void tonemap__search_four(float *local, const float *luminance, const tonemap__window *window,
-                                        const tonemap__frame *f, sat__i32x4 *passed, int x, int end)
+static inline void tonemap__search_four(const tonemap__window *window, sat__i32x4 *passed, int x, int end)
 {
+    const tonemap__frame *f = window->frame;
     sat__f32x4 epsilon = sat__f32x4_set1(f->epsilon),
-               c = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale));
+               c = sat__f32x4_mul(sat__f32x4_load(window->luminance + x), sat__f32x4_set1(f->scale));
     sat__i32x4 live = tonemap__inside4(x, end);
     int k, border = x < f->reach || x + 4 + f->reach > window->width;
     c = sat__f32x4_min(c, sat__f32x4_set1(f->cap));
     for (k = 0; k + 1 < f->boxes; k++) {
-        sat__f32x4 inverse = border ? tonemap__inverse4(window, f, k + 1, x) : sat__f32x4_set1(window->inverse[k + 1]);
-        sat__f32x4 v = sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse);
+        sat__f32x4 inverse = border ? tonemap__inverse4(window, k + 1, x) : sat__f32x4_set1(window->inverse[k + 1]);
+        sat__f32x4 v = sat__f32x4_mul(tonemap__box_sum4(window, k + 1, x), inverse);
         tonemap__step4(&c, &live, v, epsilon, sat__f32x4_set1(f->term[k]));
         if (!sat__i32x4_any(live)) break;
         passed[k] = sat__i32x4_sub(passed[k], live);
     }
-    sat__f32x4_store(local + x, c);
+    sat__f32x4_store(window->local + x, c);
 }
 
 /* What passed step k moves on from scale k to k + 1 of the statistics. */
@@ -1372,18 +1394,18 @@ static inline void tonemap__move_on(size_t *scale, const sat__i32x4 *passed, int
     }
 }
 
-static inline void tonemap__search_hard(float *local, const float *luminance, const tonemap__window *window,
-                                          const tonemap__frame *f, size_t *scale, int x, int end)
+static inline void tonemap__search_hard(const tonemap__window *window, size_t *scale, int x, int end)
 {
+    const tonemap__frame *f = window->frame;
     sat__i32x4 passed[TONEMAP__LENGTHS];
     int k;
     for (k = 0; k < TONEMAP__LENGTHS; k++) passed[k] = sat__i32x4_set1(0);
     while (x < end) {
         if (x >= f->reach && x + TONEMAP__GROUP <= end && x + TONEMAP__GROUP + f->reach <= window->width) {
-            tonemap__search_group(local, luminance, window, f, passed, x);
+            tonemap__search_group(window, passed, x);
             x += TONEMAP__GROUP;
         } else {
-            tonemap__search_four(local, luminance, window, f, passed, x, end);
+            tonemap__search_four(window, passed, x, end);
             x += 4;
         }
     }
@@ -1391,8 +1413,8 @@ static inline void tonemap__search_hard(float *local, const float *luminance, co
 }
 
 /* The same with scales mixed: the weight of what lies beyond a step falls from 1 to 0 while the step's contrast grows
-   through a band around epsilon, so that noise moves La a little instead of across a scale. */
-/* What a step of soft scales takes and changes. */
+   through a band around epsilon, so that noise moves La a little instead of across a scale. One step for four pixels:
+   whether some are not done. */
 static inline sat__i32x4 tonemap__soft_step4(sat__f32x4 *c, sat__f32x4 *taken, sat__f32x4 *weight, sat__f32x4 v,
                                              const tonemap__frame *f, int k)
 {
@@ -1407,9 +1429,11 @@ static inline sat__i32x4 tonemap__soft_step4(sat__f32x4 *c, sat__f32x4 *taken, s
 }
 
 /* Sixteen pixels, spelt out to stay in registers; done when the last of them is. */
-static inline void tonemap__soft_group(float *local, const float *luminance, const tonemap__window *window,
-                                       const tonemap__frame *f, sat__i32x4 *passed, int x)
+static inline void tonemap__soft_group(const tonemap__window *window, sat__i32x4 *passed, int x)
 {
+    const tonemap__frame *f = window->frame;
+    const float *luminance = window->luminance;
+    float *local = window->local;
     sat__f32x4 factor = sat__f32x4_set1(f->scale), cap = sat__f32x4_set1(f->cap), half = sat__f32x4_set1(0.5f);
     sat__f32x4 c0 = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), factor), cap), t0 = c0,
                w0 = sat__f32x4_set1(1);
@@ -1421,16 +1445,16 @@ static inline void tonemap__soft_group(float *local, const float *luminance, con
         sat__f32x4 inverse = sat__f32x4_set1(window->inverse[k + 1]);
         sat__i32x4 alive, n;
         alive =
-            tonemap__soft_step4(&c0, &t0, &w0, sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), f, k);
+            tonemap__soft_step4(&c0, &t0, &w0, sat__f32x4_mul(tonemap__box_sum4(window, k + 1, x), inverse), f, k);
         alive = sat__i32x4_or(
             alive, tonemap__soft_step4(&c1, &t1, &w1,
-                                       sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 4), inverse), f, k));
+                                       sat__f32x4_mul(tonemap__box_sum4(window, k + 1, x + 4), inverse), f, k));
         alive = sat__i32x4_or(
             alive, tonemap__soft_step4(&c2, &t2, &w2,
-                                       sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 8), inverse), f, k));
+                                       sat__f32x4_mul(tonemap__box_sum4(window, k + 1, x + 8), inverse), f, k));
         alive = sat__i32x4_or(
             alive, tonemap__soft_step4(&c3, &t3, &w3,
-                                       sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x + 12), inverse), f, k));
+                                       sat__f32x4_mul(tonemap__box_sum4(window, k + 1, x + 12), inverse), f, k));
         if (!sat__i32x4_any(alive)) break;
         n = sat__i32x4_add(sat__f32x4_less_equal(half, w0), sat__f32x4_less_equal(half, w1));
         n = sat__i32x4_add(n, sat__i32x4_add(sat__f32x4_less_equal(half, w2), sat__f32x4_less_equal(half, w3)));
@@ -1443,36 +1467,36 @@ static inline void tonemap__soft_group(float *local, const float *luminance, con
 }
 
 /* Four pixels, where boxes are clipped or a run ends. */
-static inline void tonemap__soft_four(float *local, const float *luminance, const tonemap__window *window,
-                                      const tonemap__frame *f, sat__i32x4 *passed, int x, int end)
+static inline void tonemap__soft_four(const tonemap__window *window, sat__i32x4 *passed, int x, int end)
 {
-    sat__f32x4 c = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(f->scale)),
+    const tonemap__frame *f = window->frame;
+    sat__f32x4 c = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(window->luminance + x), sat__f32x4_set1(f->scale)),
                                   sat__f32x4_set1(f->cap)),
                taken = c;
     sat__f32x4 weight = sat__f32x4_select(tonemap__inside4(x, end), sat__f32x4_set1(1), sat__f32x4_set1(0));
     int k, border = x < f->reach || x + 4 + f->reach > window->width;
     for (k = 0; k + 1 < f->boxes; k++) {
-        sat__f32x4 inverse = border ? tonemap__inverse4(window, f, k + 1, x) : sat__f32x4_set1(window->inverse[k + 1]);
+        sat__f32x4 inverse = border ? tonemap__inverse4(window, k + 1, x) : sat__f32x4_set1(window->inverse[k + 1]);
         if (!sat__i32x4_any(tonemap__soft_step4(&c, &taken, &weight,
-                                                sat__f32x4_mul(tonemap__box_sum4(window, f, k + 1, x), inverse), f, k)))
+                                                sat__f32x4_mul(tonemap__box_sum4(window, k + 1, x), inverse), f, k)))
             break;
         passed[k] = sat__i32x4_sub(passed[k], sat__f32x4_less_equal(sat__f32x4_set1(0.5f), weight));
     }
-    sat__f32x4_store(local + x, taken);
+    sat__f32x4_store(window->local + x, taken);
 }
 
-static inline void tonemap__search_soft(float *local, const float *luminance, const tonemap__window *window,
-                                        const tonemap__frame *f, size_t *scale, int x, int end)
+static inline void tonemap__search_soft(const tonemap__window *window, size_t *scale, int x, int end)
 {
+    const tonemap__frame *f = window->frame;
     sat__i32x4 passed[TONEMAP__LENGTHS];
     int k;
     for (k = 0; k < TONEMAP__LENGTHS; k++) passed[k] = sat__i32x4_set1(0);
     while (x < end) {
         if (x >= f->reach && x + TONEMAP__GROUP <= end && x + TONEMAP__GROUP + f->reach <= window->width) {
-            tonemap__soft_group(local, luminance, window, f, passed, x);
+            tonemap__soft_group(window, passed, x);
             x += TONEMAP__GROUP;
         } else {
-            tonemap__soft_four(local, luminance, window, f, passed, x, end);
+            tonemap__soft_four(window, passed, x, end);
             x += 4;
         }
     }
@@ -1482,9 +1506,10 @@ static inline void tonemap__search_soft(float *local, const float *luminance, co
 /* ---- Ashikhmin's search: the first neighbourhood s = 1..10 whose mean differs from that of twice its size by half of
    itself; else the last. A mean below the quantum says nothing: the pixel then stands for itself. */
 
-static inline void tonemap__search_ashikhmin(float *local, const float *luminance, const tonemap__window *window,
-                                             const tonemap__frame *f, size_t *scale, int x, int end)
+static inline void tonemap__search_ashikhmin(const tonemap__window *window, size_t *scale, int x, int end)
 {
+    const tonemap__frame *f = window->frame;
+    const float *luminance = window->luminance;
     sat__f32x4 half = sat__f32x4_set1(0.5f), quantum = sat__f32x4_set1(1 / f->quantum);
     sat__i32x4 passed[TONEMAP__ASHIKHMIN];
     int s;
@@ -1497,32 +1522,30 @@ static inline void tonemap__search_ashikhmin(float *local, const float *luminanc
         for (s = 0; s + 1 < TONEMAP__ASHIKHMIN; s++) {
             int k = 2 * s + 1;
             sat__f32x4 wide =
-                sat__f32x4_mul(tonemap__box_sum4(window, f, k, x),
-                               border ? tonemap__inverse4(window, f, k, x) : sat__f32x4_set1(window->inverse[k]));
+                sat__f32x4_mul(tonemap__box_sum4(window, k, x),
+                               border ? tonemap__inverse4(window, k, x) : sat__f32x4_set1(window->inverse[k]));
             live =
                 sat__i32x4_and(live, sat__f32x4_less(sat__f32x4_abs(sat__f32x4_sub(g, wide)), sat__f32x4_mul(half, g)));
             if (!sat__i32x4_any(live)) break;
             k = s + 1;
-            g = sat__f32x4_mul(tonemap__box_sum4(window, f, k, x),
-                               border ? tonemap__inverse4(window, f, k, x) : sat__f32x4_set1(window->inverse[k]));
+            g = sat__f32x4_mul(tonemap__box_sum4(window, k, x),
+                               border ? tonemap__inverse4(window, k, x) : sat__f32x4_set1(window->inverse[k]));
             taken = sat__f32x4_select(live, g, taken);
             passed[s] = sat__i32x4_sub(passed[s], live);
         }
-        sat__f32x4_store(local + x, sat__f32x4_select(sat__f32x4_less(taken, quantum), own, taken));
+        sat__f32x4_store(window->local + x, sat__f32x4_select(sat__f32x4_less(taken, quantum), own, taken));
     }
     tonemap__move_on(scale, passed, TONEMAP__ASHIKHMIN - 1);
 }
 
 /* Searches pixels [x, end) of a row and may overwrite what follows them in the group. */
-static inline void tonemap__search(tonemap__worker *w, const float *luminance, const tonemap__window *window,
-                                   const tonemap__frame *f, int ashikhmin, int x, int end)
+static inline void tonemap__search(tonemap__worker *w, const tonemap__window *window, int ashikhmin, int x, int end)
 {
     size_t *scale = w->stats.scale;
     scale[0] += (size_t)(end - x);
-    if (TONEMAP__HAS_ASHIKHMIN && ashikhmin)
-        tonemap__search_ashikhmin(w->local, luminance, window, f, scale, x, end);
-    else if (TONEMAP__HAS_SOFT && f->soft > 0) tonemap__search_soft(w->local, luminance, window, f, scale, x, end);
-    else tonemap__search_hard(w->local, luminance, window, f, scale, x, end);
+    if (TONEMAP__HAS_ASHIKHMIN && ashikhmin) tonemap__search_ashikhmin(window, scale, x, end);
+    else if (TONEMAP__HAS_SOFT && window->frame->soft > 0) tonemap__search_soft(window, scale, x, end);
+    else tonemap__search_hard(window, scale, x, end);
     w->stats.searched += (size_t)(end - x);
 }
 
@@ -1637,14 +1660,28 @@ static inline void tonemap__add_along(uint32_t *sum0, uint32_t *sum1, const uint
     }
 }
 
-/* a in 2^-20 and b in 2^-10 steps of pixels [x, end) whose boxes have one size. */
-static inline void tonemap__guided_fit(uint32_t *a, uint32_t *b, const uint32_t *sum, const uint32_t *square, int x,
-                                       int end, float inverse, float edge2)
+/* Pixels [x, end) of a row whose boxes have one area: 1 / area. It changes at each pixel beside the borders. */
+typedef struct tonemap__run { int x, end; float inverse; } tonemap__run;
+
+/* The run that begins at x. */
+static inline tonemap__run tonemap__guided_run(int x, int width, int rows)
+{
+    int x0 = sat__max_int(x - TONEMAP__RADIUS, 0), x1 = sat__min_int(x + TONEMAP__RADIUS + 1, width);
+    tonemap__run run;
+    run.x = x;
+    run.end = x1 - x0 < 2 * TONEMAP__RADIUS + 1 ? x + 1 : width - TONEMAP__RADIUS;
+    run.inverse = 1 / (float)(rows * (x1 - x0));
+    return run;
+}
+
+/* a in 2^-20 and b in 2^-10 steps. */
+static inline void tonemap__guided_fit(uint32_t *a, uint32_t *b, const uint32_t *sum, const uint32_t *square,
+                                       const tonemap__run *run, float edge2)
 {
     const int32_t *s = (const int32_t *)(const void *)sum, *s2 = (const int32_t *)(const void *)square;
-    int r = TONEMAP__RADIUS;
-    for (; x < end; x += 4) {
-        sat__f32x4 i = sat__f32x4_set1(inverse), half = sat__f32x4_set1(0.5f), share, mean, var;
+    int r = TONEMAP__RADIUS, x;
+    for (x = run->x; x < run->end; x += 4) {
+        sat__f32x4 i = sat__f32x4_set1(run->inverse), half = sat__f32x4_set1(0.5f), share, mean, var;
         mean = sat__f32x4_mul(
             sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_load(s + x + r + 1), sat__i32x4_load(s + x - r))), i);
         var = sat__f32x4_mul(
@@ -1659,27 +1696,19 @@ static inline void tonemap__guided_fit(uint32_t *a, uint32_t *b, const uint32_t 
     }
 }
 
-static inline void tonemap__guided_local(float *local, const float *steps, const uint32_t *a, const uint32_t *b, int x,
-                                         int end, float inverse)
+static inline void tonemap__guided_local(float *local, const float *steps, const uint32_t *a, const uint32_t *b,
+                                         const tonemap__run *run)
 {
-    int r = TONEMAP__RADIUS;
-    float share = inverse / (1048576.0f * TONEMAP__STEPS), base = inverse / (1024.0f * TONEMAP__STEPS);
+    int r = TONEMAP__RADIUS, x;
+    float share = run->inverse / (1048576.0f * TONEMAP__STEPS), base = run->inverse / (1024.0f * TONEMAP__STEPS);
     const int32_t *sa = (const int32_t *)(const void *)a, *sb = (const int32_t *)(const void *)b;
-    for (; x < end; x += 4) {
+    for (x = run->x; x < run->end; x += 4) {
         sat__f32x4 va = sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_load(sa + x + r + 1), sat__i32x4_load(sa + x - r)));
         sat__f32x4 vb = sat__i32x4_to_f32(sat__i32x4_sub(sat__i32x4_load(sb + x + r + 1), sat__i32x4_load(sb + x - r)));
         va = sat__f32x4_mul(sat__f32x4_mul(va, sat__f32x4_set1(share)), sat__f32x4_load(steps + x));
         vb = sat__f32x4_sub(sat__f32x4_mul(vb, sat__f32x4_set1(base)), sat__f32x4_set1(TONEMAP__OCTAVES));
         sat__f32x4_store(local + x, tonemap__exp2_4(sat__f32x4_add(va, vb)));
     }
-}
-
-/* 1 / area of the boxes at pixel x, and where it changes: at each pixel beside the borders. */
-static inline int tonemap__guided_run(float *inverse, int x, int width, int rows)
-{
-    int x0 = sat__max_int(x - TONEMAP__RADIUS, 0), x1 = sat__min_int(x + TONEMAP__RADIUS + 1, width);
-    *inverse = 1 / (float)(rows * (x1 - x0));
-    return x1 - x0 < 2 * TONEMAP__RADIUS + 1 ? x + 1 : width - TONEMAP__RADIUS;
 }
 
 static inline int tonemap__guided_rows(const tonemap *map, int y)
@@ -1691,9 +1720,9 @@ static inline int tonemap__guided_rows(const tonemap *map, int y)
 static inline void tonemap__guided_row(const tonemap *map, tonemap__worker *w, int m, int first)
 {
     enum { R = TONEMAP__RADIUS };
-    int j = m > first ? m + R : sat__max_int(m - R, 0), begin = sat__max_int(first - R, 0), x = 0, end, which;
+    int j = m > first ? m + R : sat__max_int(m - R, 0), begin = sat__max_int(first - R, 0), x, which;
     uint32_t *sum = tonemap__guided_ring(map, w, 3, 0), *square = tonemap__guided_ring(map, w, 3, 1);
-    float inverse;
+    tonemap__run run;
     if (m == first)
         for (which = 0; which < 4; which++) memset(w->column[which], 0, (size_t)map->row * sizeof(uint32_t));
     for (; j <= m + R; j++) {
@@ -1707,10 +1736,10 @@ static inline void tonemap__guided_row(const tonemap *map, tonemap__worker *w, i
                             map->width);
     }
     tonemap__add_along(sum, square, w->column[0], w->column[1], map->width);
-    for (; x < map->width; x = end) {
-        end = tonemap__guided_run(&inverse, x, map->width, tonemap__guided_rows(map, m));
-        tonemap__guided_fit(tonemap__guided_ring(map, w, 1, m), tonemap__guided_ring(map, w, 2, m), sum, square, x, end,
-                            inverse, map->frame.edge2);
+    for (x = 0; x < map->width; x = run.end) {
+        run = tonemap__guided_run(x, map->width, tonemap__guided_rows(map, m));
+        tonemap__guided_fit(tonemap__guided_ring(map, w, 1, m), tonemap__guided_ring(map, w, 2, m), sum, square, &run,
+                            map->frame.edge2);
     }
 }
 
@@ -1718,9 +1747,9 @@ static inline void tonemap__guided_row(const tonemap *map, tonemap__worker *w, i
 static inline void tonemap__guided_local_row(const tonemap *map, tonemap__worker *w, int y, int first)
 {
     enum { R = TONEMAP__RADIUS };
-    int begin = sat__max_int(first - R, 0), m = y > first ? y + R : begin, x = 0, end, which;
+    int begin = sat__max_int(first - R, 0), m = y > first ? y + R : begin, x, which;
     uint32_t *sum[2];
-    float inverse;
+    tonemap__run run;
     for (; m <= y + R; m++) {
         if (m < map->height) tonemap__guided_row(map, w, m, begin);
         for (which = 0; which < 2; which++) {
@@ -1734,65 +1763,76 @@ static inline void tonemap__guided_local_row(const tonemap *map, tonemap__worker
     }
     for (which = 0; which < 2; which++) sum[which] = tonemap__guided_ring(map, w, 3, which);
     tonemap__add_along(sum[0], sum[1], w->column[2], w->column[3], map->width);
-    for (; x < map->width; x = end) {
-        end = tonemap__guided_run(&inverse, x, map->width, tonemap__guided_rows(map, y));
+    for (x = 0; x < map->width; x = run.end) {
+        run = tonemap__guided_run(x, map->width, tonemap__guided_rows(map, y));
         tonemap__guided_local(w->local, (const float *)(const void *)tonemap__guided_ring(map, w, 0, y), sum[0], sum[1],
-                              x, end, inverse);
+                              &run);
     }
 }
 
 /* ---- La for one row */
 
-/* The pixel for itself: what the global operators take, and, capped as in the sums, pixels that are not worth a
-   search. */
-static inline void tonemap__own_luminance(float *local, const float *luminance, float scale, float cap, int x, int end)
+/* A row and what its pixels take for themselves: the scaled luminance up to a cap. `edge`: squared gradients, and the
+   threshold below which a pixel is not worth a search. */
+typedef struct tonemap__own {
+    float *local;
+    const float *luminance, *edge;
+    float scale, cap, threshold;
+} tonemap__own;
+
+/* What the global operators take, and, capped as in the sums, pixels that are not worth a search. */
+static inline void tonemap__own_luminance(const tonemap__own *own, int x, int end)
 {
-    for (; x < end; x += 4) {
-        sat__f32x4 own = sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale));
-        sat__f32x4_store(local + x, sat__f32x4_min(own, sat__f32x4_set1(cap)));
-    }
+    const sat__f32x4 scale = sat__f32x4_set1(own->scale), cap = sat__f32x4_set1(own->cap);
+    for (; x < end; x += 4)
+        sat__f32x4_store(own->local + x,
+                         sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(own->luminance + x), scale), cap));
 }
 
 /* Some squared gradient of [x, end) is above the threshold. */
-static inline int tonemap__has_edge(const float *edge, float threshold, int x, int end)
+static inline int tonemap__has_edge(const tonemap__own *own, int x, int end)
 {
+    const sat__f32x4 threshold = sat__f32x4_set1(own->threshold);
     sat__i32x4 above = sat__i32x4_set1(0);
     for (; x < end; x += 4)
-        above = sat__i32x4_or(above,
-                              sat__i32x4_and(tonemap__inside4(x, end),
-                                             sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x))));
+        above = sat__i32x4_or(above, sat__i32x4_and(tonemap__inside4(x, end),
+                                                    sat__f32x4_less(threshold, sat__f32x4_load(own->edge + x))));
     return sat__i32x4_any(above);
 }
 
 /* Where it is not, the pixel stands for itself. */
-static inline void tonemap__reset_flat(float *local, const float *luminance, const float *edge, float threshold,
-                                       float scale, float cap, int x, int end)
+static inline void tonemap__reset_flat(const tonemap__own *own, int x, int end)
 {
+    const sat__f32x4 threshold = sat__f32x4_set1(own->threshold), scale = sat__f32x4_set1(own->scale),
+                     cap = sat__f32x4_set1(own->cap);
     for (; x < end; x += 4) {
-        sat__i32x4 above = sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_load(edge + x));
-        sat__f32x4 own = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(luminance + x), sat__f32x4_set1(scale)),
-                                        sat__f32x4_set1(cap));
-        sat__f32x4_store(local + x, sat__f32x4_select(above, sat__f32x4_load(local + x), own));
+        sat__i32x4 above = sat__f32x4_less(threshold, sat__f32x4_load(own->edge + x));
+        sat__f32x4 v = sat__f32x4_min(sat__f32x4_mul(sat__f32x4_load(own->luminance + x), scale), cap);
+        sat__f32x4_store(own->local + x, sat__f32x4_select(above, sat__f32x4_load(own->local + x), v));
     }
 }
 
-static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const float *luminance,
-                                         const tonemap__window *window, int y)
+static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const tonemap__window *window, int y)
 {
-    const tonemap__frame *f = &map->frame;
-    const float *above = y > 0 ? luminance - map->row : luminance,
+    const float *luminance = window->luminance, *above = y > 0 ? luminance - map->row : luminance,
                 *below = y + 1 < map->height ? luminance + map->row : luminance;
-    float threshold = (float)map->options.selective / f->scale, *edge = w->edge;
+    tonemap__own own;
     int x, end;
-    threshold *= threshold;
-    tonemap__sobel_row(edge, above, luminance, below, map->width);
+    own.local = w->local;
+    own.luminance = luminance;
+    own.edge = w->edge;
+    own.scale = map->frame.scale;
+    own.cap = map->frame.cap;
+    own.threshold = (float)map->options.selective / own.scale;
+    own.threshold *= own.threshold;
+    tonemap__sobel_row(w->edge, above, luminance, below, map->width);
     for (x = 0; x < map->width; x = end) {
         end = sat__min_int(x + TONEMAP__GROUP, map->width);
-        if (tonemap__has_edge(edge, threshold, x, end)) {
-            tonemap__search(w, luminance, window, f, map->options.operation == TONEMAP_ASHIKHMIN, x, end);
-            tonemap__reset_flat(w->local, luminance, edge, threshold, f->scale, f->cap, x, end);
+        if (tonemap__has_edge(&own, x, end)) {
+            tonemap__search(w, window, map->options.operation == TONEMAP_ASHIKHMIN, x, end);
+            tonemap__reset_flat(&own, x, end);
         } else {
-            tonemap__own_luminance(w->local, luminance, f->scale, f->cap, x, end);
+            tonemap__own_luminance(&own, x, end);
             w->stats.skipped += (size_t)(end - x);
         }
     }
@@ -1801,19 +1841,22 @@ static inline void tonemap__search_edges(tonemap *map, tonemap__worker *w, const
 static inline void tonemap__local_row(tonemap *map, tonemap__worker *w, int y, int first)
 {
     const tonemap_options *o = &map->options;
-    const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
     tonemap__window window;
     if (o->operation == TONEMAP_GUIDED) {
         tonemap__guided_local_row(map, w, y, first);
         return;
     }
     if (map->frame.boxes < 2) {
-        tonemap__own_luminance(w->local, luminance, map->frame.scale, FLT_MAX, 0, map->width);
+        tonemap__own own = {NULL, NULL, NULL, 0, FLT_MAX, 0};
+        own.local = w->local;
+        own.luminance = map->luminance + (size_t)y * (size_t)map->row;
+        own.scale = map->frame.scale;
+        tonemap__own_luminance(&own, 0, map->width);
         return;
     }
     tonemap__open_window(&window, map, w, y);
-    if (TONEMAP__HAS_SELECTIVE && o->selective > 0) tonemap__search_edges(map, w, luminance, &window, y);
-    else tonemap__search(w, luminance, &window, &map->frame, o->operation == TONEMAP_ASHIKHMIN, 0, map->width);
+    if (TONEMAP__HAS_SELECTIVE && o->selective > 0) tonemap__search_edges(map, w, &window, y);
+    else tonemap__search(w, &window, o->operation == TONEMAP_ASHIKHMIN, 0, map->width);
 }
 
 /* ---- >> mesopic vision
@@ -2249,8 +2292,16 @@ static inline uint32_t tonemap__threshold(int x, int y)
     return (uint32_t)((d & 1) << 7 | (y & 1) << 6 | (d & 2) << 4 | (y & 2) << 3 | (d & 4) << 1 | (y & 4)) + 2;
 }
 
-static inline void tonemap__write_u8(const tonemap *map, unsigned char *out, int channels, tonemap__planes v, int n)
+/* n pixels of row y from column x on, as they are written. */
+typedef struct tonemap__piece {
+    unsigned char *out;
+    int channels, x, y, n;
+} tonemap__piece;
+
+static inline void tonemap__write_u8(const tonemap *map, const tonemap__piece *piece, tonemap__planes v)
 {
+    const int channels = piece->channels, n = piece->n;
+    unsigned char *out = piece->out;
     int i;
     if (channels == 1) {
         for (i = 0; i < n; i++) out[i] = tonemap__code(map, v[0][i]);
@@ -2265,9 +2316,10 @@ static inline void tonemap__write_u8(const tonemap *map, unsigned char *out, int
 
 /* Ordered dithering: code + a threshold that is another 64th at each of 8 x 8 pixels, rounded down. The mean over such
    a block is that of the codes. */
-static inline void tonemap__write_dithered(const tonemap *map, unsigned char *out, int channels, tonemap__planes v,
-                                           int x, int y, int n)
+static inline void tonemap__write_dithered(const tonemap *map, const tonemap__piece *piece, tonemap__planes v)
 {
+    const int channels = piece->channels, x = piece->x, y = piece->y, n = piece->n;
+    unsigned char *out = piece->out;
     int i, c, colours = channels == 1 ? 1 : 3;
     for (i = 0; i < n; i++, out += channels)
         for (c = 0; c < colours; c++) {
@@ -2279,8 +2331,10 @@ static inline void tonemap__write_dithered(const tonemap *map, unsigned char *ou
         }
 }
 
-static inline void tonemap__write_f32(float *out, int channels, tonemap__planes v, int n, const tonemap *map)
+static inline void tonemap__write_f32(const tonemap *map, const tonemap__piece *piece, tonemap__planes v)
 {
+    const int channels = piece->channels, n = piece->n;
+    float *out = (float *)(void *)piece->out;
     int i, c, colours = channels == 1 ? 1 : 3;
     if (map->options.encoding > TONEMAP_ENCODING_LINEAR) tonemap__encode_planes(v, map, n);
     else if (map->frame.peak > 1)
@@ -2299,7 +2353,9 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
     const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
     unsigned char *row = job->out + (ptrdiff_t)y * job->out_stride;
     int x, i, n, channels = job->hdr->channels, curve = map->options.operation > TONEMAP_GUIDED;
+    size_t element = job->as_float ? sizeof(float) : 1;
     tonemap__shading shading;
+    tonemap__piece piece;
     tonemap__planes v;
     shading.pixels = pixels;
     shading.luminance = luminance;
@@ -2311,21 +2367,24 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
     shading.floor = job->as_float ? 0 : TONEMAP__CODE_FLOOR;
     shading.gamut = channels > 1 && !curve ? map->frame.gamut : -1;
     shading.clamped = 0;
+    piece.channels = channels;
+    piece.y = y;
     for (x = 0; x < map->width; x += n) {
         size_t at = (size_t)x * (size_t)channels;
-        float *as_float = (float *)(void *)row + at;
-        n = sat__min_int(TONEMAP__CHUNK, map->width - x);
+        piece.out = row + at * element;
+        piece.x = x;
+        piece.n = n = sat__min_int(TONEMAP__CHUNK, map->width - x);
         tonemap__shade(v, &shading, x, n);
         if (curve) tonemap__curve_planes(v, map->options.operation, shading.floor, 1 / map->frame.peak, n);
         if (channels == 4) /* alpha: before the colours, which may overwrite the input */
             for (i = 0; i < n; i++) {
                 float alpha = tonemap__unit(pixels[at + 4 * (size_t)i + 3]);
-                if (job->as_float) as_float[4 * i + 3] = alpha;
-                else row[at + 4 * (size_t)i + 3] = (unsigned char)(alpha * 255 + 0.5f);
+                if (job->as_float) ((float *)(void *)piece.out)[4 * i + 3] = alpha;
+                else piece.out[4 * i + 3] = (unsigned char)(alpha * 255 + 0.5f);
             }
-        if (job->as_float) tonemap__write_f32(as_float, channels, v, n, map);
-        else if (map->options.dither) tonemap__write_dithered(map, row + at, channels, v, x, y, n);
-        else tonemap__write_u8(map, row + at, channels, v, n);
+        if (job->as_float) tonemap__write_f32(map, &piece, v);
+        else if (map->options.dither) tonemap__write_dithered(map, &piece, v);
+        else tonemap__write_u8(map, &piece, v);
     }
     if (!curve) w->stats.clamped += shading.clamped;
 }
@@ -2491,13 +2550,30 @@ static inline void tonemap__finish_stats(tonemap *map)
     }
 }
 
+/* Resolves a stride of 0. */
+static inline sat_result tonemap__check_call(tonemap__job *job, double dt)
+{
+    const sat_image *hdr = job->hdr;
+    size_t element = job->as_float ? sizeof(float) : 1;
+    if (!job->map || !sat__image_is_valid(hdr) || hdr->channels == 2) return SAT_ERR_ARGUMENT;
+    if (hdr->width != job->map->width || hdr->height != job->map->height) return SAT_ERR_MISMATCH;
+    if (!sat__rows_are_valid(job->out, &job->out_stride, hdr->width, hdr->height, (size_t)hdr->channels * element,
+                             element))
+        return SAT_ERR_ARGUMENT;
+    return tonemap__in_range(dt, 0, 1e300) || tonemap__is_infinite(dt) ? SAT_OK : SAT_ERR_ARGUMENT;
+}
+
 static inline sat_result tonemap__apply(tonemap__job *job, double dt, tonemap_stats *stats)
 {
     tonemap *map = job->map;
-    const sat_threads *threads = &map->options.threads;
+    const sat_result result = tonemap__check_call(job, dt);
+    const sat_threads *threads;
     double measured[TONEMAP__STATES];
-    int i, bands = (map->height + TONEMAP__BAND - 1) / TONEMAP__BAND;
-    int histogram = tonemap__needs_histogram(&map->options, stats);
+    int i, bands, histogram;
+    if (result != SAT_OK) return result;
+    threads = &map->options.threads;
+    bands = (map->height + TONEMAP__BAND - 1) / TONEMAP__BAND;
+    histogram = tonemap__needs_histogram(&map->options, stats);
     memset(&map->stats, 0, sizeof map->stats);
     for (i = 0; i < map->workers; i++) {
         tonemap__worker *w = &map->worker[i];
@@ -2518,40 +2594,30 @@ static inline sat_result tonemap__apply(tonemap__job *job, double dt, tonemap_st
     return SAT_OK;
 }
 
-static inline sat_result tonemap__check_call(const tonemap *map, const void *out, ptrdiff_t *out_stride, size_t element,
-                                             const sat_image *hdr, double dt)
+static inline tonemap__job tonemap__job_of(tonemap *map, void *out, ptrdiff_t out_stride, const sat_image *hdr,
+                                           int as_float)
 {
-    if (!map || !sat__image_is_valid(hdr) || hdr->channels == 2) return SAT_ERR_ARGUMENT;
-    if (hdr->width != map->width || hdr->height != map->height) return SAT_ERR_MISMATCH;
-    if (!sat__rows_are_valid(out, out_stride, hdr->width, hdr->height, (size_t)hdr->channels * element, element))
-        return SAT_ERR_ARGUMENT;
-    return tonemap__in_range(dt, 0, 1e300) || tonemap__is_infinite(dt) ? SAT_OK : SAT_ERR_ARGUMENT;
-}
-
-static inline sat_result tonemap__call(tonemap *map, void *out, ptrdiff_t out_stride, int as_float,
-                                       const sat_image *hdr, double dt, tonemap_stats *stats)
-{
-    sat_result result = tonemap__check_call(map, out, &out_stride, as_float ? sizeof(float) : 1, hdr, dt);
     tonemap__job job;
-    if (result != SAT_OK) return result;
     job.map = map;
     job.hdr = hdr;
     job.out = (unsigned char *)out;
     job.out_stride = out_stride;
     job.as_float = as_float;
-    return tonemap__apply(&job, dt, stats);
+    return job;
 }
 
 TONEMAP_DEF sat_result tonemap_apply_u8(tonemap *map, unsigned char *out, ptrdiff_t out_stride, const sat_image *hdr,
                                         double dt, tonemap_stats *stats)
 {
-    return tonemap__call(map, out, out_stride, 0, hdr, dt, stats);
+    tonemap__job job = tonemap__job_of(map, out, out_stride, hdr, 0);
+    return tonemap__apply(&job, dt, stats);
 }
 
 TONEMAP_DEF sat_result tonemap_apply_f32(tonemap *map, float *out, ptrdiff_t out_stride, const sat_image *hdr,
                                          double dt, tonemap_stats *stats)
 {
-    return tonemap__call(map, out, out_stride, 1, hdr, dt, stats);
+    tonemap__job job = tonemap__job_of(map, out, out_stride, hdr, 1);
+    return tonemap__apply(&job, dt, stats);
 }
 
 TONEMAP_DEF sat_result tonemap_once_u8(unsigned char *out, const float *pixels, int width, int height, int channels,

@@ -409,7 +409,6 @@ TEST(pixels_do_not_depend_on_their_group)
         EXPECT_EQ(tonemap_apply_u8(map, out, W * 3, &view, 0, NULL), SAT_OK);
         w = &map->worker[0];
         for (y = 0; y < H; ++y) {
-            const float *luminance = map->luminance + (size_t)y * (size_t)map->row;
             memset(scale, 0, sizeof scale);
             if (y == 0) memset(tonemap__ring_row(map, w, 0), 0, (size_t)map->ring_row * 4);
             for (j = y == 0 ? 0 : y + map->frame.reach; j < H && j <= y + map->frame.reach; ++j)
@@ -419,10 +418,9 @@ TEST(pixels_do_not_depend_on_their_group)
                 for (x = 0; x < W; x += j ? 1 : W) {
                     int end = j ? x + 1 : W;
                     scale[j][0] += (size_t)(end - x);
-                    if (kind == 0) tonemap__search_hard(w->local, luminance, &window, &map->frame, scale[j], x, end);
-                    if (kind == 1) tonemap__search_soft(w->local, luminance, &window, &map->frame, scale[j], x, end);
-                    if (kind == 2)
-                        tonemap__search_ashikhmin(w->local, luminance, &window, &map->frame, scale[j], x, end);
+                    if (kind == 0) tonemap__search_hard(&window, scale[j], x, end);
+                    if (kind == 1) tonemap__search_soft(&window, scale[j], x, end);
+                    if (kind == 2) tonemap__search_ashikhmin(&window, scale[j], x, end);
                     if (!j) memcpy(whole, w->local, W * sizeof(float));
                 }
             differ += memcmp(whole, w->local, W * sizeof(float)) != 0;
@@ -477,7 +475,8 @@ TEST(colours_do_not_depend_on_their_group)
             tonemap__planes v[2];
             tonemap__worker *w = &map->worker[0];
             uint32_t *sum = tonemap__guided_ring(map, w, 3, 0), *square = tonemap__guided_ring(map, w, 3, 1);
-            float inverse = 1 / 441.0f, steps[W + 3];
+            tonemap__run fits = {0, W, 1 / 441.0f}, means = {0, W, 1e-3f / 441};
+            float steps[W + 3];
             memset(&shading, 0, sizeof shading);
             memset(v, 0, sizeof v);
             shading.pixels = pixels + 3 * y * W;
@@ -504,11 +503,13 @@ TEST(colours_do_not_depend_on_their_group)
                 sum[x] = (uint32_t)(x + 10) * 5000u;
                 square[x] = (uint32_t)(x + 10) * 3000000u + (uint32_t)(x * x * 70 * y);
             }
-            tonemap__guided_fit(a[0], b[0], sum, square, 0, W, inverse, map->frame.edge2);
-            tonemap__guided_local(local[0], steps, sum, square, 0, W, inverse * 1e-3f);
+            tonemap__guided_fit(a[0], b[0], sum, square, &fits, map->frame.edge2);
+            tonemap__guided_local(local[0], steps, sum, square, &means);
             for (x = 0; x < W; ++x) {
-                tonemap__guided_fit(a[1], b[1], sum, square, x, x + 1, inverse, map->frame.edge2);
-                tonemap__guided_local(local[1], steps, sum, square, x, x + 1, inverse * 1e-3f);
+                fits.x = means.x = x;
+                fits.end = means.end = x + 1;
+                tonemap__guided_fit(a[1], b[1], sum, square, &fits, map->frame.edge2);
+                tonemap__guided_local(local[1], steps, sum, square, &means);
             }
             differ += memcmp(a[0], a[1], W * sizeof a[0][0]) != 0 || memcmp(b[0], b[1], W * sizeof b[0][0]) != 0;
             differ += memcmp(local[0], local[1], W * sizeof local[0][0]) != 0;
