@@ -351,9 +351,41 @@ SAT_DEF void sat_destroy(sat_table *table); /* NULL is fine */
 
 /* Box [x0,x1) x [y0,y1), clipped to the table; an empty box gives 0. Constant time, any number of threads. */
 SAT_DEF double sat_sum(const sat_table *table, int channel, int x0, int y0, int x1, int y1);
-/* The sums of `count` boxes, x0 y0 x1 y1 each: the same bits. For many boxes in any order: it asks memory for those to
-   come while it adds up one, and chooses the kind once. */
+/* The sums of `count` boxes, x0 y0 x1 y1 each: the same bits. Chooses the kind once. */
 SAT_DEF void sat_sums(double *out, const sat_table *table, int channel, const int *boxes, size_t count);
+
+/* For loops of your own: what the lookups of one channel read, to be had once. It follows builds and ends with the
+   table. Its members are private: they stand here so that the compiler sees them. */
+typedef struct sat_view {
+    const sat_table *table;
+    double (*other)(const struct sat_view *view, int x0, int y0, int x1, int y1);
+    const uint32_t *cells;
+    const double *quanta;
+    size_t stride;
+    int tiles, shift, channel;
+} sat_view;
+SAT_DEF sat_result sat_get_view(sat_view *out, const sat_table *table, int channel);
+/* sat_sum, the same bits, of a box that must hold a pixel and lie inside the table: nothing is clipped. Boxes within
+   one tile of SAT_KIND_TILED take no call. */
+static inline double sat_view_sum(const sat_view *view, int x0, int y0, int x1, int y1)
+{
+    if (!view) return 0;
+    if (!((unsigned)((x0 ^ (x1 - 1)) | (y0 ^ (y1 - 1))) >> view->shift)) {
+        const double quantum = view->quanta[(size_t)(y0 >> view->shift) * (size_t)view->tiles +
+                                            (size_t)(x0 >> view->shift)];
+        if (quantum >= 0) { /* cells are inclusive sums within the tile: nothing is taken off in its first row */
+            const unsigned inner = (1u << view->shift) - 1;
+            const uint32_t left = 0u - (uint32_t)(((unsigned)x0 & inner) != 0),
+                           top = 0u - (uint32_t)(((unsigned)y0 & inner) != 0);
+            const uint32_t *high = view->cells + (size_t)(y0 - (int)(top & 1)) * view->stride,
+                           *low = view->cells + (size_t)(y1 - 1) * view->stride;
+            const int a = x0 - (int)(left & 1), b = x1 - 1;
+            return (double)(int32_t)((low[b] - (low[a] & left)) - ((high[b] - (high[a] & left)) & top)) * quantum;
+        }
+    }
+    return view->other(view, x0, y0, x1, y1);
+}
+
 /* The sum divided by the clipped area. */
 SAT_DEF double sat_mean(const sat_table *table, int channel, int x0, int y0, int x1, int y1);
 /* The exact integral of the piecewise constant image (pixel i covers [i, i+1)) over a box with real corners. */
@@ -2928,6 +2960,7 @@ struct sat_table {
     unsigned char *sums;                /* corner (0, 0) of channel 0 */
     double *left, *above, *whole;       /* tiled only, as all down to `ring` */
     sat__tile *tiles;
+    double *quanta;                     /* of the tiles again, for lookups; below 0 where these need more than cells */
     sat__spike *spikes;
     sat__giant *giants;
     uint64_t *wide;                     /* the pool of 64-bit tiles */
@@ -2942,12 +2975,15 @@ struct sat_table {
     float *pixels;                      /* one row piece a worker */
     uint64_t *integers;                 /* the same, quantised */
     sat__tally *tallies, total[4];
+    sat_view view[4];
     double quantum, limit;              /* pixels are clamped to +-limit */
     float mean[4];
     int refused;                        /* the last build met NaN or infinity and was not to */
 };
 
 static int sat__is_fixed(sat_kind kind) { return kind == SAT_KIND_FIXED32 || kind == SAT_KIND_FIXED64; }
+
+static void sat__make_views(sat_table *t);
 
 static size_t sat__kind_size(sat_kind kind) { return kind == SAT_KIND_DOUBLE || kind == SAT_KIND_FIXED64 ? 8 : 4; }
 
@@ -3104,6 +3140,7 @@ static size_t sat__lay_out_tiled(sat_table *t, unsigned char *base)
     t->above = (double *)sat__carve(&arena, bands * width, sizeof(double));
     t->whole = (double *)sat__carve(&arena, tiles, sizeof(double));
     t->tiles = (sat__tile *)sat__carve(&arena, tiles, sizeof(sat__tile));
+    t->quanta = (double *)sat__carve(&arena, tiles, sizeof(double));
     t->spikes = (sat__spike *)sat__carve(&arena, tiles * SAT__SPIKES, sizeof(sat__spike));
     t->giants = (sat__giant *)sat__carve(&arena, bands * (size_t)t->giant_room, sizeof(sat__giant));
     t->wide = (uint64_t *)sat__carve(&arena, pool, (t->wide_stride << t->shift) * sizeof(uint64_t));
@@ -3172,6 +3209,7 @@ static sat_result sat__table_create(sat_table **out, int width, int height, int 
     table = (sat_table *)t.block;
     sat__lay_out(&t, sat__align64(base + sizeof t));
     *table = t;
+    sat__make_views(table);
     *out = table;
     return SAT_OK;
 }
@@ -3613,46 +3651,74 @@ static inline uint64_t *sat__wide_cells(const sat_table *t, int slot)
     return t->wide + ((((size_t)slot - 1) * t->wide_stride) << t->shift);
 }
 
-static double sat__spike_sum(const sat_table *t, size_t index, int x0, int y0, int x1, int y1)
+/* A box that is not empty; and the place of a tile. */
+typedef struct sat__box {
+    int x0, y0, x1, y1;
+} sat__box;
+
+typedef struct sat__place {
+    int channel, band, tx;
+} sat__place;
+
+static inline sat__box sat__box_of(int x0, int y0, int x1, int y1)
+{
+    sat__box box;
+    box.x0 = x0;
+    box.y0 = y0;
+    box.x1 = x1;
+    box.y1 = y1;
+    return box;
+}
+
+static inline sat__place sat__place_of(int channel, int band, int tx)
+{
+    sat__place place;
+    place.channel = channel;
+    place.band = band;
+    place.tx = tx;
+    return place;
+}
+
+static double sat__spike_sum(const sat_table *t, size_t index, sat__box box)
 {
     const sat__spike *s = t->spikes + index * SAT__SPIKES;
     double sum = 0;
     int i;
     for (i = 0; i < t->tiles[index].spikes; i++)
-        if (s[i].x >= x0 && s[i].x < x1 && s[i].y >= y0 && s[i].y < y1) sum += (double)s[i].value;
+        if (s[i].x >= box.x0 && s[i].x < box.x1 && s[i].y >= box.y0 && s[i].y < box.y1) sum += (double)s[i].value;
     return sum;
 }
 
-static double sat__wide_part(const sat_table *t, const sat__tile *tile, int x0, int y0, int x1, int y1)
+static double sat__wide_part(const sat_table *t, const sat__tile *tile, sat__box box)
 {
-    const uint64_t *high = sat__wide_cells(t, tile->slot) + (size_t)(y1 - 1) * t->wide_stride,
-                   *low = y0 ? high - (size_t)(y1 - y0) * t->wide_stride : NULL;
-    uint64_t d = high[x1 - 1];
-    if (x0) d -= high[x0 - 1];
-    if (low) d -= low[x1 - 1];
-    if (low && x0) d += low[x0 - 1];
+    const uint64_t *high = sat__wide_cells(t, tile->slot) + (size_t)(box.y1 - 1) * t->wide_stride,
+                   *low = box.y0 ? high - (size_t)(box.y1 - box.y0) * t->wide_stride : NULL;
+    uint64_t d = high[box.x1 - 1];
+    if (box.x0) d -= high[box.x0 - 1];
+    if (low) d -= low[box.x1 - 1];
+    if (low && box.x0) d += low[box.x0 - 1];
     return (double)(int64_t)d * sat__wide_quantum(tile);
 }
 
 /* The part of a box inside one tile, in the tile's own coordinates. */
-static inline double sat__tile_part(const sat_table *t, int channel, int band, int tx, int x0, int y0, int x1, int y1)
+static double sat__tile_part(const sat_table *t, sat__place at, sat__box box)
 {
-    size_t index = sat__tile_index(t, channel, band, tx);
+    size_t index = sat__tile_index(t, at.channel, at.band, at.tx);
     const sat__tile *tile = &t->tiles[index];
     double sum;
-    if (tile->slot) sum = sat__wide_part(t, tile, x0, y0, x1, y1);
+    if (tile->slot) sum = sat__wide_part(t, tile, box);
     else {
-        const uint32_t *high = sat__cells(t, channel, band, y1 - 1) + ((size_t)tx << t->shift);
-        uint32_t d = high[x1 - 1];
-        if (x0) d -= high[x0 - 1];
-        if (y0) {
-            const uint32_t *low = high - (size_t)(y1 - y0) * t->stride;
-            d -= low[x1 - 1];
-            if (x0) d += low[x0 - 1];
+        const uint32_t *high = sat__cells(t, at.channel, at.band, box.y1 - 1) + ((size_t)at.tx << t->shift);
+        uint32_t d = high[box.x1 - 1];
+        if (box.x0) d -= high[box.x0 - 1];
+        if (box.y0) {
+            const uint32_t *low = high - (size_t)(box.y1 - box.y0) * t->stride;
+            d -= low[box.x1 - 1];
+            if (box.x0) d += low[box.x0 - 1];
         }
         sum = (double)(int32_t)d * tile->quantum;
     }
-    return tile->spikes ? sum + sat__spike_sum(t, index, x0, y0, x1, y1) : sum;
+    return tile->spikes ? sum + sat__spike_sum(t, index, box) : sum;
 }
 
 /* An interval of pixels as tiles: those that are looked up in themselves, and a run of whole ones for the strips. */
@@ -3680,7 +3746,22 @@ static inline void sat__span_of(sat__span *s, int a, int b, int shift)
     s->end[s->count - 1] = b - (last << shift);
 }
 
-/* Kept out of the short way, which would save registers for them. */
+static double sat__giant_sum(const sat_table *t, int channel, sat__box box)
+{
+    double sum = 0;
+    int band, i;
+    for (band = box.y0 >> t->shift; band <= (box.y1 - 1) >> t->shift; band++) {
+        size_t at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
+        const sat__giant *g = t->giants + at * (size_t)t->giant_room;
+        int top = band << t->shift;
+        for (i = 0; i < t->tallies[at].giants; i++)
+            if (g[i].x >= box.x0 && g[i].x < box.x1 && top + g[i].y >= box.y0 && top + g[i].y < box.y1)
+                sum += (double)g[i].value;
+    }
+    return sum;
+}
+
+/* Kept out of the short ways, which would save registers for it. */
 #if defined(__GNUC__)
 #define SAT__APART __attribute__((noinline))
 #elif defined(_MSC_VER)
@@ -3689,126 +3770,141 @@ static inline void sat__span_of(sat__span *s, int a, int b, int shift)
 #define SAT__APART
 #endif
 
-SAT__APART static double sat__giant_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
-{
-    double sum = 0;
-    int band, i;
-    for (band = y0 >> t->shift; band <= (y1 - 1) >> t->shift; band++) {
-        size_t at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
-        const sat__giant *g = t->giants + at * (size_t)t->giant_room;
-        int top = band << t->shift;
-        for (i = 0; i < t->tallies[at].giants; i++)
-            if (g[i].x >= x0 && g[i].x < x1 && top + g[i].y >= y0 && top + g[i].y < y1) sum += (double)g[i].value;
-    }
-    return sum;
-}
-
-/* The sum over a box of at most 3 x 3 tiles that is not empty and inside the table, tile by tile. */
-SAT__APART static double sat__tiles_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+/* A box of at most 3 x 3 tiles, tile by tile with all that these hold. */
+SAT__APART static double sat__tiles_sum(const sat_table *t, int channel, sat__box box)
 {
     sat__span x, y;
     double sum = 0;
     int i, j;
-    sat__span_of(&x, x0, x1, t->shift);
-    sat__span_of(&y, y0, y1, t->shift);
+    sat__span_of(&x, box.x0, box.x1, t->shift);
+    sat__span_of(&y, box.y0, box.y1, t->shift);
     for (j = 0; j < y.count; j++)
         for (i = 0; i < x.count; i++)
-            sum += sat__tile_part(t, channel, y.tile[j], x.tile[i], x.begin[i], y.begin[j], x.end[i], y.end[j]);
-    return sum;
+            sum += sat__tile_part(t, sat__place_of(channel, y.tile[j], x.tile[i]),
+                                  sat__box_of(x.begin[i], y.begin[j], x.end[i], y.end[j]));
+    return t->has_giants ? sum + sat__giant_sum(t, channel, box) : sum;
 }
 
-/* The sum from the corner of a super tile, tile (super_x, super_y), up to (x, y) inside it or on its border. */
-static inline double sat__super_corner(const sat_table *t, int channel, int super_x, int super_y, int x, int y)
+/* What corners of one row read, each beginning at column 0 of the picture; NULL where that adds nothing: strips of the
+   tile rows above, of the tiles to the left, and the tile row's cells. */
+typedef struct sat__corners {
+    const double *whole, *above, *left;
+    const uint32_t *cells;
+    int super_y, band, in_y;
+} sat__corners;
+
+/* Corners in row y of a super tile row whose first tile row is super_y. */
+static inline sat__corners sat__corners_of(const sat_view *v, int super_y, int y)
 {
-    const int shift = t->shift, inner = (1 << shift) - 1, tx = x >> shift, ty = y >> shift, in_x = x & inner,
-              in_y = y & inner;
+    const sat_table *t = v->table;
+    sat__corners r;
+    r.super_y = super_y;
+    r.band = y >> v->shift;
+    r.in_y = y & (t->options.tile - 1);
+    r.whole = r.band > super_y ? t->whole + sat__tile_index(t, v->channel, r.band - 1, 0) : NULL;
+    r.above = r.band > super_y ? sat__above(t, v->channel, r.band - 1) : NULL;
+    r.left = r.in_y ? sat__left(t, v->channel, r.band, r.in_y - 1) : NULL;
+    r.cells = r.in_y ? sat__cells(t, v->channel, r.band, r.in_y - 1) : NULL;
+    return r;
+}
+
+/* The sum from the corner of a super tile, whose first tile column is super_x, up to (x, y) in it or on its border. */
+static inline double sat__corner_sum(const sat_view *v, const sat__corners *r, int super_x, int x)
+{
+    const int tx = x >> v->shift, in_x = x & ((1 << v->shift) - 1);
     double sum = 0;
-    if (tx > super_x && ty > super_y) sum = t->whole[sat__tile_index(t, channel, ty - 1, tx - 1)];
-    if (in_x && ty > super_y) sum += sat__above(t, channel, ty - 1)[x - 1];
-    if (in_y && tx > super_x) sum += sat__left(t, channel, ty, in_y - 1)[tx - 1];
-    if (in_x && in_y) {
-        const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, ty, tx)];
-        if (tile->slot || tile->spikes) sum += sat__tile_part(t, channel, ty, tx, 0, 0, in_x, in_y);
-        else sum += (double)(int32_t)sat__cells(t, channel, ty, in_y - 1)[x - 1] * tile->quantum;
+    if (tx > super_x && r->whole) sum = r->whole[tx - 1];
+    if (in_x && r->above) sum += r->above[x - 1];
+    if (!r->left) return sum;
+    if (tx > super_x) sum += r->left[tx - 1];
+    if (in_x) {
+        const double quantum = v->quanta[(size_t)r->band * (size_t)v->tiles + (size_t)tx];
+        if (quantum < 0)
+            sum += sat__tile_part(v->table, sat__place_of(v->channel, r->band, tx), sat__box_of(0, 0, in_x, r->in_y));
+        else sum += (double)(int32_t)r->cells[x - 1] * quantum;
     }
     return sum;
 }
 
-/* Larger boxes: four corners in each super tile that they touch. */
-SAT__APART static double sat__supers_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+/* Boxes beyond three tiles: four corners in each super tile that they touch. */
+SAT__APART static double sat__supers_sum(const sat_view *v, sat__box box)
 {
-    const int inner = SAT__SUPER - 1, shift = t->shift;
+    const int inner = SAT__SUPER - 1, shift = v->shift;
     double sum = 0;
     int x, y, x_end, y_end;
-    for (y = y0; y < y1; y = y_end) {
+    for (y = box.y0; y < box.y1; y = y_end) {
         int super_y = (y & ~inner) >> shift;
-        y_end = sat__min_int(y1 - 1, y | inner) + 1;
-        for (x = x0; x < x1; x = x_end) {
+        sat__corners low = sat__corners_of(v, super_y, y), high;
+        y_end = sat__min_int(box.y1 - 1, y | inner) + 1;
+        high = sat__corners_of(v, super_y, y_end);
+        for (x = box.x0; x < box.x1; x = x_end) {
             int super_x = (x & ~inner) >> shift;
-            x_end = sat__min_int(x1 - 1, x | inner) + 1;
-            sum += (sat__super_corner(t, channel, super_x, super_y, x_end, y_end) -
-                    sat__super_corner(t, channel, super_x, super_y, x, y_end)) -
-                   (sat__super_corner(t, channel, super_x, super_y, x_end, y) -
-                    sat__super_corner(t, channel, super_x, super_y, x, y));
+            x_end = sat__min_int(box.x1 - 1, x | inner) + 1;
+            sum += (sat__corner_sum(v, &high, super_x, x_end) - sat__corner_sum(v, &high, super_x, x)) -
+                   (sat__corner_sum(v, &low, super_x, x_end) - sat__corner_sum(v, &low, super_x, x));
         }
     }
-    return sum;
+    return v->table->has_giants ? sum + sat__giant_sum(v->table, v->channel, box) : sum;
 }
 
-/* Boxes of more than 2 x 2 tiles, and all boxes of a table with giants. */
-SAT__APART static double sat__hard_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
+/* At most 3 x 3 tiles. Tile columns that the box does not reach are read as its last one and masked away: a loop over
+   them would guess its length wrong. */
+SAT__APART static double sat__tiles_3_sum(const sat_view *v, sat__box box)
 {
-    const int right = ((x1 - 1) >> t->shift) - (x0 >> t->shift), below = ((y1 - 1) >> t->shift) - (y0 >> t->shift);
-    double sum = right > 2 || below > 2 ? sat__supers_sum(t, channel, x0, y0, x1, y1)
-                                        : sat__tiles_sum(t, channel, x0, y0, x1, y1);
-    return t->has_giants ? sum + sat__giant_sum(t, channel, x0, y0, x1, y1) : sum;
-}
-
-static inline int sat__is_plain(const sat__tile *tile) { return !(tile->slot | tile->spikes); }
-
-/* Of one row of cells: what lies in [x0, x1) of a tile; `left` is 0 where x0 is the tile's first pixel. */
-#define SAT__ACROSS(row, x0, x1, left) ((row)[(x1) - 1] - ((row)[(x0) - (int)((left) & 1)] & (left)))
-
-/* A box that is not empty and inside the table. Nearly all boxes up to a tile's side touch 1, 2 or 4 plain tiles. */
-static inline double sat__tiled_sum(const sat_table *t, int channel, int x0, int y0, int x1, int y1)
-{
-    const int shift = t->shift, inner = (1 << shift) - 1, tx = x0 >> shift, ty = y0 >> shift;
-    const int right = ((x1 - 1) >> shift) - tx, below = ((y1 - 1) >> shift) - ty;
-    const uint32_t left = 0u - (uint32_t)((x0 & inner) != 0), top = 0u - (uint32_t)((y0 & inner) != 0);
-    const sat__tile *a =
-        t->tiles + ((size_t)channel * (size_t)t->tiles_y + (size_t)ty) * (size_t)t->tiles_x + (size_t)tx;
-    const uint32_t *cells = (const uint32_t *)(const void *)t->sums + (size_t)channel * t->plane;
-    const uint32_t *high = cells + (size_t)(y0 - (int)(top & 1)) * t->stride,
-                   *low = cells + (size_t)(y1 - 1) * t->stride;
-    const int xm = (x0 | inner) + 1;
-    double sum;
-    if (t->has_giants || (right | below) > 1) return sat__hard_sum(t, channel, x0, y0, x1, y1);
-    if (!below) {
-        if (!right) {
-            if (!sat__is_plain(a)) return sat__tiles_sum(t, channel, x0, y0, x1, y1);
-            return (double)(int32_t)(SAT__ACROSS(low, x0, x1, left) - (SAT__ACROSS(high, x0, x1, left) & top)) *
-                   a->quantum;
-        }
-        if (!(sat__is_plain(a) & sat__is_plain(a + 1))) return sat__tiles_sum(t, channel, x0, y0, x1, y1);
-        sum = (double)(int32_t)(SAT__ACROSS(low, x0, xm, left) - (SAT__ACROSS(high, x0, xm, left) & top)) * a->quantum;
-        return sum + (double)(int32_t)(low[x1 - 1] - (high[x1 - 1] & top)) * a[1].quantum;
-    } else {
-        const uint32_t *middle = cells + (size_t)(y0 | inner) * t->stride;
-        const sat__tile *c = a + t->tiles_x;
-        if (!right) {
-            if (!(sat__is_plain(a) & sat__is_plain(c))) return sat__tiles_sum(t, channel, x0, y0, x1, y1);
-            sum = (double)(int32_t)(SAT__ACROSS(middle, x0, x1, left) - (SAT__ACROSS(high, x0, x1, left) & top)) *
-                  a->quantum;
-            return sum + (double)(int32_t)SAT__ACROSS(low, x0, x1, left) * c->quantum;
-        }
-        if (!(sat__is_plain(a) & sat__is_plain(a + 1) & sat__is_plain(c) & sat__is_plain(c + 1)))
-            return sat__tiles_sum(t, channel, x0, y0, x1, y1);
-        sum = (double)(int32_t)(SAT__ACROSS(middle, x0, xm, left) - (SAT__ACROSS(high, x0, xm, left) & top)) *
-                  a->quantum +
-              (double)(int32_t)(middle[x1 - 1] - (high[x1 - 1] & top)) * a[1].quantum;
-        return sum + ((double)(int32_t)SAT__ACROSS(low, x0, xm, left) * c->quantum +
-                      (double)(int32_t)low[x1 - 1] * c[1].quantum);
+    const int shift = v->shift, side = 1 << shift, inner = side - 1, tx = box.x0 >> shift, ty = box.y0 >> shift;
+    const int right = ((box.x1 - 1) >> shift) - tx, below = ((box.y1 - 1) >> shift) - ty, second = right > 0;
+    const uint32_t left = 0u - (uint32_t)((box.x0 & inner) != 0), top = 0u - (uint32_t)((box.y0 & inner) != 0),
+                   has1 = 0u - (uint32_t)(right > 0), has2 = 0u - (uint32_t)(right > 1);
+    const int a = box.x0 - (int)(left & 1), b = box.x1 - 1, end0 = right ? box.x0 | inner : b,
+              end1 = right > 1 ? end0 + side : b;
+    const double *q = v->quanta + (size_t)ty * (size_t)v->tiles + (size_t)tx;
+    const uint32_t *high = v->cells + (size_t)(box.y0 - (int)(top & 1)) * v->stride,
+                   *last = v->cells + (size_t)(box.y1 - 1) * v->stride,
+                   *row = below ? v->cells + (size_t)(box.y0 | inner) * v->stride : last;
+    uint32_t high0 = (high[end0] - (high[a] & left)) & top, high1 = high[end1] & top, high2 = high[b] & top;
+    double sum = 0;
+    int j, hard = 0;
+    for (j = 0; j <= below; j++) {
+        hard |= (q[0] < 0) | (q[second] < 0) | (q[right] < 0);
+        sum += (double)(int32_t)(row[end0] - (row[a] & left) - high0) * q[0] +
+               ((double)(int32_t)((row[end1] - high1) & has1) * q[second] +
+                (double)(int32_t)((row[b] - high2) & has2) * q[right]);
+        high0 = high1 = high2 = 0;
+        row = j + 1 < below ? row + ((size_t)side * v->stride) : last;
+        q += v->tiles;
     }
+    return hard ? sat__tiles_sum(v->table, v->channel, box) : sum;
+}
+
+/* At most 2 x 2 tiles, in the same manner. */
+static inline double sat__tiles_2_sum(const sat_view *v, sat__box box)
+{
+    const int inner = (1 << v->shift) - 1, tx = box.x0 >> v->shift, ty = box.y0 >> v->shift;
+    const int right = ((box.x1 - 1) >> v->shift) - tx, below = ((box.y1 - 1) >> v->shift) - ty;
+    const uint32_t left = 0u - (uint32_t)((box.x0 & inner) != 0), top = 0u - (uint32_t)((box.y0 & inner) != 0),
+                   more = 0u - (uint32_t)right, under = 0u - (uint32_t)below;
+    const int a = box.x0 - (int)(left & 1), b = box.x1 - 1, m = right ? box.x0 | inner : b;
+    const double *q = v->quanta + (size_t)ty * (size_t)v->tiles + (size_t)tx, *lower = below ? q + v->tiles : q;
+    const uint32_t *high = v->cells + (size_t)(box.y0 - (int)(top & 1)) * v->stride,
+                   *low = v->cells + (size_t)(box.y1 - 1) * v->stride,
+                   *middle = below ? v->cells + (size_t)(box.y0 | inner) * v->stride : low;
+    const uint32_t first = (middle[m] - (middle[a] & left)) - ((high[m] - (high[a] & left)) & top),
+                   second = (middle[b] - (high[b] & top)) & more, third = (low[m] - (low[a] & left)) & under,
+                   fourth = low[b] & under & more;
+    const double sum = (double)(int32_t)first * q[0] + (double)(int32_t)second * q[right];
+    if ((q[0] < 0) | (q[right] < 0) | (lower[0] < 0) | (lower[right] < 0))
+        return sat__tiles_sum(v->table, v->channel, box);
+    return sum + ((double)(int32_t)third * lower[0] + (double)(int32_t)fourth * lower[right]);
+}
+
+/* What sat_view_sum leaves: boxes beyond one tile, and tiles that hold more than cells. */
+static double sat__tiled_sum(const sat_view *v, int x0, int y0, int x1, int y1)
+{
+    const int shift = v->shift, right = ((x1 - 1) >> shift) - (x0 >> shift),
+              below = ((y1 - 1) >> shift) - (y0 >> shift);
+    if ((right | below) <= 1) return sat__tiles_2_sum(v, sat__box_of(x0, y0, x1, y1));
+    return right > 2 || below > 2 ? sat__supers_sum(v, sat__box_of(x0, y0, x1, y1))
+                                  : sat__tiles_3_sum(v, sat__box_of(x0, y0, x1, y1));
 }
 
 /* ---- >> building tiles */
@@ -4142,7 +4238,8 @@ static void sat__sum_tile(const sat_table *t, const sat__source *from, int chann
         uint32_t sum = sat__sum_tile_row(cells + (size_t)y * t->stride, column, integers, from->p + y * from->step, w,
                                          quantum, stream);
         left[(size_t)y * (size_t)t->tiles_x] =
-            (double)(int32_t)sum * quantum + (tile->spikes ? sat__spike_sum(t, index, 0, 0, side, y + 1) : 0);
+            (double)(int32_t)sum * quantum +
+            (tile->spikes ? sat__spike_sum(t, index, sat__box_of(0, 0, side, y + 1)) : 0);
     }
 }
 
@@ -4237,7 +4334,8 @@ static void sat__wide_tile(const sat_table *t, const sat_image *image, int chann
             out[x] = y ? out[x - (int)t->wide_stride] + run : run;
         }
         sat__left(t, channel, band, y)[tx] =
-            sat__tile_part(t, channel, band, tx, 0, 0, sat__min_int(side, t->width - (tx << t->shift)), y + 1);
+            sat__tile_part(t, sat__place_of(channel, band, tx),
+                           sat__box_of(0, 0, sat__min_int(side, t->width - (tx << t->shift)), y + 1));
     }
 }
 
@@ -4246,6 +4344,9 @@ static void sat__finish_band(const sat_table *t, const sat_image *image, int cha
 {
     sat__tally *tally = &t->tallies[(size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band)];
     int tx, y, rows = sat__min_int(t->options.tile, image->height - y0), super = SAT__SUPER >> t->shift;
+    double *quanta = t->quanta + sat__tile_index(t, channel, band, 0);
+    const sat__giant *giants =
+        t->giants + ((size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band)) * (size_t)t->giant_room;
     tally->tile_largest = tally->tile_squares = 0;
     for (tx = 0; tx < t->tiles_x; tx++) {
         const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
@@ -4253,7 +4354,9 @@ static void sat__finish_band(const sat_table *t, const sat_image *image, int cha
         if (tile->slot) sat__wide_tile(t, image, channel, band, tx, y0, worker);
         if (quantum > tally->tile_largest) tally->tile_largest = quantum;
         tally->tile_squares += quantum * quantum;
+        quanta[tx] = tile->slot || tile->spikes ? -1 : quantum;
     }
+    for (y = 0; y < tally->giants; y++) quanta[giants[y].x >> t->shift] = -1;
     for (y = 0; y < rows; y++) {
         double *left = sat__left(t, channel, band, y), run = 0;
         for (tx = 0; tx < t->tiles_x; tx++) {
@@ -4315,7 +4418,9 @@ static void sat__build_above(const sat_table *t, int channel, int band, int rows
         int x0 = tx << t->shift, w = sat__min_int(t->options.tile, t->width - x0);
         double last;
         if (tile->slot)
-            for (x = 0; x < w; x++) above[x0 + x] = sat__tile_part(t, channel, band, tx, 0, 0, x + 1, rows);
+            for (x = 0; x < w; x++)
+                above[x0 + x] =
+                    sat__tile_part(t, sat__place_of(channel, band, tx), sat__box_of(0, 0, x + 1, rows));
         else {
             const sat__spike *spikes = t->spikes + sat__tile_index(t, channel, band, tx) * SAT__SPIKES;
             int i;
@@ -4646,6 +4751,7 @@ static void sat__clear(sat_table *t)
         memset(t->above, 0, bands * (size_t)t->width * sizeof(double));
         memset(t->whole, 0, tiles * sizeof(double));
         memset(t->tiles, 0, tiles * sizeof *t->tiles);
+        memset(t->quanta, 0, tiles * sizeof *t->quanta);
         memset(t->tallies, 0, bands * sizeof *t->tallies);
         t->has_giants = 0;
     } else memset(t->sums, 0, (t->plane * (size_t)t->channels - (SAT__LINE / t->element - 1)) * t->element);
@@ -4798,66 +4904,46 @@ static int sat__clip_box(const sat_table *t, int *x0, int *y0, int *x1, int *y1)
     return *x0 < *x1 && *y0 < *y1;
 }
 
+static double sat__flat_sum(const sat_view *v, int x0, int y0, int x1, int y1)
+{
+    sat__rows rows = sat__rows_at(v->table, v->channel, y0, y1);
+    return sat__rows_sum(v->table, v->table->options.kind, &rows, v->channel, x0, x1, y1 - y0);
+}
+
+/* What lookups in loops read. A flat table looks like one tile that needs more than its cells. */
+static void sat__make_views(sat_table *t)
+{
+    static const double hard = -1;
+    int i, tiled = t->options.kind == SAT_KIND_TILED;
+    for (i = 0; i < t->channels; i++) {
+        sat_view *v = &t->view[i];
+        v->table = t;
+        v->other = tiled ? sat__tiled_sum : sat__flat_sum;
+        v->channel = i;
+        v->cells = tiled ? (const uint32_t *)(const void *)t->sums + (size_t)i * t->plane : NULL;
+        v->quanta = tiled ? t->quanta + (size_t)i * (size_t)t->tiles_y * (size_t)t->tiles_x : &hard;
+        v->stride = tiled ? t->stride : 0;
+        v->tiles = tiled ? t->tiles_x : 0;
+        v->shift = tiled ? t->shift : 31;
+    }
+}
+
 SAT_DEF double sat_sum(const sat_table *table, int channel, int x0, int y0, int x1, int y1)
 {
-    sat__rows rows;
     if (!table || channel < 0 || channel >= table->channels || !sat__clip_box(table, &x0, &y0, &x1, &y1)) return 0;
-    if (table->options.kind == SAT_KIND_TILED) return sat__tiled_sum(table, channel, x0, y0, x1, y1);
-    rows = sat__rows_at(table, channel, y0, y1);
-    return sat__rows_sum(table, table->options.kind, &rows, channel, x0, x1, y1 - y0);
-}
-
-/* Asks for the cells that a box will read. Which ones these are may be guessed: a wrong line costs little. */
-static inline void sat__prefetch_row(const sat_table *t, int channel, int y, int x0, int x1)
-{
-    const unsigned char *row = sat__row(t, channel, y);
-    SAT__PREFETCH(row + (size_t)x0 * t->element);
-    SAT__PREFETCH(row + (size_t)x1 * t->element);
-}
-
-static void sat__prefetch_box(const sat_table *t, int channel, const int *box)
-{
-    const int inner = t->options.tile - 1, shift = t->shift, tiled = t->options.kind == SAT_KIND_TILED;
-    int x0 = box[0], y0 = box[1], x1 = box[2], y1 = box[3];
-    if (!sat__clip_box(t, &x0, &y0, &x1, &y1)) return;
-    x0 -= tiled && x0;
-    x1 -= tiled;
-    y0 -= tiled && y0;
-    y1 -= tiled;
-    sat__prefetch_row(t, channel, y0, x0, x1);
-    sat__prefetch_row(t, channel, y1, x0, x1);
-    if (!tiled) return;
-    if (((x1 >> shift) - (x0 >> shift)) > 2 || ((y1 >> shift) - (y0 >> shift)) > 2) {
-        const double *high = sat__above(t, channel, sat__max_int(0, (y0 >> shift) - 1)),
-                     *low = sat__above(t, channel, sat__max_int(0, (y1 >> shift) - 1));
-        SAT__PREFETCH(high + x0);
-        SAT__PREFETCH(high + x1);
-        SAT__PREFETCH(low + x0);
-        SAT__PREFETCH(low + x1);
-        SAT__PREFETCH(sat__left(t, channel, y0 >> shift, y0 & inner) + (x0 >> shift));
-        SAT__PREFETCH(sat__left(t, channel, y1 >> shift, y1 & inner) + (x1 >> shift));
-        return;
-    }
-    x0 = (x0 + 1) | inner;
-    if (((y0 + 1) | inner) < y1) sat__prefetch_row(t, channel, (y0 + 1) | inner, sat__min_int(x0, x1), x1);
-    if (x0 < x1) {
-        sat__prefetch_row(t, channel, y0, x0, x0);
-        sat__prefetch_row(t, channel, y1, x0, x0);
-    }
+    return sat_view_sum(&table->view[channel], x0, y0, x1, y1);
 }
 
 /* The kind is chosen once; the compiler makes a loop for each. */
 static inline void sat__sums(double *out, const sat_table *t, sat_kind kind, int channel, const int *boxes,
                              size_t count)
 {
-    enum { AHEAD = 16 };
+    const sat_view view = t->view[channel];
     size_t i;
-    for (i = 0; i < AHEAD && i < count; i++) sat__prefetch_box(t, channel, boxes + 4 * i);
     for (i = 0; i < count; i++) {
         int x0 = boxes[4 * i], y0 = boxes[4 * i + 1], x1 = boxes[4 * i + 2], y1 = boxes[4 * i + 3];
-        if (count - i > AHEAD) sat__prefetch_box(t, channel, boxes + 4 * (i + AHEAD));
         if (!sat__clip_box(t, &x0, &y0, &x1, &y1)) out[i] = 0;
-        else if (kind == SAT_KIND_TILED) out[i] = sat__tiled_sum(t, channel, x0, y0, x1, y1);
+        else if (kind == SAT_KIND_TILED) out[i] = sat_view_sum(&view, x0, y0, x1, y1);
         else {
             sat__rows rows = sat__rows_at(t, channel, y0, y1);
             out[i] = sat__rows_sum(t, kind, &rows, channel, x0, x1, y1 - y0);
@@ -4880,6 +4966,13 @@ SAT_DEF void sat_sums(double *out, const sat_table *table, int channel, const in
     case SAT_KIND_FIXED32: sat__sums(out, table, SAT_KIND_FIXED32, channel, boxes, count); break;
     case SAT_KIND_FIXED64: sat__sums(out, table, SAT_KIND_FIXED64, channel, boxes, count); break;
     }
+}
+
+SAT_DEF sat_result sat_get_view(sat_view *out, const sat_table *table, int channel)
+{
+    if (!out || !table || channel < 0 || channel >= table->channels) return SAT_ERR_ARGUMENT;
+    *out = table->view[channel];
+    return SAT_OK;
 }
 
 SAT_DEF double sat_mean(const sat_table *table, int channel, int x0, int y0, int x1, int y1)
@@ -5042,7 +5135,7 @@ static void sat__tile_columns(double *v, const sat_table *t, int channel, const 
         const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, y->tile[j], tx)];
         if (tile->slot)
             for (i = 0; i < n; i++)
-                v[i] = (j ? v[i] : 0) + sat__wide_part(t, tile, 0, y->begin[j], i + 1, y->end[j]);
+                v[i] = (j ? v[i] : 0) + sat__wide_part(t, tile, sat__box_of(0, y->begin[j], i + 1, y->end[j]));
         else {
             const uint32_t *high = sat__cells(t, channel, y->tile[j], y->end[j] - 1) + ((size_t)tx << t->shift),
                            *low = y->begin[j] ? high - (size_t)(y->end[j] - y->begin[j]) * t->stride : NULL;
@@ -5147,8 +5240,9 @@ static void sat__line_sums(double *sum, sat__filter_line *f, int x, int n, int f
     /* spikes of whole tile rows are in the strips already */
     if (f->giants)
         for (i = 0; i < n; i++)
-            sum[i] += sat__giant_sum(t, f->channel, sat__max_int(x + i - r, 0), f->y0,
-                                     sat__min_int(x + i + r + 1, t->width), f->y1);
+            sum[i] += sat__giant_sum(t, f->channel,
+                                     sat__box_of(sat__max_int(x + i - r, 0), f->y0,
+                                                 sat__min_int(x + i + r + 1, t->width), f->y1));
 }
 
 /* The same where no border cuts a box and no spike or giant is near: straight to the means. */
@@ -5363,7 +5457,7 @@ static double sat__box_doubles(const sat_table *t, int channel, int x0, int y0, 
             for (i = 0; i < t->tiles[index].spikes; i++)
                 sum += fabs((double)t->spikes[index * SAT__SPIKES + (size_t)i].value);
         }
-    return few * v * (sum + (t->has_giants ? fabs(sat__giant_sum(t, channel, x0, y0, x1, y1)) : 0));
+    return few * v * (sum + (t->has_giants ? fabs(sat__giant_sum(t, channel, sat__box_of(x0, y0, x1, y1))) : 0));
 }
 
 SAT_DEF double sat_error_bound_box(const sat_table *table, int channel, int x0, int y0, int x1, int y1)

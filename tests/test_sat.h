@@ -1129,17 +1129,25 @@ TEST(many_sums_at_once_are_the_single_ones)
     support_hdr_image(p, W, H, 1, 8);
     p[W * 300 + 700] = (float)HUGE_VAL;
     for (i = 0; i < N; i++) random_box(&state, W, H, i % 3 == 0 ? 3 : i % 3 == 1 ? 60 : 1100, boxes + 4 * i);
-    for (k = 0; k < 5; k++) {
+    for (k = 0; k < 6; k++) {
         sat_options o = sat_defaults();
         sat_table *t;
-        o.kind = kinds[k];
+        sat_view loop;
+        o.kind = kinds[k % 5];
+        if (k == 5) o.tile = 8;
         t = build(&view, &o);
         sat_sums(out, t, 0, boxes, N);
+        EXPECT(sat_get_view(&loop, t, 0) == SAT_OK);
         for (i = 0; i < N; i++) {
             const int *b = boxes + 4 * i;
             double one = sat_sum(t, 0, b[0], b[1], b[2], b[3]);
             EXPECT(memcmp(&one, &out[i], sizeof one) == 0);
+            if (b[0] < 0 || b[1] < 0 || b[0] >= b[2] || b[1] >= b[3] || b[2] > W || b[3] > H) continue;
+            one = sat_view_sum(&loop, b[0], b[1], b[2], b[3]);
+            EXPECT(memcmp(&one, &out[i], sizeof one) == 0);
         }
+        EXPECT(sat_get_view(&loop, t, 1) == SAT_ERR_ARGUMENT && sat_get_view(NULL, t, 0) == SAT_ERR_ARGUMENT);
+        EXPECT(sat_get_view(&loop, NULL, 0) == SAT_ERR_ARGUMENT && sat_get_view(&loop, t, -1) == SAT_ERR_ARGUMENT);
         sat_sums(out, t, 1, boxes, 2);
         EXPECT_NEAR(out[0] + out[1], 0, 0);
         sat_sums(NULL, t, 0, boxes, 2);
@@ -1150,6 +1158,39 @@ TEST(many_sums_at_once_are_the_single_ones)
     sat_sums(out, NULL, 0, boxes, 1);
     EXPECT_NEAR(out[0], 0, 0);
     free(p);
+}
+
+/* A table of 5 x 5 tiles with spikes, a giant and a tile of many bright pixels; the view was had before the build. */
+TEST(every_box_of_a_small_table_is_its_pixels)
+{
+    enum { N = 37 };
+    float p[N * N];
+    sat_image picture = sat_image_f32(p, N, N, 1);
+    sat_options o = sat_defaults();
+    sat_table *t;
+    sat_view view;
+    int i, x0, y0, x1, y1;
+    o.tile = 8;
+    if (!EXPECT(sat_create(&t, N, N, 1, &o) == SAT_OK && sat_get_view(&view, t, 0) == SAT_OK)) return;
+    for (i = 0; i < N * N; i++) p[i] = (float)(i * 7 % 100);
+    p[3 * N + 4] = 1048576;
+    p[9 * N + 20] = 1e25f;
+    for (i = 0; i < 8; i++) p[(17 + i) * N + i] = 1048576.0f * (float)(1 << i);
+    EXPECT(sat_build(t, &picture) == SAT_OK);
+    for (y0 = 0; y0 < N; y0++)
+        for (x0 = 0; x0 < N; x0++)
+            for (y1 = y0 + 1; y1 <= N; y1 += 1 + (y1 > y0 + 3) * 4)
+                for (x1 = x0 + 1; x1 <= N; x1 += 1 + (x1 > x0 + 3) * 4) {
+                    double sum = 0, got = sat_view_sum(&view, x0, y0, x1, y1);
+                    int x, y;
+                    for (y = y0; y < y1; y++)
+                        for (x = x0; x < x1; x++) sum += (double)p[y * N + x];
+                    if (!EXPECT(fabs(got - sum) <= 1e-12 * sum)) {
+                        sat_destroy(t);
+                        return;
+                    }
+                }
+    sat_destroy(t);
 }
 
 /* opencv#20162: squares of 8 bits in 32 bits. */
