@@ -396,9 +396,10 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *g
                                            const ssao_sat_options *options);
 /* depth: a 2D texture whose red is the depth (R32F, R16F, or a depth format without comparison). normals: its red,
    green, blue are the view-space normal, signed; 0: from depth. Both may be larger than the picture, which lies at
-   to->from. to: its red gets the accessibility; NULL: the
-   object's own R32F, ssao_sat_gl_texture(). Of `input` only width, height,
-   depth_kind, projection, clip_zero_to_one and sky count. */
+   to->from. to: its red gets the accessibility; NULL: the object's own R32F, ssao_sat_gl_texture(). Of `input` only
+   width, height, depth_kind, projection, clip_zero_to_one, sky and left_handed count. Another size a frame (dynamic
+   resolution): width and height may be anything up to those of create, larger ones are SAT_ERR_SIZE; the own textures
+   then hold the picture in their corner. */
 SSAO_SAT_DEF sat_result ssao_sat_gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth, unsigned normals,
                                           const ssao_sat_input *input);
 #ifndef SSAO_SAT_NO_BENT
@@ -463,50 +464,45 @@ extern "C" {
 #endif
 
 /* ------------------------------------------------------------------------------------------------
-   >> vectors: of four, those of sat.h under shorter names. One kernel serves SSE2, NEON and plain C.
+   >> vectors: of four, those of sat.h. One kernel serves SSE2, NEON and plain C.
    ------------------------------------------------------------------------------------------------ */
 
-typedef sat__f32x4 ssao_sat__f;
-typedef sat__i32x4 ssao_sat__i;
-static inline ssao_sat__f ssao_sat__load(const float *p) { return sat__f32x4_load(p); }
-static inline void ssao_sat__store(float *p, ssao_sat__f v) { sat__f32x4_store(p, v); }
-static inline ssao_sat__f ssao_sat__set(float v) { return sat__f32x4_set1(v); }
-static inline ssao_sat__f ssao_sat__add(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_add(a, b); }
-static inline ssao_sat__f ssao_sat__sub(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_sub(a, b); }
-static inline ssao_sat__f ssao_sat__mul(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_mul(a, b); }
-static inline ssao_sat__f ssao_sat__div(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_div(a, b); }
-static inline ssao_sat__f ssao_sat__max(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_max(a, b); }
-static inline ssao_sat__f ssao_sat__min(ssao_sat__f a, ssao_sat__f b) { return sat__f32x4_min(a, b); }
-static inline ssao_sat__f ssao_sat__sqrt(ssao_sat__f a) { return sat__f32x4_sqrt(a); }
-static inline ssao_sat__f ssao_sat__abs(ssao_sat__f a) { return sat__f32x4_abs(a); }
-static inline ssao_sat__f ssao_sat__if_positive(ssao_sat__f a, ssao_sat__f b) /* a > 0 ? b : 0 */
+static inline sat__f32x4 ssao_sat__if_positive(sat__f32x4 a, sat__f32x4 b) /* a > 0 ? b : 0 */
 {
     return sat__f32x4_select(sat__f32x4_less(sat__f32x4_set1(0), a), b, sat__f32x4_set1(0));
 }
-static inline int ssao_sat__any_positive(ssao_sat__f a)
+
+static inline int ssao_sat__any_positive(sat__f32x4 a)
 {
     return sat__i32x4_any(sat__f32x4_less(sat__f32x4_set1(0), a));
 }
-static inline ssao_sat__i ssao_sat__load_i(const uint32_t *p)
+
+/* Words of the tables: unsigned, with the same sums. */
+static inline sat__i32x4 ssao_sat__load_words(const uint32_t *p)
 {
     return sat__i32x4_load((const int32_t *)(const void *)p);
 }
-static inline void ssao_sat__store_i(uint32_t *p, ssao_sat__i v) { sat__i32x4_store((int32_t *)(void *)p, v); }
-static inline ssao_sat__i ssao_sat__add_i(ssao_sat__i a, ssao_sat__i b) { return sat__i32x4_add(a, b); }
-static inline ssao_sat__i ssao_sat__sub_i(ssao_sat__i a, ssao_sat__i b) { return sat__i32x4_sub(a, b); }
-static inline ssao_sat__f ssao_sat__to_f(ssao_sat__i a) { return sat__i32x4_to_f32(a); }
-#if defined(SAT__SSE2)
-static inline void ssao_sat__transpose(ssao_sat__f *m) { _MM_TRANSPOSE4_PS(m[0], m[1], m[2], m[3]); }
-#else
-static inline void ssao_sat__transpose(ssao_sat__f *m)
+
+static inline void ssao_sat__store_words(uint32_t *p, sat__i32x4 v) { sat__i32x4_store((int32_t *)(void *)p, v); }
+
+static inline sat__f32x4 ssao_sat__dot(const sat__f32x4 *a, const sat__f32x4 *b)
 {
+    return sat__f32x4_add(sat__f32x4_add(sat__f32x4_mul(a[0], b[0]), sat__f32x4_mul(a[1], b[1])),
+                          sat__f32x4_mul(a[2], b[2]));
+}
+
+static inline void ssao_sat__transpose(sat__f32x4 *m)
+{
+#if defined(SAT__SSE2)
+    _MM_TRANSPOSE4_PS(m[0], m[1], m[2], m[3]);
+#else
     float rows[16], columns[16];
     int i;
-    for (i = 0; i < 4; i++) ssao_sat__store(rows + 4 * i, m[i]);
+    for (i = 0; i < 4; i++) sat__f32x4_store(rows + 4 * i, m[i]);
     for (i = 0; i < 16; i++) columns[i] = rows[i % 4 * 4 + i / 4];
-    for (i = 0; i < 4; i++) m[i] = ssao_sat__load(columns + 4 * i);
-}
+    for (i = 0; i < 4; i++) m[i] = sat__f32x4_load(columns + 4 * i);
 #endif
+}
 
 /* ------------------------------------------------------------------------------------------------
    >> object: and frame, fitted numbers, options
@@ -517,6 +513,7 @@ enum {
     SSAO_SAT__NOTHING = 31 << SSAO_SAT__LEVEL_BITS,
     SSAO_SAT__ROUGH = 1 << 30,  /* in the first word of a table pixel: its pixels are no plane */
     SSAO_SAT__PAD = 16,       /* words of nothing left and right of a row: neighbours may be read blindly */
+    SSAO_SAT__MAX_SIDE = 32768, /* of a picture */
     SSAO_SAT__MAX_SLABS = 16,
     SSAO_SAT__MAX_SCALES = 4,
     SSAO_SAT__BLOCK = 8,      /* table pixels of a row that are asked for a slab together */
@@ -529,12 +526,21 @@ enum {
 #define SSAO_SAT__BEYOND 0.73f /* of a side's weight that the border takes, to the cells beside the pixel: a corner
                                   keeps its value */
 #define SSAO_SAT__BLOCKED 2.0f  /* length of blocked directions against occlusion, fitted */
-#define SSAO_SAT__SHARPNESS 50 /* upsampling: a neighbour off the tangent plane by 1/50 of the distance has no weight; in
-                                  GLSL too */
+#define SSAO_SAT__SHARPNESS 50.0f /* upsampling: a neighbour off the tangent plane by 1/50 of the distance weighs no
+                                  more than */
+#define SSAO_SAT__ELSEWHERE 1e-4f /* one on another surface, against 1 on the same */
 #define SSAO_SAT__BEND 0.2f   /* there is interpolation between neighbours on a plane up to a tenth of a radius, */
 #define SSAO_SAT__ALIKE 0.9f  /* with normals less than 25 degrees apart */
 #define SSAO_SAT__COARSE 6    /* half side from which it may be between those two apart */
 #define SSAO_SAT__FAR 1e18f   /* distances beyond are sky: their squares would overflow */
+#define SSAO_SAT__LEAST_AFFINE 1e-30f  /* 1/z from which on there is a distance */
+#define SSAO_SAT__LEAST_SQUARE 1e-20f  /* of normals that are a direction */
+#define SSAO_SAT__LARGEST_RADIUS 1e15f /* what is added to depth ranges for it, so that they stay finite */
+#define SSAO_SAT__BEHIND 1.05f /* published methods: sky lies at this many farthest distances */
+#define SSAO_SAT__GRAZING 1e-3f /* PLANE: normals that face the camera less count as facing it so much */
+#define SSAO_SAT__RANGE_SLACK 0.001f /* of the range's ends, for the rounding of what lies there */
+#define SSAO_SAT__OPEN_LENGTH (2 / 3.0f) /* mean direction of an open hemisphere along its normal */
+#define SSAO_SAT__NO_DIRECTION 1e-3f /* bent normals shorter than this are the normal */
 
 /* What was fitted to ray-traced references by tests/bench/bench_ssao_sat.c. reach: half side of the region in radii.
    range: SLABS: occluders count less with their distance, to nothing at this many radii; PLANE: heights h (in radii)
@@ -594,6 +600,22 @@ typedef struct ssao_sat__camera {
     float aspect;           /* those along y over those along x */
 } ssao_sat__camera;
 
+/* Arrays of pixels: distance, normal, accessibility, and the sum of the directions that are blocked. */
+typedef struct ssao_sat__pixels { float *z, *nx, *ny, *nz, *open, *blocked[3]; } ssao_sat__pixels;
+
+/* Pixels begin, begin + step, ... before end, of row y of the picture. */
+typedef struct ssao_sat__strip { int y, begin, end, step; } ssao_sat__strip;
+
+typedef struct ssao_sat__rect { int x0, y0, x1, y1; } ssao_sat__rect; /* half open */
+
+/* What a call writes: `element` is bytes of an accessibility, 4 for float, 2 for half, 1 for 8 bits. */
+typedef struct ssao_sat__output {
+    void *out;
+    float *bent;            /* or NULL */
+    ptrdiff_t stride, bent_stride;
+    int element, is_signed;
+} ssao_sat__output;
+
 /* One slab: depths between two edges. Its words: count, sum of the quantised affine depth, of x, of y. */
 typedef struct ssao_sat__slab { float low, quantum, inverse; uint32_t top; } ssao_sat__slab; /* levels 0 .. top */
 
@@ -613,7 +635,8 @@ struct ssao_sat {
     size_t stride, table_stride, table_plane;
     int tables;             /* words a pixel: 4 a slab, or 1 */
     /* arrays of `capacity` rows, `stride` apart */
-    float *z, *affine, *nx, *ny, *nz, *open, *blocked[3];
+    ssao_sat__pixels work;
+    float *affine;
     float *lower;           /* affine depth of the pixel below: half resolution has one between two table rows */
     uint32_t *words;        /* step x step a table pixel, rows `word_stride` apart: slab and quantised affine depth,
                                SSAO_SAT__NOTHING */
@@ -642,12 +665,8 @@ struct ssao_sat {
     float sky_value, mean;  /* what stands for sky in it; mean taken off float tables */
     float flat_limit;
     int frame_slabs;        /* <= options.slabs */
-    int bent_wanted, is_signed;
+    ssao_sat__output to;
     int geometric;          /* the option, where normals are given */
-    int element;            /* bytes of an output: float, half or 8 bits */
-    void *out;
-    float *bent_out;
-    ptrdiff_t out_stride, bent_stride;
     /* this band: rows [first, first + held) are held, [begin, end) estimated */
     int first, held, begin, end;
     int estimated_first;    /* of the rows that are estimated: the band's, and those its pixels take from */
@@ -831,7 +850,7 @@ static inline float ssao_sat__distance(const ssao_sat *s, int x, int y)
     else {
         if (in->depth_kind == SSAO_SAT_DEPTH_HARDWARE ? d < 0 || d >= 1 : d <= 0 || d > 1) return 0;
         affine = s->camera.depth_a * (double)d + s->camera.depth_b + s->camera.tilt[0] * x + s->camera.tilt[1] * y;
-        if (!(affine > 1e-30)) return 0;
+        if (!(affine > (double)SSAO_SAT__LEAST_AFFINE)) return 0;
         z = (float)(s->camera.orthographic ? affine : 1 / affine);
     }
     return z > 1 / SSAO_SAT__FAR && z < SSAO_SAT__FAR ? z : 0;
@@ -849,14 +868,14 @@ static inline ssao_sat__vector ssao_sat__position(const ssao_sat *s, int x, int 
     return p;
 }
 
-/* Tangent along x or y from the neighbour whose affine depth is nearer; 0 when both are missing. */
-static int ssao_sat__tangent(ssao_sat__vector *t, const ssao_sat *s, int x, int y, float z, int dx, int dy)
+/* Tangent along x (0) or y (1) from the neighbour whose affine depth is nearer; 0 when both are missing. */
+static int ssao_sat__tangent(ssao_sat__vector *t, const ssao_sat *s, int x, int y, float z, int axis)
 {
     ssao_sat__vector p = ssao_sat__position(s, x, y, z), q;
     int side, best = 0;
     float nearest = 0;
     for (side = -1; side <= 1; side += 2) {
-        int i = x + side * dx, j = y + side * dy;
+        int i = axis ? x : x + side, j = axis ? y + side : y;
         float zi, difference;
         if (i < 0 || j < 0 || i >= s->width || j >= s->height) continue;
         zi = ssao_sat__distance(s, i, j);
@@ -878,7 +897,7 @@ static ssao_sat__vector ssao_sat__depth_normal(const ssao_sat *s, int x, int y, 
 {
     ssao_sat__vector n = {0, 0, -1}, u, v, p = ssao_sat__position(s, x, y, z);
     float length, facing;
-    if (!ssao_sat__tangent(&u, s, x, y, z, 1, 0) || !ssao_sat__tangent(&v, s, x, y, z, 0, 1)) return n;
+    if (!ssao_sat__tangent(&u, s, x, y, z, 0) || !ssao_sat__tangent(&v, s, x, y, z, 1)) return n;
     length = 1 / sqrtf((u.x * u.x + u.y * u.y + u.z * u.z) * (v.x * v.x + v.y * v.y + v.z * v.z));
     u.x *= length; u.y *= length; u.z *= length; /* the cross product is then of order 1 at any scale */
     n.x = u.y * v.z - u.z * v.y;
@@ -907,7 +926,7 @@ static inline ssao_sat__vector ssao_sat__normal(const ssao_sat *s, int x, int y,
     n.y = p[1];
     n.z = s->camera.forward * p[2];
     square = n.x * n.x + n.y * n.y + n.z * n.z;
-    if (!sat__is_finite(square) || !(square > 1e-20f)) {
+    if (!sat__is_finite(square) || !(square > SSAO_SAT__LEAST_SQUARE)) {
         if (stats) stats->normals_replaced++;
         return ssao_sat__depth_normal(s, x, y, z);
     }
@@ -926,19 +945,19 @@ static inline ssao_sat__vector ssao_sat__normal(const ssao_sat *s, int x, int y,
     return n;
 }
 
-/* Every step-th pixel of row y from x0 up to `end`: distances and normals. */
-static void ssao_sat__read_row(const ssao_sat *s, int y, int x0, int end, int step, float *z, float *nx, float *ny,
-                               float *nz, ssao_sat_stats *stats)
+/* Distances and normals of a strip, from to[at] on. */
+static inline void ssao_sat__read_strip(const ssao_sat *s, const ssao_sat__pixels *to, size_t at,
+                                 const ssao_sat__strip *strip, ssao_sat_stats *stats)
 {
-    int x, i = 0;
-    for (x = x0; x < end; x += step, i++) {
-        float d = ssao_sat__distance(s, x, y);
+    int x;
+    for (x = strip->begin; x < strip->end; x += strip->step, at++) {
+        float z = ssao_sat__distance(s, x, strip->y);
         ssao_sat__vector n = {0, 0, -1};
-        if (d > 0) n = ssao_sat__normal(s, x, y, d, stats);
-        z[i] = d;
-        nx[i] = n.x;
-        ny[i] = n.y;
-        nz[i] = n.z;
+        if (z > 0) n = ssao_sat__normal(s, x, strip->y, z, stats);
+        to->z[at] = z;
+        to->nx[at] = n.x;
+        to->ny[at] = n.y;
+        to->nz[at] = n.z;
     }
 }
 
@@ -1034,8 +1053,9 @@ static void ssao_sat__count_depths(const ssao_sat *s, float *share, float low, f
     for (j = 0; j < SSAO_SAT__GRID; j++)
         for (i = 0; i < SSAO_SAT__GRID; i++) {
             float z = ssao_sat__sample(s, i, j);
-            /* nothing, or what the range leaves out; the slack is for the rounding of what lies at its ends */
-            if (!(z >= 0.999f * s->nearest && z <= 1.001f * s->farthest)) continue;
+            /* nothing, or what the range leaves out */
+            if (!(z >= (1 - SSAO_SAT__RANGE_SLACK) * s->nearest && z <= (1 + SSAO_SAT__RANGE_SLACK) * s->farthest))
+                continue;
             count[range > 0 ? sat__clamp_int((int)((ssao_sat__scale_depth(s, z) - low) / range * SSAO_SAT__BINS), 0,
                                              SSAO_SAT__BINS - 1)
                             : 0]++;
@@ -1075,7 +1095,7 @@ static ssao_sat__slab ssao_sat__quantise(float low, float high, double area)
     ssao_sat__slab q;
     int bits = 31;
     while (bits > 1 && area * ((double)((uint32_t)1 << bits)) > 2147483648.0) bits--;
-    if (bits > 20) bits = 20;
+    if (bits > SSAO_SAT__LEVEL_BITS) bits = SSAO_SAT__LEVEL_BITS;
     q.low = low;
     q.top = ((uint32_t)1 << bits) - 1;
     q.quantum = (high - low) / (float)q.top;
@@ -1104,12 +1124,12 @@ static int ssao_sat__slab_count(const ssao_sat *s)
 /* The end slabs hold whatever is nearer or farther than the range: all of it behind, MARGIN times as near in front. */
 static void ssao_sat__prepare_slabs(ssao_sat *s)
 {
-    double cell = (2 * (double)s->largest / (s->is_signed ? 1 : 3) + 2) * s->step;
+    double cell = (2 * (double)s->largest / (s->to.is_signed ? 1 : 3) + 2) * s->step;
     float spare = s->camera.orthographic ? s->farthest - s->nearest + SSAO_SAT__MARGIN * s->radius : 0;
     int k;
     s->frame_slabs = ssao_sat__slab_count(s);
     ssao_sat__cut_slabs(s);
-    if (!(spare < 1e15f)) spare = 1e15f;
+    if (!(spare < SSAO_SAT__LARGEST_RADIUS)) spare = SSAO_SAT__LARGEST_RADIUS;
     for (k = 0; k < s->frame_slabs; k++) {
         float low = s->edge[k], high = s->edge[k + 1];
         if (k == 0) low = s->camera.orthographic ? low - spare : low / SSAO_SAT__MARGIN;
@@ -1141,8 +1161,9 @@ static void ssao_sat__prepare_value(ssao_sat *s)
     s->sky_value = 0;
     if (ssao_sat__table_is_inverse(s)) high = SSAO_SAT__MARGIN / s->nearest;
     else if (s->options.method == SSAO_SAT_PLANE)
-        high = s->farthest - s->nearest + SSAO_SAT__MARGIN * (s->radius < 1e15f ? s->radius : 1e15f);
-    else high = s->sky_value = 1.05f * s->farthest;
+        high = s->farthest - s->nearest +
+               SSAO_SAT__MARGIN * (s->radius < SSAO_SAT__LARGEST_RADIUS ? s->radius : SSAO_SAT__LARGEST_RADIUS);
+    else high = s->sky_value = SSAO_SAT__BEHIND * s->farthest;
     s->value = ssao_sat__quantise(0, high, side * side);
 }
 
@@ -1243,8 +1264,11 @@ static void ssao_sat__hold_rows(int begin, int end, int worker, void *context)
         int y = s->first + i;
         size_t at = ssao_sat__at(s, y);
         ssao_sat_stats *stats = y >= s->begin && y < s->end ? &w->stats : NULL;
-        ssao_sat__read_row(s, y * s->step, 0, s->width, s->step, s->z + at, s->nx + at, s->ny + at, s->nz + at,
-                           stats);
+        ssao_sat__strip strip = {0, 0, 0, 0};
+        strip.y = y * s->step;
+        strip.end = s->width;
+        strip.step = s->step;
+        ssao_sat__read_strip(s, &s->work, at, &strip, stats);
 #ifndef SSAO_SAT_NO_SLABS
         if (s->options.method == SSAO_SAT_SLABS) {
             ssao_sat__hold_words(s, y, s->scratch + (size_t)worker * 8 * s->stride, w);
@@ -1252,7 +1276,7 @@ static void ssao_sat__hold_rows(int begin, int end, int worker, void *context)
         }
 #endif
         for (x = 0; x < s->columns; x++) {
-            float z = s->z[at + (size_t)x];
+            float z = s->work.z[at + (size_t)x];
             if (!(z > 0)) continue;
             if (!(w->farthest > 0) || z < w->nearest) w->nearest = z;
             if (z > w->farthest) w->farthest = z;
@@ -1272,13 +1296,13 @@ static void ssao_sat__build_slab(ssao_sat *s, int k)
     for (row = 0; row < s->held; row++) {
         uint32_t *o = table + (size_t)(row + 1) * stride;
         const uint32_t *above = o - stride, *words = s->words + (size_t)(row * step) * s->word_stride;
-        ssao_sat__i sum;
+        sat__i32x4 sum;
         if (!(s->row_slabs[row] >> k & 1)) {
             memcpy(o, above, stride * sizeof *table);
             continue;
         }
         memset(o, 0, 4 * sizeof *o);
-        sum = ssao_sat__load_i(o);
+        sum = ssao_sat__load_words(o);
         for (x = 0; x < s->columns; x++) {
             const int holds = s->block_slabs[(size_t)row * s->blocks + (size_t)(x / SSAO_SAT__BLOCK)] >> k & 1;
             o += 4;
@@ -1290,9 +1314,9 @@ static void ssao_sat__build_slab(ssao_sat *s, int k)
                 word[2] = (uint32_t)(x * step + i % step);
                 word[3] = (uint32_t)((s->first + row) * step + i / step); /* counted in the picture, so that bands give
                                                                              the same bits */
-                sum = ssao_sat__add_i(sum, ssao_sat__load_i(word));
+                sum = sat__i32x4_add(sum, ssao_sat__load_words(word));
             }
-            ssao_sat__store_i(o, ssao_sat__add_i(sum, ssao_sat__load_i(above)));
+            ssao_sat__store_words(o, sat__i32x4_add(sum, ssao_sat__load_words(above)));
         }
     }
 }
@@ -1308,7 +1332,7 @@ static void ssao_sat__build_value(ssao_sat *s)
     for (row = 0; row < s->held; row++) {
         uint32_t *o = s->table + (size_t)(row + 1) * stride, sum = 0;
         const uint32_t *above = o - stride;
-        const float *z = s->z + (size_t)row * s->stride + SSAO_SAT__PAD;
+        const float *z = s->work.z + (size_t)row * s->stride + SSAO_SAT__PAD;
         float real = 0;
         o[0] = 0;
         for (x = 0; x < s->columns; x++) {
@@ -1331,7 +1355,8 @@ static void ssao_sat__build_value(ssao_sat *s)
 static int ssao_sat__is_bent(const ssao_sat *s, const float *a, size_t at, float rx, float ry)
 {
     const float *above = a - s->stride, *below = a + s->stride;
-    float c = *a, limit = s->flat_limit * c, z = s->z[at], nx = s->nx[at], ny = s->ny[at], nz = s->nz[at];
+    float c = *a, limit = s->flat_limit * c, z = s->work.z[at];
+    const float nx = s->work.nx[at], ny = s->work.ny[at], nz = s->work.nz[at];
     float gx = 0.5f * (a[1] - a[-1]), gy = 0.5f * (*below - *above), scale;
     if (!(z > 0) || !(c > 0)) return 1;
     if (fabsf(a[-1] + a[1] - 2 * c) > limit || fabsf(*above + *below - 2 * c) > limit ||
@@ -1404,13 +1429,12 @@ static void ssao_sat__build_tables(int begin, int end, int worker, void *context
 }
 
 /* Box sum in a table of `words` words an entry, rows and columns within it. */
-static inline uint32_t ssao_sat__box(const ssao_sat *s, const uint32_t *table, size_t words, int x0, int y0, int x1,
-                                     int y1)
+static inline uint32_t ssao_sat__box(const ssao_sat *s, const uint32_t *table, size_t words, ssao_sat__rect r)
 {
-    const uint32_t *above = table + words * (size_t)(y0 - s->first) * s->table_stride;
-    const uint32_t *below = table + words * (size_t)(y1 - s->first) * s->table_stride;
-    return below[words * (size_t)x1] - below[words * (size_t)x0] - above[words * (size_t)x1] +
-           above[words * (size_t)x0];
+    const uint32_t *above = table + words * (size_t)(r.y0 - s->first) * s->table_stride;
+    const uint32_t *below = table + words * (size_t)(r.y1 - s->first) * s->table_stride;
+    return below[words * (size_t)r.x1] - below[words * (size_t)r.x0] - above[words * (size_t)r.x1] +
+           above[words * (size_t)r.x0];
 }
 
 /* (1 - strength occlusion)^power; the fitted exponents are 1, 1.5, 2 or 3, so powf is for callers who ask for
@@ -1438,105 +1462,110 @@ static inline float ssao_sat__accessibility(const ssao_sat *s, float occlusion, 
 
 /* What all pixels share, the same in all lanes: read from memory that no store can be thought to change. */
 typedef struct ssao_sat__lanes {
-    ssao_sat__f low[SSAO_SAT__MAX_SLABS], quantum[SSAO_SAT__MAX_SLABS];
-    ssao_sat__f ax, bx, ay, by, falloff, inverse_radius, bias;
-    ssao_sat__f term[SSAO_SAT__MAX_SCALES][SSAO_SAT__MAX_SCALES][SSAO_SAT__TERMS]; /* kernel of rings [first, last] */
+    sat__f32x4 low[SSAO_SAT__MAX_SLABS], quantum[SSAO_SAT__MAX_SLABS];
+    sat__f32x4 ax, bx, ay, by, falloff, inverse_radius, bias;
+    sat__f32x4 term[SSAO_SAT__MAX_SCALES][SSAO_SAT__MAX_SCALES][SSAO_SAT__TERMS]; /* kernel of rings [first, last] */
 } ssao_sat__lanes;
 
 typedef struct ssao_sat__point {
-    int x, y;
+    int x, y, first_slab, end_slab;        /* slabs in reach */
+    float half_side;
     float z, facing, slope[2];             /* n.ray and its change a column and a row; orthographic: n.z, n.x, n.y */
-    ssao_sat__f px, py, pz, nx, ny, nz;    /* the same in all lanes */
-    ssao_sat__f surface[3];                /* the normal from depth, where it counts too */
-    ssao_sat__f least;                     /* square of a millionth of the distance: nothing is nearer than that */
-    ssao_sat__f occlusion[2], blocked[2][3]; /* by cell */
+    sat__f32x4 at[3], n[3];               /* the same in all lanes */
+    sat__f32x4 surface[3];                /* the normal from depth, where it counts too */
+    sat__f32x4 least;                     /* square of a millionth of the distance: nothing is nearer than that */
+    sat__f32x4 occlusion[2], blocked[2][3]; /* by cell */
 } ssao_sat__point;
 
-/* Columns and rows of the 3 x 3 cells, clipped to the picture, and what one pixel weighs in each of the eight outer
-   ones. */
+/* Half sides in pixels of a ring along an axis: its inner cells reach to the one, the outer ones to the other. */
+typedef struct ssao_sat__ring { int inner, outer; } ssao_sat__ring;
+
+/* The 3 cells along an axis: borders, clipped to the picture, and what one pixel weighs in each. */
+typedef struct ssao_sat__cut { int border[4]; float weight[3]; } ssao_sat__cut;
+
+/* The eight cells of a ring around a pixel, and what one slab holds in them. */
 typedef struct ssao_sat__cells {
-    int column[4], row[4];
-    ssao_sat__f weight[2];
-    const ssao_sat__f *term; /* of the kernel */
+    ssao_sat__cut column, row;
+    sat__f32x4 weight[2];
+    const sat__f32x4 *term; /* of the kernel */
+    int slab;
 } ssao_sat__cells;
 
 /* Horner in the distance, for one power of the sine. */
-static inline ssao_sat__f ssao_sat__cubic(const ssao_sat__f *c, ssao_sat__f d)
+static inline sat__f32x4 ssao_sat__cubic(const sat__f32x4 *c, sat__f32x4 d)
 {
-    ssao_sat__f sum = ssao_sat__add(c[2], ssao_sat__mul(d, c[3]));
-    sum = ssao_sat__add(c[1], ssao_sat__mul(d, sum));
-    return ssao_sat__add(c[0], ssao_sat__mul(d, sum));
+    sat__f32x4 sum = sat__f32x4_add(c[2], sat__f32x4_mul(d, c[3]));
+    sum = sat__f32x4_add(c[1], sat__f32x4_mul(d, sum));
+    return sat__f32x4_add(c[0], sat__f32x4_mul(d, sum));
 }
 
 /* The occluders of one slab in four cells, given the sums over each. */
-static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__lanes *l, int slab,
-                                           ssao_sat__f *sums, int group, const ssao_sat__cells *c)
+static inline void ssao_sat__add_occluders(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__lanes *l,
+                                           const ssao_sat__cells *c, sat__f32x4 *sums, int group)
 {
-    const ssao_sat__f one = ssao_sat__set(1), zero = ssao_sat__set(0);
-    ssao_sat__f count, affine, r, z, dx, dy, dz, square, height, share, length, inverse, sine, part;
+    const sat__f32x4 one = sat__f32x4_set1(1), zero = sat__f32x4_set1(0);
+    sat__f32x4 count, affine, r, z, d[3], square, height, share, length, inverse, sine, part;
     ssao_sat__transpose(sums); /* count, level, x, y of the four cells */
     count = sums[0];
-    affine = ssao_sat__add(ssao_sat__mul(l->low[slab], count), ssao_sat__mul(l->quantum[slab], sums[1]));
-    r = ssao_sat__div(one, s->camera.orthographic ? ssao_sat__max(count, one)
-                                                  : ssao_sat__max(affine, ssao_sat__set(1e-30f)));
-    z = ssao_sat__mul(s->camera.orthographic ? affine : count, r);
-    dx = ssao_sat__add(ssao_sat__mul(l->ax, sums[2]), ssao_sat__mul(l->bx, count));
-    dy = ssao_sat__add(ssao_sat__mul(l->ay, sums[3]), ssao_sat__mul(l->by, count));
-    dx = ssao_sat__sub(ssao_sat__mul(dx, r), p->px);
-    dy = ssao_sat__sub(ssao_sat__mul(dy, r), p->py);
-    dz = ssao_sat__sub(z, p->pz);
-    square = ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, dx), ssao_sat__mul(dy, dy)), ssao_sat__mul(dz, dz));
-    height = ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, p->nx), ssao_sat__mul(dy, p->ny)), ssao_sat__mul(dz, p->nz));
-    if (s->geometric)
-        height = ssao_sat__min(height, ssao_sat__add(ssao_sat__add(ssao_sat__mul(dx, p->surface[0]),
-                                                                   ssao_sat__mul(dy, p->surface[1])),
-                                                     ssao_sat__mul(dz, p->surface[2])));
-    share = ssao_sat__sub(one, ssao_sat__mul(square, l->falloff));
-    share = ssao_sat__if_positive(height, ssao_sat__mul(ssao_sat__max(zero, share), count));
+    affine = sat__f32x4_add(sat__f32x4_mul(l->low[c->slab], count), sat__f32x4_mul(l->quantum[c->slab], sums[1]));
+    r = sat__f32x4_div(one, s->camera.orthographic
+                                ? sat__f32x4_max(count, one)
+                                : sat__f32x4_max(affine, sat__f32x4_set1(SSAO_SAT__LEAST_AFFINE)));
+    z = sat__f32x4_mul(s->camera.orthographic ? affine : count, r);
+    d[0] = sat__f32x4_add(sat__f32x4_mul(l->ax, sums[2]), sat__f32x4_mul(l->bx, count));
+    d[1] = sat__f32x4_add(sat__f32x4_mul(l->ay, sums[3]), sat__f32x4_mul(l->by, count));
+    d[0] = sat__f32x4_sub(sat__f32x4_mul(d[0], r), p->at[0]);
+    d[1] = sat__f32x4_sub(sat__f32x4_mul(d[1], r), p->at[1]);
+    d[2] = sat__f32x4_sub(z, p->at[2]);
+    square = ssao_sat__dot(d, d);
+    height = ssao_sat__dot(d, p->n);
+    if (s->geometric) height = sat__f32x4_min(height, ssao_sat__dot(d, p->surface));
+    share = sat__f32x4_sub(one, sat__f32x4_mul(square, l->falloff));
+    share = ssao_sat__if_positive(height, sat__f32x4_mul(sat__f32x4_max(zero, share), count));
     if (!ssao_sat__any_positive(share)) return;
-    length = ssao_sat__sqrt(ssao_sat__max(square, p->least));
-    inverse = ssao_sat__div(one, length);
-    sine = ssao_sat__max(zero, ssao_sat__sub(ssao_sat__mul(height, inverse), l->bias));
-    length = ssao_sat__mul(length, l->inverse_radius);
-    length = ssao_sat__min(length, ssao_sat__set(2)); /* the share is 0 from fit.range on: no overflow beyond */
-    part = ssao_sat__mul(sine, ssao_sat__cubic(c->term + 8, length));
-    part = ssao_sat__mul(sine, ssao_sat__add(part, ssao_sat__cubic(c->term + 4, length)));
-    part = ssao_sat__mul(sine, ssao_sat__add(part, ssao_sat__cubic(c->term, length)));
-    part = ssao_sat__mul(ssao_sat__mul(part, share), c->weight[group]);
-    p->occlusion[group] = ssao_sat__add(p->occlusion[group], part);
+    length = sat__f32x4_sqrt(sat__f32x4_max(square, p->least));
+    inverse = sat__f32x4_div(one, length);
+    sine = sat__f32x4_max(zero, sat__f32x4_sub(sat__f32x4_mul(height, inverse), l->bias));
+    length = sat__f32x4_mul(length, l->inverse_radius);
+    length = sat__f32x4_min(length, sat__f32x4_set1(2)); /* the share is 0 from fit.range on: no overflow beyond */
+    part = sat__f32x4_mul(sine, ssao_sat__cubic(c->term + 8, length));
+    part = sat__f32x4_mul(sine, sat__f32x4_add(part, ssao_sat__cubic(c->term + 4, length)));
+    part = sat__f32x4_mul(sine, sat__f32x4_add(part, ssao_sat__cubic(c->term, length)));
+    part = sat__f32x4_mul(sat__f32x4_mul(part, share), c->weight[group]);
+    p->occlusion[group] = sat__f32x4_add(p->occlusion[group], part);
 #ifndef SSAO_SAT_NO_BENT
-    if (s->bent_wanted) {
-        part = ssao_sat__mul(part, inverse);
-        p->blocked[group][0] = ssao_sat__add(p->blocked[group][0], ssao_sat__mul(part, dx));
-        p->blocked[group][1] = ssao_sat__add(p->blocked[group][1], ssao_sat__mul(part, dy));
-        p->blocked[group][2] = ssao_sat__add(p->blocked[group][2], ssao_sat__mul(part, dz));
+    if (s->to.bent) {
+        part = sat__f32x4_mul(part, inverse);
+        p->blocked[group][0] = sat__f32x4_add(p->blocked[group][0], sat__f32x4_mul(part, d[0]));
+        p->blocked[group][1] = sat__f32x4_add(p->blocked[group][1], sat__f32x4_mul(part, d[1]));
+        p->blocked[group][2] = sat__f32x4_add(p->blocked[group][2], sat__f32x4_mul(part, d[2]));
     }
 #endif
 }
 
 /* Sixteen table entries make the sums over eight cells of one slab. */
 static inline void ssao_sat__add_slab(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__lanes *l,
-                                      const ssao_sat__cells *c, int k)
+                                      const ssao_sat__cells *c)
 {
-    const uint32_t *table = s->table + 4 * (size_t)k * s->table_plane, *row[4];
-    ssao_sat__i band[3][4], upper, lower;
-    ssao_sat__f corners[4], sides[4];
+    const uint32_t *table = s->table + 4 * (size_t)c->slab * s->table_plane, *row[4];
+    sat__i32x4 band[3][4], upper, lower;
+    sat__f32x4 corners[4], sides[4];
     size_t column[4];
     int j, t;
     for (t = 0; t < 4; t++) {
-        column[t] = 4 * (size_t)c->column[t];
-        row[t] = table + 4 * (size_t)(c->row[t] - s->first) * s->table_stride;
+        column[t] = 4 * (size_t)c->column.border[t];
+        row[t] = table + 4 * (size_t)(c->row.border[t] - s->first) * s->table_stride;
     }
     if (row[3][column[3]] - row[3][column[0]] == row[0][column[3]] - row[0][column[0]])
         return; /* no pixel of the slab in sight */
     for (t = 0; t < 4; t++) {
-        upper = ssao_sat__load_i(row[0] + column[t]);
+        upper = ssao_sat__load_words(row[0] + column[t]);
         for (j = 0; j < 3; j++, upper = lower) {
-            lower = ssao_sat__load_i(row[j + 1] + column[t]);
-            band[j][t] = ssao_sat__sub_i(lower, upper);
+            lower = ssao_sat__load_words(row[j + 1] + column[t]);
+            band[j][t] = sat__i32x4_sub(lower, upper);
         }
     }
-#define SSAO_SAT__CELL(j, t) ssao_sat__to_f(ssao_sat__sub_i(band[j][(t) + 1], band[j][t]))
+#define SSAO_SAT__CELL(j, t) sat__i32x4_to_f32(sat__i32x4_sub(band[j][(t) + 1], band[j][t]))
     corners[0] = SSAO_SAT__CELL(0, 0);
     corners[1] = SSAO_SAT__CELL(0, 2);
     corners[2] = SSAO_SAT__CELL(2, 0);
@@ -1546,40 +1575,40 @@ static inline void ssao_sat__add_slab(ssao_sat__point *p, const ssao_sat *s, con
     sides[2] = SSAO_SAT__CELL(1, 2);
     sides[3] = SSAO_SAT__CELL(2, 1);
 #undef SSAO_SAT__CELL
-    ssao_sat__add_occluders(p, s, l, k, corners, 0, c);
-    ssao_sat__add_occluders(p, s, l, k, sides, 1, c);
+    ssao_sat__add_occluders(p, s, l, c, corners, 0);
+    ssao_sat__add_occluders(p, s, l, c, sides, 1);
 }
 
 /* Borders of the cells along one axis: [at - outer, at - inner) [at - inner, at + inner] (at + inner, at + outer], and
    what a pixel of the picture weighs in them. What the picture's border takes from a side goes to the middle, less for
    being farther off: as if the surroundings went on beyond the border, without a jump where a cell leaves the
    picture. */
-static inline void ssao_sat__cut_axis(int *border, float *weight, int at, int inner, int outer, int end, int step,
-                                      int pixels)
+static inline void ssao_sat__cut_axis(ssao_sat__cut *c, int at, ssao_sat__ring r, int end, int step, int pixels)
 {
-    float first, last, length = (float)(outer - inner);
+    float first, last, length = (float)(r.outer - r.inner);
     int t;
-    border[0] = sat__max_int(at - outer, 0);
-    border[1] = sat__max_int(at - inner, 0);
-    border[2] = sat__min_int(at + inner + 1, end);
-    border[3] = sat__min_int(at + outer + 1, end);
+    c->border[0] = sat__max_int(at - r.outer, 0);
+    c->border[1] = sat__max_int(at - r.inner, 0);
+    c->border[2] = sat__min_int(at + r.inner + 1, end);
+    c->border[3] = sat__min_int(at + r.outer + 1, end);
     for (t = 0; t < 3; t++) {
-        int count = sat__min_int(border[t + 1] * step, pixels) - border[t] * step;
-        weight[t] = count > 0 ? 1 / (float)count : 0;
+        int count = sat__min_int(c->border[t + 1] * step, pixels) - c->border[t] * step;
+        c->weight[t] = count > 0 ? 1 / (float)count : 0;
     }
-    if (border[0] == at - outer && border[3] == at + outer + 1) return;
-    first = (float)(border[1] - border[0]) / length;
-    last = (float)(border[3] - border[2]) / length;
-    weight[0] *= first;
-    weight[1] *= 1 + SSAO_SAT__BEYOND * (2 - first - last);
-    weight[2] *= last;
+    if (c->border[0] == at - r.outer && c->border[3] == at + r.outer + 1) return;
+    first = (float)(c->border[1] - c->border[0]) / length;
+    last = (float)(c->border[3] - c->border[2]) / length;
+    c->weight[0] *= first;
+    c->weight[1] *= 1 + SSAO_SAT__BEYOND * (2 - first - last);
+    c->weight[2] *= last;
 }
 
-static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, int y, const int *inner, const int *outer)
+static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, int y, const ssao_sat__ring *ring)
 {
-    float u[3], v[3], corners[4], sides[4];
-    ssao_sat__cut_axis(c->column, u, x, inner[0], outer[0], s->columns, s->step, s->width);
-    ssao_sat__cut_axis(c->row, v, y, inner[1], outer[1], s->rows, s->step, s->height);
+    const float *u = c->column.weight, *v = c->row.weight;
+    float corners[4], sides[4];
+    ssao_sat__cut_axis(&c->column, x, ring[0], s->columns, s->step, s->width);
+    ssao_sat__cut_axis(&c->row, y, ring[1], s->rows, s->step, s->height);
     corners[0] = u[0] * v[0];
     corners[1] = u[2] * v[0];
     corners[2] = u[0] * v[2];
@@ -1588,16 +1617,16 @@ static void ssao_sat__cut_cells(ssao_sat__cells *c, const ssao_sat *s, int x, in
     sides[1] = u[0] * v[1];
     sides[2] = u[2] * v[1];
     sides[3] = u[1] * v[2];
-    c->weight[0] = ssao_sat__load(corners);
-    c->weight[1] = ssao_sat__load(sides);
+    c->weight[0] = sat__f32x4_load(corners);
+    c->weight[1] = sat__f32x4_load(sides);
 }
 
 /* Can anything of the slab within the ring rise above the tangent plane by more than the bias? Its height is at most
    that of a corner of the frustum that holds it, and its distance at least that along the axis. */
-static inline int ssao_sat__may_occlude(const ssao_sat__point *p, const ssao_sat *s, const int *outer, int k)
+static inline int ssao_sat__may_occlude(const ssao_sat__point *p, const ssao_sat *s, const ssao_sat__ring *ring, int k)
 {
     float low = s->edge[k], high = s->edge[k + 1],
-          spread = p->slope[0] * (float)(outer[0] + 1) + p->slope[1] * (float)(outer[1] + 1);
+          spread = p->slope[0] * (float)(ring[0].outer + 1) + p->slope[1] * (float)(ring[1].outer + 1);
     float distance, height;
     if (k == 0 && s->band_nearest < low) low = s->band_nearest; /* the end slabs hold all that is beyond */
     if (k == s->frame_slabs - 1 && s->band_farthest > high) high = s->band_farthest;
@@ -1611,49 +1640,53 @@ static void ssao_sat__set_lanes(ssao_sat__lanes *l, const ssao_sat *s)
 {
     const ssao_sat__kernel *kernel = &ssao_sat__kernels[s->options.scales - 1];
     int first, last, ring, i;
-    l->ax = ssao_sat__set((float)s->camera.full[0]);
-    l->bx = ssao_sat__set(s->camera.bx);
-    l->ay = ssao_sat__set((float)s->camera.full[2]);
-    l->by = ssao_sat__set(s->camera.by);
-    l->falloff = ssao_sat__set(1 / (s->range * s->range));
-    l->inverse_radius = ssao_sat__set(1 / s->radius);
-    l->bias = ssao_sat__set(s->fit.bias);
+    l->ax = sat__f32x4_set1((float)s->camera.full[0]);
+    l->bx = sat__f32x4_set1(s->camera.bx);
+    l->ay = sat__f32x4_set1((float)s->camera.full[2]);
+    l->by = sat__f32x4_set1(s->camera.by);
+    l->falloff = sat__f32x4_set1(1 / (s->range * s->range));
+    l->inverse_radius = sat__f32x4_set1(1 / s->radius);
+    l->bias = sat__f32x4_set1(s->fit.bias);
     for (i = 0; i < s->frame_slabs; i++) {
-        l->low[i] = ssao_sat__set(s->slabs[i].low);
-        l->quantum[i] = ssao_sat__set(s->slabs[i].quantum);
+        l->low[i] = sat__f32x4_set1(s->slabs[i].low);
+        l->quantum[i] = sat__f32x4_set1(s->slabs[i].quantum);
     }
     for (first = 0; first < s->options.scales; first++)
         for (last = first; last < s->options.scales; last++)
             for (i = 0; i < SSAO_SAT__TERMS; i++) {
                 float term = 0;
                 for (ring = first; ring <= last; ring++) term += kernel->term[ring][i];
-                l->term[first][last][i] = ssao_sat__set(term);
+                l->term[first][last][i] = sat__f32x4_set1(term);
             }
 }
 
-/* The first `rings` rings around the point; those that round to the same pixels are looked up once. */
-static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__lanes *l, float half_side,
-                                int rings, int first_slab, int end_slab)
+static inline ssao_sat__ring ssao_sat__ring_of(float r)
 {
-    float r = half_side;
-    int inner[2], outer[2], next[2][2], ring, first = 0, k;
+    ssao_sat__ring ring;
+    ring.inner = sat__max_int(1, (int)(r / 3 + 0.5f));
+    ring.outer = sat__max_int(ring.inner + 1, (int)(r + 0.5f));
+    return ring;
+}
+
+/* The first `rings` rings around the point; those that round to the same pixels are looked up once. */
+static void ssao_sat__add_rings(ssao_sat__point *p, const ssao_sat *s, const ssao_sat__lanes *l, int rings)
+{
+    float r = p->half_side;
+    ssao_sat__ring now[2], next[2];
+    int ring, first = 0;
     ssao_sat__cells cells;
     for (ring = 0; ring <= rings; ring++, r *= 1 / 3.0f) {
-        next[0][0] = sat__max_int(1, (int)(r / 3 + 0.5f));
-        next[1][0] = sat__max_int(next[0][0] + 1, (int)(r + 0.5f));
-        next[0][1] = sat__max_int(1, (int)(r * s->camera.aspect / 3 + 0.5f));
-        next[1][1] = sat__max_int(next[0][1] + 1, (int)(r * s->camera.aspect + 0.5f));
-        if (ring > 0 && (ring == rings || memcmp(next[0], inner, sizeof inner) ||
-                         memcmp(next[1], outer, sizeof outer))) {
-            ssao_sat__cut_cells(&cells, s, p->x, p->y, inner, outer);
+        next[0] = ssao_sat__ring_of(r);
+        next[1] = ssao_sat__ring_of(r * s->camera.aspect);
+        if (ring > 0 && (ring == rings || memcmp(next, now, sizeof now))) {
+            ssao_sat__cut_cells(&cells, s, p->x, p->y, now);
             cells.term = l->term[first][ring - 1];
-            for (k = first_slab; k < end_slab; k++)
-                if (s->used_slabs >> k & 1 && ssao_sat__may_occlude(p, s, outer, k))
-                    ssao_sat__add_slab(p, s, l, &cells, k);
+            for (cells.slab = p->first_slab; cells.slab < p->end_slab; cells.slab++)
+                if (s->used_slabs >> cells.slab & 1 && ssao_sat__may_occlude(p, s, now, cells.slab))
+                    ssao_sat__add_slab(p, s, l, &cells);
             first = ring;
         }
-        memcpy(inner, next[0], sizeof inner);
-        memcpy(outer, next[1], sizeof outer);
+        memcpy(now, next, sizeof now);
     }
 }
 
@@ -1667,10 +1700,10 @@ static inline float ssao_sat__by_facing(const ssao_sat *s, const ssao_sat__point
     return cosine < 0.5f ? 1 + (kernel->grazing - 1) * (1 - 2 * cosine) : 1 + (kernel->facing - 1) * (2 * cosine - 1);
 }
 
-static inline float ssao_sat__sum_lanes(ssao_sat__f a, ssao_sat__f b)
+static inline float ssao_sat__sum_lanes(sat__f32x4 a, sat__f32x4 b)
 {
     float v[4];
-    ssao_sat__store(v, ssao_sat__add(a, b));
+    sat__f32x4_store(v, sat__f32x4_add(a, b));
     return (v[0] + v[1]) + (v[2] + v[3]);
 }
 
@@ -1680,17 +1713,21 @@ static inline float ssao_sat__sum_lanes(ssao_sat__f a, ssao_sat__f b)
 static void ssao_sat__store_blocked(const ssao_sat *s, const ssao_sat__point *p, size_t at, float gain)
 {
     int c;
-    for (c = 0; c < 3; c++) s->blocked[c][at] = gain * ssao_sat__sum_lanes(p->blocked[0][c], p->blocked[1][c]);
+    for (c = 0; c < 3; c++) s->work.blocked[c][at] = gain * ssao_sat__sum_lanes(p->blocked[0][c], p->blocked[1][c]);
 }
 #endif
 
 /* Is everything in sight one plane? */
 static inline int ssao_sat__is_flat(const ssao_sat *s, int x, int y, float half_side)
 {
-    int rx = (int)(half_side + 0.5f) + 2, ry = (int)(half_side * s->camera.aspect + 0.5f) + 2;
-    return s->options.skip_flat &&
-           ssao_sat__box(s, s->flags, 1, sat__max_int(x - rx, 0), sat__max_int(y - ry, 0),
-                         sat__min_int(x + rx + 1, s->columns), sat__min_int(y + ry + 1, s->rows)) == 0;
+    const int rx = (int)(half_side + 0.5f) + 2, ry = (int)(half_side * s->camera.aspect + 0.5f) + 2;
+    ssao_sat__rect r;
+    if (!s->options.skip_flat) return 0;
+    r.x0 = sat__max_int(x - rx, 0);
+    r.y0 = sat__max_int(y - ry, 0);
+    r.x1 = sat__min_int(x + rx + 1, s->columns);
+    r.y1 = sat__min_int(y + ry + 1, s->rows);
+    return ssao_sat__box(s, s->flags, 1, r) == 0;
 }
 
 /* How many rings, from the outermost on, have anything but one plane in sight. */
@@ -1703,66 +1740,74 @@ static inline int ssao_sat__ring_count(const ssao_sat *s, int x, int y, float ha
 
 static void ssao_sat__set_point(ssao_sat__point *p, const ssao_sat *s, int x, int y, size_t at)
 {
-    float z = s->z[at], scale = s->camera.orthographic ? 1 : z;
+    const float z = s->work.z[at], scale = s->camera.orthographic ? 1 : z, nx = s->work.nx[at], ny = s->work.ny[at];
+    const float rx = s->camera.ax * (float)x + s->camera.bx, ry = s->camera.ay * (float)y + s->camera.by;
     int i;
     p->x = x;
     p->y = y;
     p->z = z;
-    p->facing = s->nz[at];
-    if (!s->camera.orthographic)
-        p->facing +=
-            s->nx[at] * (s->camera.ax * (float)x + s->camera.bx) + s->ny[at] * (s->camera.ay * (float)y + s->camera.by);
-    p->slope[0] = fabsf(s->nx[at] * s->camera.ax);
-    p->slope[1] = fabsf(s->ny[at] * s->camera.ay);
-    p->px = ssao_sat__set((s->camera.ax * (float)x + s->camera.bx) * scale);
-    p->py = ssao_sat__set((s->camera.ay * (float)y + s->camera.by) * scale);
-    p->pz = ssao_sat__set(z);
-    p->least = ssao_sat__set(z * z * 1e-12f + 1e-37f);
-    p->nx = ssao_sat__set(s->nx[at]);
-    p->ny = ssao_sat__set(s->ny[at]);
-    p->nz = ssao_sat__set(s->nz[at]);
-    p->occlusion[0] = p->occlusion[1] = ssao_sat__set(0);
+    p->facing = s->work.nz[at];
+    if (!s->camera.orthographic) p->facing += nx * rx + ny * ry;
+    p->slope[0] = fabsf(nx * s->camera.ax);
+    p->slope[1] = fabsf(ny * s->camera.ay);
+    p->at[0] = sat__f32x4_set1(rx * scale);
+    p->at[1] = sat__f32x4_set1(ry * scale);
+    p->at[2] = sat__f32x4_set1(z);
+    p->least = sat__f32x4_set1(z * z * 1e-12f + 1e-37f);
+    p->n[0] = sat__f32x4_set1(nx);
+    p->n[1] = sat__f32x4_set1(ny);
+    p->n[2] = sat__f32x4_set1(s->work.nz[at]);
+    p->occlusion[0] = p->occlusion[1] = sat__f32x4_set1(0);
     for (i = 0; i < 6; i++) p->blocked[i / 3][i % 3] = p->occlusion[0];
 }
 
-/* Occlusion of one pixel of the tables from the slabs that meet [z - range, z + range]. */
+/* The slabs that meet [z - range, z + range], and what the statistics say of the pixel. */
+static inline void ssao_sat__set_reach(ssao_sat__point *p, const ssao_sat *s, ssao_sat_stats *stats)
+{
+    const int side_x = (int)p->half_side + 1, side_y = (int)(p->half_side * s->camera.aspect) + 1;
+    int k;
+    p->first_slab = 0;
+    p->end_slab = s->frame_slabs;
+    while (p->first_slab < p->end_slab - 1 && s->edge[p->first_slab + 1] < p->z - s->range) p->first_slab++;
+    while (p->end_slab > p->first_slab + 1 && s->edge[p->end_slab - 1] > p->z + s->range) p->end_slab--;
+    for (k = 0; k < s->frame_slabs; k++)
+        if (k >= p->first_slab && k < p->end_slab && s->used_slabs >> k & 1) stats->slabs_visited++;
+        else stats->slabs_skipped++;
+    stats->border +=
+        p->x < side_x || p->y < side_y || p->x + side_x >= s->columns || p->y + side_y >= s->rows;
+    stats->estimated++;
+}
+
+/* Occlusion of one pixel of the tables. */
 static void ssao_sat__estimate_slabs(ssao_sat *s, const ssao_sat__lanes *l, int x, int y, ssao_sat_stats *stats)
 {
     size_t at = ssao_sat__at(s, y) + (size_t)x;
     ssao_sat__point p;
-    float half_side, fade, z = s->z[at];
-    int k, first = 0, end = s->frame_slabs, cut, side_x, side_y;
-    s->open[at] = 1;
+    float fade, z = s->work.z[at];
+    int cut;
+    s->work.open[at] = 1;
     if (!(z > 0)) { stats->sky++; return; }
-    half_side = ssao_sat__half_side(s, z, &cut);
-    fade = ssao_sat__fade(s, half_side);
     ssao_sat__set_point(&p, s, x, y, at);
+    p.half_side = ssao_sat__half_side(s, z, &cut);
+    fade = ssao_sat__fade(s, p.half_side);
     stats->cut += (size_t)cut;
     if (!(fade > 0)) stats->tiny++;
-    else if (ssao_sat__is_flat(s, x, y, half_side)) stats->flat++;
+    else if (ssao_sat__is_flat(s, x, y, p.half_side)) stats->flat++;
     else {
-        while (first < end - 1 && s->edge[first + 1] < z - s->range) first++;
-        while (end > first + 1 && s->edge[end - 1] > z + s->range) end--;
-        for (k = 0; k < s->frame_slabs; k++)
-            if (k >= first && k < end && s->used_slabs >> k & 1) stats->slabs_visited++;
-            else stats->slabs_skipped++;
-        side_x = (int)half_side + 1;
-        side_y = (int)(half_side * s->camera.aspect) + 1;
-        stats->border += x < side_x || y < side_y || x + side_x >= s->columns || y + side_y >= s->rows;
-        stats->estimated++;
+        ssao_sat__set_reach(&p, s, stats);
         if (s->geometric) {
             ssao_sat__vector n = ssao_sat__depth_normal(s, x * s->step, y * s->step, z);
-            p.surface[0] = ssao_sat__set(n.x);
-            p.surface[1] = ssao_sat__set(n.y);
-            p.surface[2] = ssao_sat__set(n.z);
+            p.surface[0] = sat__f32x4_set1(n.x);
+            p.surface[1] = sat__f32x4_set1(n.y);
+            p.surface[2] = sat__f32x4_set1(n.z);
         }
-        ssao_sat__add_rings(&p, s, l, half_side, ssao_sat__ring_count(s, x, y, half_side), first, end);
+        ssao_sat__add_rings(&p, s, l, ssao_sat__ring_count(s, x, y, p.half_side));
         fade *= ssao_sat__by_facing(s, &p);
-        s->open[at] =
+        s->work.open[at] =
             ssao_sat__accessibility(s, ssao_sat__sum_lanes(p.occlusion[0], p.occlusion[1]), fade * s->fit.gain);
     }
 #ifndef SSAO_SAT_NO_BENT
-    if (s->bent_wanted) ssao_sat__store_blocked(s, &p, at, fade * s->fit.gain * SSAO_SAT__BLOCKED);
+    if (s->to.bent) ssao_sat__store_blocked(s, &p, at, fade * s->fit.gain * SSAO_SAT__BLOCKED);
 #endif
 }
 #endif /* SSAO_SAT_NO_SLABS */
@@ -1777,17 +1822,24 @@ typedef struct ssao_sat__region {
     int x[5], y[5];
     uint32_t corner[5][5];
     int fine; /* all 25 are there */
+    ssao_sat_stats *stats; /* counts the lookups */
 } ssao_sat__region;
 
+/* A pixel of the tables: its centre in them, its ray (0, 0 in orthographic views). */
+typedef struct ssao_sat__pixel {
+    float x, y, z, ray_x, ray_y, half_side;
+    ssao_sat__vector n;
+} ssao_sat__pixel;
+
 /* Looks up the corners at multiples of `step`, except those at multiples of `have`. */
-static void ssao_sat__look_up(ssao_sat__region *r, const ssao_sat *s, int step, int have, ssao_sat_stats *stats)
+static void ssao_sat__look_up(ssao_sat__region *r, const ssao_sat *s, int step, int have)
 {
     int i, j;
     for (j = 0; j < 5; j += step)
         for (i = 0; i < 5; i += step) {
             if (have && i % have == 0 && j % have == 0) continue;
             r->corner[j][i] = s->table[(size_t)(r->y[j] - s->first) * s->table_stride + (size_t)r->x[i]];
-            stats->lookups++;
+            r->stats->lookups++;
         }
 }
 
@@ -1797,8 +1849,9 @@ static inline int ssao_sat__round(float v)
     return (int)rounded;
 }
 
-static void ssao_sat__set_region(ssao_sat__region *r, const ssao_sat *s, float cx, float cy, float half_x, float half_y)
+static void ssao_sat__set_region(ssao_sat__region *r, const ssao_sat *s, float cx, float cy, float half_x)
 {
+    const float half_y = half_x * s->camera.aspect;
     float x0 = cx - half_x, x1 = cx + half_x, y0 = cy - half_y, y1 = cy + half_y;
     r->x[0] = sat__clamp_int(ssao_sat__round(x0), 0, s->columns - 1);
     r->y[0] = sat__clamp_int(ssao_sat__round(y0), 0, s->rows - 1);
@@ -1813,15 +1866,17 @@ static void ssao_sat__set_region(ssao_sat__region *r, const ssao_sat *s, float c
     r->fine = 0;
 }
 
-static inline float ssao_sat__area(const ssao_sat__region *r, int i0, int j0, int i1, int j1)
+/* Parts of a region: from corner (i, j) on, `step` of the 4 x 4 parts along both axes. */
+static inline float ssao_sat__area(const ssao_sat__region *r, int i, int j, int step)
 {
-    return (float)((r->x[i1] - r->x[i0]) * (r->y[j1] - r->y[j0]));
+    return (float)((r->x[i + step] - r->x[i]) * (r->y[j + step] - r->y[j]));
 }
 
 /* Mean of the table's values over part of the region, of area > 0. */
-static float ssao_sat__mean(const ssao_sat__region *r, const ssao_sat *s, int i0, int j0, int i1, int j1)
+static float ssao_sat__mean(const ssao_sat__region *r, const ssao_sat *s, int i0, int j0, int step)
 {
-    float area = ssao_sat__area(r, i0, j0, i1, j1);
+    const int i1 = i0 + step, j1 = j0 + step;
+    float area = ssao_sat__area(r, i0, j0, step);
     uint32_t a = r->corner[j0][i0], b = r->corner[j0][i1], c = r->corner[j1][i0], d = r->corner[j1][i1];
     if (s->options.float_table)
         return s->mean +
@@ -1839,26 +1894,25 @@ static float ssao_sat__deficit(const ssao_sat *s, float mean, float z)
 #ifndef SSAO_SAT_NO_REFINED
 /* Eq 5.4 over the children of one node: those that are nearer than their parent, weighted by area. As printed (E:
    "higher", where 5.4.1 calls higher values farther away) the others are kept. No child passes: the parent. */
-static float ssao_sat__refine(ssao_sat__region *r, const ssao_sat *s, float z, int i0, int j0, int step, int level,
-                              ssao_sat_stats *stats)
+static float ssao_sat__refine(ssao_sat__region *r, const ssao_sat *s, float z, int i0, int j0, int level)
 {
-    float parent_mean = ssao_sat__mean(r, s, i0, j0, i0 + 2 * step, j0 + 2 * step),
-          parent = ssao_sat__deficit(s, parent_mean, z);
+    const int step = level ? 1 : 2; /* of the children */
+    float parent_mean = ssao_sat__mean(r, s, i0, j0, 2 * step), parent = ssao_sat__deficit(s, parent_mean, z);
     float sum = 0, weight = 0;
     int i, j;
     if (level >= s->options.refine_levels || fabsf(parent) >= (float)s->options.refine_threshold * z) return parent;
     if (r->x[i0 + 2 * step] - r->x[i0] < 2 || r->y[j0 + 2 * step] - r->y[j0] < 2) return parent;
-    if (level == 0) ssao_sat__look_up(r, s, 2, 4, stats);
+    if (level == 0) ssao_sat__look_up(r, s, 2, 4);
     else if (!r->fine) {
-        ssao_sat__look_up(r, s, 1, 2, stats);
+        ssao_sat__look_up(r, s, 1, 2);
         r->fine = 1;
     }
     for (j = j0; j < j0 + 2 * step; j += step)
         for (i = i0; i < i0 + 2 * step; i += step) {
-            float mean = ssao_sat__mean(r, s, i, j, i + step, j + step), child = ssao_sat__deficit(s, mean, z);
-            float area = ssao_sat__area(r, i, j, i + step, j + step);
+            float mean = ssao_sat__mean(r, s, i, j, step), child = ssao_sat__deficit(s, mean, z);
+            float area = ssao_sat__area(r, i, j, step);
             if (!(s->options.as_printed ? mean > parent_mean : child > parent)) continue;
-            if (step == 2) child = ssao_sat__refine(r, s, z, i, j, 1, level + 1, stats);
+            if (level == 0) child = ssao_sat__refine(r, s, z, i, j, 1);
             sum += area * child;
             weight += area;
         }
@@ -1867,29 +1921,28 @@ static float ssao_sat__refine(ssao_sat__region *r, const ssao_sat *s, float z, i
 #endif
 
 /* Where the region is centred: moved along the projected normal (5.4.2). A normal n at P moves its point along
-   n.xy - n.z P.xy / P.z on the screen; the text's n.xy is right in orthographic views. */
-static void ssao_sat__guide(const ssao_sat *s, const ssao_sat__vector *n, float rx, float ry, float half_side,
-                            float *cx, float *cy)
+   n.xy - n.z P.xy / P.z on the screen; the text's n.xy is right in orthographic views. PLANE: along n.xy too. */
+static inline void ssao_sat__guide(const ssao_sat *s, const ssao_sat__pixel *p, float *cx, float *cy)
 {
-    float straight = s->options.as_printed || s->camera.orthographic ? 0 : n->z, length;
-    float dx = (n->x - straight * rx) * (s->camera.ax > 0 ? 1.0f : -1.0f),
-          dy = (n->y - straight * ry) * (s->camera.ay > 0 ? 1.0f : -1.0f);
-    float offset = (float)s->options.normal_offset * half_side;
-    length = dx * dx + dy * dy;
-    if (length > 1) offset /= sqrtf(length);
+    const int plane = s->options.method == SSAO_SAT_PLANE;
+    float straight = s->options.as_printed || s->camera.orthographic || plane ? 0 : p->n.z;
+    float dx = (p->n.x - straight * p->ray_x) * (s->camera.ax > 0 ? 1.0f : -1.0f),
+          dy = (p->n.y - straight * p->ray_y) * (s->camera.ay > 0 ? 1.0f : -1.0f);
+    float offset = (plane ? 1 : (float)s->options.normal_offset) * p->half_side, length = dx * dx + dy * dy;
+    if (length > 1 && !plane) offset /= sqrtf(length);
     *cx += dx * offset;
     *cy += dy * offset * s->camera.aspect;
 }
 
-static float ssao_sat__published(const ssao_sat *s, ssao_sat__region *r, float z, ssao_sat_stats *stats)
+static inline float ssao_sat__published(const ssao_sat *s, ssao_sat__region *r, float z)
 {
     float deficit, gain = 1;
-    ssao_sat__look_up(r, s, 4, 0, stats);
+    ssao_sat__look_up(r, s, 4, 0);
 #ifndef SSAO_SAT_NO_REFINED
-    if (s->options.method == SSAO_SAT_REFINED) deficit = ssao_sat__refine(r, s, z, 0, 0, 2, 0, stats);
+    if (s->options.method == SSAO_SAT_REFINED) deficit = ssao_sat__refine(r, s, z, 0, 0, 0);
     else
 #endif
-        deficit = ssao_sat__deficit(s, ssao_sat__mean(r, s, 0, 0, 4, 4), z);
+        deficit = ssao_sat__deficit(s, ssao_sat__mean(r, s, 0, 0, 4), z);
     if (s->farthest > s->nearest) gain += (float)s->options.depth_gain * (z - s->nearest) / (s->farthest - s->nearest);
     return deficit > 0 ? gain * deficit / s->radius : 0;
 }
@@ -1905,36 +1958,32 @@ static inline float ssao_sat__plane_mean(float centre, float spread)
 /* Height of the mean over the tangent plane, for each of the boxes. In perspective the plane is 1/z = n.ray / n.P, in
    orthographic views z itself is affine: both are compared at the centre of the box, where their mean over the box
    lies. */
-static float ssao_sat__over_plane(const ssao_sat *s, ssao_sat__region *r, const ssao_sat__vector *n, float x, float y,
-                                  float z, float rx, float ry, ssao_sat_stats *stats)
+static inline float ssao_sat__over_plane(const ssao_sat *s, ssao_sat__region *r, const ssao_sat__pixel *p)
 {
-    float gx, gy, own, to_height, sum = 0;
+    float gx, gy, own, to_height, sum = 0, facing = p->n.x * p->ray_x + p->n.y * p->ray_y + p->n.z; /* n.P / z */
     int i, j, step = s->options.plane_boxes == 2 ? 2 : 4;
+    if (facing > -SSAO_SAT__GRAZING) facing = -SSAO_SAT__GRAZING;
     if (s->camera.orthographic) {
-        float facing = n->z < -1e-3f ? n->z : -1e-3f;
-        gx = n->x / facing * s->camera.ax;
-        gy = n->y / facing * s->camera.ay;
-        own = s->farthest - z;
+        gx = p->n.x / facing * s->camera.ax;
+        gy = p->n.y / facing * s->camera.ay;
+        own = s->farthest - p->z;
         to_height = -facing / s->radius;
     } else {
-        float facing = n->x * rx + n->y * ry + n->z; /* n.P / z; grazing and back-facing normals count as nearly
-                                                        grazing */
-        if (facing > -1e-3f) facing = -1e-3f;
-        gx = n->x * s->camera.ax / (facing * z);
-        gy = n->y * s->camera.ay / (facing * z);
-        own = 1 / z;
-        to_height = -facing * z * z / s->radius;
+        gx = p->n.x * s->camera.ax / (facing * p->z);
+        gy = p->n.y * s->camera.ay / (facing * p->z);
+        own = 1 / p->z;
+        to_height = -facing * p->z * p->z / s->radius;
     }
-    ssao_sat__look_up(r, s, step, 0, stats);
+    ssao_sat__look_up(r, s, step, 0);
     for (j = 0; j < 4; j += step)
         for (i = 0; i < 4; i += step) {
             float height, spread, cx = 0.5f * (float)(r->x[i] + r->x[i + step]),
                                   cy = 0.5f * (float)(r->y[j] + r->y[j + step]);
-            if (!(ssao_sat__area(r, i, j, i + step, j + step) > 0)) continue;
+            if (!(ssao_sat__area(r, i, j, step) > 0)) continue;
             spread =
                 0.5f * (fabsf(gx) * (float)(r->x[i + step] - r->x[i]) + fabsf(gy) * (float)(r->y[j + step] - r->y[j]));
-            height = (ssao_sat__mean(r, s, i, j, i + step, j + step) -
-                      ssao_sat__plane_mean(own + gx * (cx - x) + gy * (cy - y), spread)) *
+            height = (ssao_sat__mean(r, s, i, j, step) -
+                      ssao_sat__plane_mean(own + gx * (cx - p->x) + gy * (cy - p->y), spread)) *
                      to_height;
             if (height > 0) sum += height / (1 + s->fit.range * height * height);
         }
@@ -1942,81 +1991,95 @@ static float ssao_sat__over_plane(const ssao_sat *s, ssao_sat__region *r, const 
 }
 
 /* Mean depth of a region; harmonic where the table holds 1/z. */
-static float ssao_sat__mean_depth(const ssao_sat *s, ssao_sat__region *r, ssao_sat_stats *stats)
+static float ssao_sat__mean_depth(const ssao_sat *s, ssao_sat__region *r)
 {
     float mean;
     if (s->options.method == SSAO_SAT_SLABS) {
+        ssao_sat__rect rect;
         float affine = 0;
         uint32_t total = 0;
         int k;
+        rect.x0 = r->x[0];
+        rect.y0 = r->y[0];
+        rect.x1 = r->x[4];
+        rect.y1 = r->y[4];
         for (k = 0; k < s->frame_slabs; k++) {
             const uint32_t *table = s->table + 4 * (size_t)k * s->table_plane;
-            uint32_t count = ssao_sat__box(s, table, 4, r->x[0], r->y[0], r->x[4], r->y[4]);
-            uint32_t level = ssao_sat__box(s, table + 1, 4, r->x[0], r->y[0], r->x[4], r->y[4]);
+            uint32_t count = ssao_sat__box(s, table, 4, rect), level = ssao_sat__box(s, table + 1, 4, rect);
             affine += s->slabs[k].low * (float)count + s->slabs[k].quantum * (float)level;
             total += count;
-            stats->lookups += 8;
+            r->stats->lookups += 8;
         }
         mean = affine / (float)(total ? total : 1);
         return s->camera.orthographic ? mean : 1 / mean;
     }
-    ssao_sat__look_up(r, s, 4, 0, stats);
-    mean = ssao_sat__mean(r, s, 0, 0, 4, 4);
+    ssao_sat__look_up(r, s, 4, 0);
+    mean = ssao_sat__mean(r, s, 0, 0, 4);
     if (ssao_sat__table_is_inverse(s)) return 1 / mean;
     return s->options.method == SSAO_SAT_PLANE ? s->farthest - mean : mean;
+}
+
+static inline void ssao_sat__set_pixel(ssao_sat__pixel *p, const ssao_sat *s, int x, int y)
+{
+    const size_t at = ssao_sat__at(s, y) + (size_t)x;
+    const float perspective = s->camera.orthographic ? 0.0f : 1.0f;
+    p->x = (float)x + 0.5f;
+    p->y = (float)y + 0.5f;
+    p->z = s->work.z[at];
+    p->ray_x = (s->camera.ax * (float)x + s->camera.bx) * perspective;
+    p->ray_y = (s->camera.ay * (float)y + s->camera.by) * perspective;
+    p->n.x = s->work.nx[at];
+    p->n.y = s->work.ny[at];
+    p->n.z = s->work.nz[at];
 }
 
 /* One pixel of a single-table method, or of the signed output of any method. */
 static float ssao_sat__estimate_pixel(const ssao_sat *s, int x, int y, ssao_sat_stats *stats)
 {
-    size_t at = ssao_sat__at(s, y) + (size_t)x;
-    float z = s->z[at], cx = (float)x + 0.5f, cy = (float)y + 0.5f, half_side, fade;
-    float perspective = s->camera.orthographic ? 0.0f : 1.0f;
-    float rx = (s->camera.ax * (float)x + s->camera.bx) * perspective,
-          ry = (s->camera.ay * (float)y + s->camera.by) * perspective;
+    float cx, cy, fade, half_y, v;
     ssao_sat__region region;
-    ssao_sat__vector n;
+    ssao_sat__pixel p;
     int cut;
-    if (!(z > 0)) { stats->sky++; return s->is_signed ? 0.0f : 1.0f; }
-    half_side = ssao_sat__half_side(s, z, &cut);
-    fade = ssao_sat__fade(s, half_side);
-    if (!(fade > 0)) { stats->tiny++; return s->is_signed ? 0.0f : 1.0f; }
+    ssao_sat__set_pixel(&p, s, x, y);
+    if (!(p.z > 0)) { stats->sky++; return s->to.is_signed ? 0.0f : 1.0f; }
+    p.half_side = ssao_sat__half_side(s, p.z, &cut);
+    fade = ssao_sat__fade(s, p.half_side);
+    if (!(fade > 0)) { stats->tiny++; return s->to.is_signed ? 0.0f : 1.0f; }
     stats->cut += (size_t)cut;
     stats->estimated++;
-    n.x = s->nx[at];
-    n.y = s->ny[at];
-    n.z = s->nz[at];
-    if (!s->is_signed && (s->options.method == SSAO_SAT_NORMAL_GUIDED || s->options.method == SSAO_SAT_REFINED))
-        ssao_sat__guide(s, &n, rx, ry, half_side, &cx, &cy);
-    else if (!s->is_signed && s->options.method == SSAO_SAT_PLANE) {
-        cx += n.x * half_side * (s->camera.ax > 0 ? 1.0f : -1.0f);
-        cy += n.y * half_side * s->camera.aspect * (s->camera.ay > 0 ? 1.0f : -1.0f);
-    }
-    if (cx - half_side < 0 || cx + half_side > (float)s->columns || cy - half_side * s->camera.aspect < 0 ||
-        cy + half_side * s->camera.aspect > (float)s->rows) stats->border++;
-    ssao_sat__set_region(&region, s, cx, cy, half_side, half_side * s->camera.aspect);
-    if (s->is_signed) {
-        float v = fade * (float)s->options.gain * (ssao_sat__mean_depth(s, &region, stats) - z) / s->radius;
+    cx = p.x;
+    cy = p.y;
+    if (!s->to.is_signed && s->options.method != SSAO_SAT_MINIMALIST) ssao_sat__guide(s, &p, &cx, &cy);
+    half_y = p.half_side * s->camera.aspect;
+    stats->border += cx - p.half_side < 0 || cx + p.half_side > (float)s->columns || cy - half_y < 0 ||
+                     cy + half_y > (float)s->rows;
+    region.stats = stats;
+    ssao_sat__set_region(&region, s, cx, cy, p.half_side);
+    if (s->to.is_signed) {
+        v = fade * (float)s->options.gain * (ssao_sat__mean_depth(s, &region) - p.z) / s->radius;
         return v > 1 ? 1 : v > -1 ? v : -1;
     }
-    if (s->options.method == SSAO_SAT_PLANE)
-        return ssao_sat__accessibility(
-            s, ssao_sat__over_plane(s, &region, &n, (float)x + 0.5f, (float)y + 0.5f, z, rx, ry, stats),
-            fade * s->fit.gain);
-    return ssao_sat__accessibility(s, ssao_sat__published(s, &region, z, stats), fade * s->fit.gain);
+    v = s->options.method == SSAO_SAT_PLANE ? ssao_sat__over_plane(s, &region, &p)
+                                            : ssao_sat__published(s, &region, p.z);
+    return ssao_sat__accessibility(s, v, fade * s->fit.gain);
 }
 
 #ifndef SSAO_SAT_NO_SLABS
+/* Of the angle between the normals of two pixels. */
+static inline float ssao_sat__cosine(const ssao_sat__pixels *p, size_t a, size_t b)
+{
+    return p->nx[a] * p->nx[b] + p->ny[a] * p->ny[b] + p->nz[a] * p->nz[b];
+}
+
 /* Do the table pixels `offset` before and after this one lie on a plane with it, and agree? */
 static inline int ssao_sat__agrees(const ssao_sat *s, size_t at, ptrdiff_t offset, float z)
 {
     const size_t a = at - (size_t)offset, b = at + (size_t)offset;
     const float own = s->affine[at], bend = s->affine[a] + s->affine[b] - 2 * own;
-    if (!(s->z[a] > 0) || !(s->z[b] > 0)) return 0;
-    if (!(fabsf(s->open[a] - s->open[b]) <= (float)s->options.tolerance)) return 0;
+    if (!(s->work.z[a] > 0) || !(s->work.z[b] > 0)) return 0;
+    if (!(fabsf(s->work.open[a] - s->work.open[b]) <= (float)s->options.tolerance)) return 0;
     if (!(fabsf(bend) * (s->camera.orthographic ? 1 : z) <= SSAO_SAT__BEND * s->radius * own / z)) return 0;
-    return s->nx[at] * s->nx[a] + s->ny[at] * s->ny[a] + s->nz[at] * s->nz[a] > SSAO_SAT__ALIKE &&
-           s->nx[at] * s->nx[b] + s->ny[at] * s->ny[b] + s->nz[at] * s->nz[b] > SSAO_SAT__ALIKE;
+    return ssao_sat__cosine(&s->work, at, a) > SSAO_SAT__ALIKE && ssao_sat__cosine(&s->work, at, b) > SSAO_SAT__ALIKE;
 }
 
 /* A pixel between two or four of those `spacing` apart takes their mean where they agree. */
@@ -2025,18 +2088,18 @@ static int ssao_sat__interpolate(ssao_sat *s, int x, int y, int spacing, ssao_sa
     const int dx = x & spacing, dy = y & spacing;
     const size_t at = ssao_sat__at(s, y) + (size_t)x;
     const ptrdiff_t down = (ptrdiff_t)s->stride * dy, first = down + dx, second = down - dx;
-    const float z = s->z[at], tolerance = (float)s->options.tolerance;
+    const float z = s->work.z[at], tolerance = (float)s->options.tolerance;
     float *planes[4];
     int i, cut;
     if (!(z > 0) || x + dx >= s->columns || y + dy >= s->rows) return 0;
     if (spacing > 1 && ssao_sat__half_side(s, z, &cut) < SSAO_SAT__COARSE) return 0;
     if (!ssao_sat__agrees(s, at, first, z)) return 0;
-    if (dx && dy && (!(fabsf(s->open[at - (size_t)first] - s->open[at - (size_t)second]) <= tolerance) ||
+    if (dx && dy && (!(fabsf(s->work.open[at - (size_t)first] - s->work.open[at - (size_t)second]) <= tolerance) ||
                      !ssao_sat__agrees(s, at, second, z)))
         return 0;
-    planes[0] = s->open;
-    for (i = 0; i < 3; i++) planes[i + 1] = s->blocked[i];
-    for (i = 0; i < (s->bent_wanted ? 4 : 1); i++) {
+    planes[0] = s->work.open;
+    for (i = 0; i < 3; i++) planes[i + 1] = s->work.blocked[i];
+    for (i = 0; i < (s->to.bent ? 4 : 1); i++) {
         float *v = planes[i] + at, mean = 0.5f * (v[-first] + v[first]);
         if (dx && dy) mean = 0.5f * mean + 0.25f * (v[-second] + v[second]);
         *v = mean;
@@ -2065,20 +2128,20 @@ static void ssao_sat__estimate_rows(int begin, int end, int worker, void *contex
     int y, x;
 #ifndef SSAO_SAT_NO_SLABS
     ssao_sat__lanes lanes;
-    if (s->options.method == SSAO_SAT_SLABS && !s->is_signed) ssao_sat__set_lanes(&lanes, s);
+    if (s->options.method == SSAO_SAT_SLABS && !s->to.is_signed) ssao_sat__set_lanes(&lanes, s);
 #endif
     memset(&unused, 0, sizeof unused);
     for (y = s->estimated_first + begin; y < s->estimated_first + end; y++) {
         ssao_sat_stats *stats =
             y >= s->begin && y < s->end ? &s->workers[worker].stats : &unused; /* neighbours of the band count there */
 #ifndef SSAO_SAT_NO_SLABS
-        if (s->options.method == SSAO_SAT_SLABS && !s->is_signed) {
+        if (s->options.method == SSAO_SAT_SLABS && !s->to.is_signed) {
             ssao_sat__estimate_row(s, &lanes, y, stats);
             continue;
         }
 #endif
         for (x = 0; x < s->columns; x++)
-            s->open[ssao_sat__at(s, y) + (size_t)x] = ssao_sat__estimate_pixel(s, x, y, stats);
+            s->work.open[ssao_sat__at(s, y) + (size_t)x] = ssao_sat__estimate_pixel(s, x, y, stats);
     }
 }
 
@@ -2096,145 +2159,149 @@ static inline float *ssao_sat__out_row(void *out, ptrdiff_t stride, int y)
 /* A row of accessibility as the caller wants it. */
 static void ssao_sat__pack_row(const ssao_sat *s, int y, const float *row)
 {
-    void *out = ssao_sat__out_row(s->out, s->out_stride, y);
+    void *out = ssao_sat__out_row(s->to.out, s->to.stride, y);
     int x;
-    if (s->element == 4) memcpy(out, row, (size_t)s->width * sizeof *row);
-    for (x = 0; x < s->width && s->element == 2; x++) ((uint16_t *)out)[x] = sat__half_from_float(row[x]);
-    for (x = 0; x < s->width && s->element == 1; x++) ((uint8_t *)out)[x] = (uint8_t)(row[x] * 255 + 0.5f);
+    if (s->to.element == 4) memcpy(out, row, (size_t)s->width * sizeof *row);
+    for (x = 0; x < s->width && s->to.element == 2; x++) ((uint16_t *)out)[x] = sat__half_from_float(row[x]);
+    for (x = 0; x < s->width && s->to.element == 1; x++) ((uint8_t *)out)[x] = (uint8_t)(row[x] * 255 + 0.5f);
 }
 
 #ifndef SSAO_SAT_NO_BENT
-/* Mean free direction: that of the open hemisphere, 2/3 n, less what is blocked. z turns from forward to OpenGL's. */
-static inline void ssao_sat__write_bent(const ssao_sat *s, float *out, float z, float nx, float ny, float nz, float bx,
-                                        float by, float bz)
+/* Mean free direction of pixel i: that of the open hemisphere less what is blocked. z turns from forward to
+   OpenGL's. */
+static inline void ssao_sat__write_bent(const ssao_sat *s, float *out, const ssao_sat__pixels *p, size_t i)
 {
-    float x = (2 / 3.0f) * nx - bx, y = (2 / 3.0f) * ny - by, w = (2 / 3.0f) * nz - bz,
-          length = sqrtf(x * x + y * y + w * w);
-    if (!(z > 0)) { nx = ny = 0; nz = -1; }
-    if (z > 0 && length > 1e-3f) { nx = x / length; ny = y / length; nz = w / length; }
-    out[0] = nx;
-    out[1] = ny;
-    out[2] = s->camera.forward * nz;
+    const float x = SSAO_SAT__OPEN_LENGTH * p->nx[i] - p->blocked[0][i],
+                y = SSAO_SAT__OPEN_LENGTH * p->ny[i] - p->blocked[1][i],
+                z = SSAO_SAT__OPEN_LENGTH * p->nz[i] - p->blocked[2][i], length = sqrtf(x * x + y * y + z * z);
+    const int is_there = p->z[i] > 0, has_direction = is_there && length > SSAO_SAT__NO_DIRECTION;
+    out[0] = has_direction ? x / length : is_there ? p->nx[i] : 0;
+    out[1] = has_direction ? y / length : is_there ? p->ny[i] : 0;
+    out[2] = s->camera.forward * (has_direction ? z / length : is_there ? p->nz[i] : -1);
+}
+
+static void ssao_sat__write_bents(const ssao_sat *s, const ssao_sat__pixels *p, size_t i, const ssao_sat__strip *strip)
+{
+    float *bent = ssao_sat__out_row(s->to.bent, s->to.bent_stride, strip->y);
+    int x;
+    for (x = strip->begin; x < strip->end; x += strip->step) ssao_sat__write_bent(s, bent + 3 * x, p, i++);
 }
 #endif
 
 static void ssao_sat__copy_row(const ssao_sat *s, int y)
 {
-    size_t at = ssao_sat__at(s, y);
-    ssao_sat__pack_row(s, y, s->open + at);
+    const size_t at = ssao_sat__at(s, y);
+    ssao_sat__pack_row(s, y, s->work.open + at);
 #ifndef SSAO_SAT_NO_BENT
-    if (s->bent_wanted) {
-        float *bent = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
-        int x;
-        for (x = 0; x < s->width; x++, at++)
-            ssao_sat__write_bent(s, bent + 3 * x, s->z[at], s->nx[at], s->ny[at], s->nz[at], s->blocked[0][at],
-                                 s->blocked[1][at], s->blocked[2][at]);
+    if (s->to.bent) {
+        ssao_sat__strip strip = {0, 0, 0, 1};
+        strip.y = y;
+        strip.end = s->width;
+        ssao_sat__write_bents(s, &s->work, at, &strip);
     }
 #endif
 }
 
-typedef struct ssao_sat__picture_row {
-    float *z, *nx, *ny, *nz, *open, *blocked[3];
-} ssao_sat__picture_row; /* every second pixel */
-
-/* Pixels x0 + 2 i, i = first .. first + lanes - 1, of row y: the 3 x 3 table pixels around (x / 2, y / 2). */
-static void ssao_sat__upsample_lanes(const ssao_sat *s, const ssao_sat__picture_row *r, int x0, int y, int first)
+/* n.p of a pixel at distance z on the ray (rx, ry, 1); scale: z in perspective, else 1. */
+static inline sat__f32x4 ssao_sat__along(const sat__f32x4 *n, sat__f32x4 scale, sat__f32x4 rx, float ry, sat__f32x4 z)
 {
-    const float orthographic = s->camera.orthographic ? 1.0f : 0.0f, perspective = 1 - orthographic;
-    const ssao_sat__f zero = ssao_sat__set(0), one = ssao_sat__set(1), nx = ssao_sat__load(r->nx + first),
-                      ny = ssao_sat__load(r->ny + first);
-    const ssao_sat__f nz = ssao_sat__load(r->nz + first), z = ssao_sat__load(r->z + first);
-    const ssao_sat__f scale = ssao_sat__add(ssao_sat__mul(z, ssao_sat__set(perspective)), ssao_sat__set(orthographic));
+    const sat__f32x4 xy = sat__f32x4_add(sat__f32x4_mul(n[0], rx), sat__f32x4_mul(n[1], sat__f32x4_set1(ry)));
+    return sat__f32x4_add(sat__f32x4_mul(scale, xy), sat__f32x4_mul(n[2], z));
+}
+
+/* Pixels first .. first + 3 of a strip: the 3 x 3 table pixels around (x / 2, y / 2). */
+static void ssao_sat__upsample_lanes(const ssao_sat *s, const ssao_sat__pixels *r, const ssao_sat__strip *strip,
+                                     int first)
+{
+    const int x0 = strip->begin, y = strip->y;
+    const sat__f32x4 orthographic = sat__f32x4_set1(s->camera.orthographic ? 1.0f : 0.0f),
+                     perspective = sat__f32x4_set1(s->camera.orthographic ? 0.0f : 1.0f);
+    const sat__f32x4 zero = sat__f32x4_set1(0), one = sat__f32x4_set1(1), z = sat__f32x4_load(r->z + first);
+    const sat__f32x4 scale = sat__f32x4_add(sat__f32x4_mul(z, perspective), orthographic);
     float lane[4], ry = (float)(s->camera.full[2] * (y + 0.5) + s->camera.full[3]);
-    ssao_sat__f total = ssao_sat__set(1e-20f), sum = s->is_signed ? zero : total, rx, own, sharpness, blocked[3];
+    sat__f32x4 total = sat__f32x4_set1(1e-20f), sum = s->to.is_signed ? zero : total, n[3], rx, own, sharpness,
+               blocked[3];
     int i, j, k, c;
+    n[0] = sat__f32x4_load(r->nx + first);
+    n[1] = sat__f32x4_load(r->ny + first);
+    n[2] = sat__f32x4_load(r->nz + first);
     for (i = 0; i < 4; i++) lane[i] = (float)(s->camera.full[0] * (x0 + 2 * (first + i) + 0.5) + s->camera.full[1]);
-    rx = ssao_sat__load(lane);
-    own =
-        ssao_sat__add(ssao_sat__mul(scale, ssao_sat__add(ssao_sat__mul(nx, rx), ssao_sat__mul(ny, ssao_sat__set(ry)))),
-                      ssao_sat__mul(nz, z));
-    sharpness = ssao_sat__div(ssao_sat__set(SSAO_SAT__SHARPNESS), ssao_sat__max(z, ssao_sat__set(1 / SSAO_SAT__FAR)));
+    rx = sat__f32x4_load(lane);
+    own = ssao_sat__along(n, scale, rx, ry, z);
+    sharpness = sat__f32x4_max(z, sat__f32x4_set1(1 / SSAO_SAT__FAR));
+    sharpness = sat__f32x4_div(sat__f32x4_set1(SSAO_SAT__SHARPNESS), sharpness);
     for (c = 0; c < 3; c++) blocked[c] = zero;
     for (j = sat__max_int(y / 2 - 1, 0); j <= sat__min_int(y / 2 + 1, s->rows - 1); j++) {
         size_t at = ssao_sat__at(s, j) + (size_t)first;
-        float rowy = s->camera.ay * (float)j + s->camera.by;
+        float row_y = s->camera.ay * (float)j + s->camera.by;
         for (k = -1; k <= 1; k++) {
             const size_t t = at + (size_t)k; /* at >= 1: rows are padded */
             const int dx = 2 * k - x0, dy = 2 * j - y;
-            ssao_sat__f tx = ssao_sat__add(rx, ssao_sat__set((float)s->camera.full[0] * (float)dx)),
-                        tz = ssao_sat__load(s->z + t);
-            ssao_sat__f tscale =
-                ssao_sat__add(ssao_sat__mul(tz, ssao_sat__set(perspective)), ssao_sat__set(orthographic));
-            ssao_sat__f along = ssao_sat__add(
-                ssao_sat__mul(tscale, ssao_sat__add(ssao_sat__mul(nx, tx), ssao_sat__mul(ny, ssao_sat__set(rowy)))),
-                ssao_sat__mul(nz, tz));
-            ssao_sat__f on_plane = ssao_sat__max(
-                zero, ssao_sat__sub(one, ssao_sat__mul(ssao_sat__abs(ssao_sat__sub(along, own)), sharpness)));
-            ssao_sat__f alike = ssao_sat__add(ssao_sat__add(ssao_sat__mul(nx, ssao_sat__load(s->nx + t)),
-                                                            ssao_sat__mul(ny, ssao_sat__load(s->ny + t))),
-                                              ssao_sat__mul(nz, ssao_sat__load(s->nz + t)));
-            ssao_sat__f weight;
-            alike = ssao_sat__max(zero, alike);
-            alike = ssao_sat__mul(alike, alike);
-            weight = ssao_sat__add(ssao_sat__mul(on_plane, ssao_sat__mul(alike, alike)), ssao_sat__set(1e-4f));
-            weight = ssao_sat__mul(weight, ssao_sat__set(1 / (float)((1 + dx * dx) * (1 + dy * dy))));
+            sat__f32x4 tx = sat__f32x4_add(rx, sat__f32x4_set1((float)s->camera.full[0] * (float)dx)),
+                       tz = sat__f32x4_load(s->work.z + t), tn[3], on_plane, alike, weight;
+            on_plane = ssao_sat__along(n, sat__f32x4_add(sat__f32x4_mul(tz, perspective), orthographic), tx, row_y, tz);
+            on_plane = sat__f32x4_mul(sat__f32x4_abs(sat__f32x4_sub(on_plane, own)), sharpness);
+            on_plane = sat__f32x4_max(zero, sat__f32x4_sub(one, on_plane));
+            tn[0] = sat__f32x4_load(s->work.nx + t);
+            tn[1] = sat__f32x4_load(s->work.ny + t);
+            tn[2] = sat__f32x4_load(s->work.nz + t);
+            alike = sat__f32x4_max(zero, ssao_sat__dot(n, tn));
+            alike = sat__f32x4_mul(alike, alike);
+            weight = sat__f32x4_mul(on_plane, sat__f32x4_mul(alike, alike));
+            weight = sat__f32x4_add(weight, sat__f32x4_set1(SSAO_SAT__ELSEWHERE));
+            weight = sat__f32x4_mul(weight, sat__f32x4_set1(1 / (float)((1 + dx * dx) * (1 + dy * dy))));
             weight = ssao_sat__if_positive(tz, weight);
-            total = ssao_sat__add(total, weight);
-            sum = ssao_sat__add(sum, ssao_sat__mul(weight, ssao_sat__load(s->open + t)));
-            if (s->bent_wanted)
-                for (c = 0; c < 3; c++)
-                    blocked[c] = ssao_sat__add(blocked[c], ssao_sat__mul(weight, ssao_sat__load(s->blocked[c] + t)));
+            total = sat__f32x4_add(total, weight);
+            sum = sat__f32x4_add(sum, sat__f32x4_mul(weight, sat__f32x4_load(s->work.open + t)));
+            for (c = 0; c < 3 && s->to.bent; c++)
+                blocked[c] =
+                    sat__f32x4_add(blocked[c], sat__f32x4_mul(weight, sat__f32x4_load(s->work.blocked[c] + t)));
         }
     }
-    ssao_sat__store(r->open + first, ssao_sat__div(sum, total));
-    if (s->bent_wanted)
-        for (c = 0; c < 3; c++) ssao_sat__store(r->blocked[c] + first, ssao_sat__div(blocked[c], total));
+    sat__f32x4_store(r->open + first, sat__f32x4_div(sum, total));
+    for (c = 0; c < 3 && s->to.bent; c++) sat__f32x4_store(r->blocked[c] + first, sat__f32x4_div(blocked[c], total));
 }
 
 /* Are all table pixels around these four of the picture open? Then they are, whatever the weights. */
 static inline int ssao_sat__is_open(const ssao_sat *s, int y, int first)
 {
-    const ssao_sat__f one = ssao_sat__set(1);
+    const sat__f32x4 one = sat__f32x4_set1(1);
     int j;
-    if (s->bent_wanted || s->is_signed) return 0;
+    if (s->to.bent || s->to.is_signed) return 0;
     for (j = sat__max_int(y / 2 - 1, 0); j <= sat__min_int(y / 2 + 1, s->rows - 1); j++) {
-        const float *open = s->open + ssao_sat__at(s, j) + (size_t)first;
-        if (ssao_sat__any_positive(ssao_sat__sub(one, ssao_sat__load(open - 1))) ||
-            ssao_sat__any_positive(ssao_sat__sub(one, ssao_sat__load(open + 1))))
+        const float *open = s->work.open + ssao_sat__at(s, j) + (size_t)first;
+        if (ssao_sat__any_positive(sat__f32x4_sub(one, sat__f32x4_load(open - 1))) ||
+            ssao_sat__any_positive(sat__f32x4_sub(one, sat__f32x4_load(open + 1))))
             return 0;
     }
     return 1;
 }
 
-/* Every second pixel of row y, from x0 on, into r. */
-static void ssao_sat__upsample_row(const ssao_sat *s, const ssao_sat__picture_row *r, int x0, int y)
+/* Every second pixel of a row into r. */
+static void ssao_sat__upsample_strip(const ssao_sat *s, const ssao_sat__pixels *r, const ssao_sat__strip *strip)
 {
+    ssao_sat__strip four = *strip;
     int i;
-    for (i = 0; x0 + 2 * i < s->width; i += 4) {
-        int x = x0 + 2 * i;
-        if (ssao_sat__is_open(s, y, i)) {
-            ssao_sat__store(r->open + i, ssao_sat__set(1));
-            ssao_sat__store(r->z + i, ssao_sat__set(1));
+    for (i = 0; four.begin < strip->end; i += 4, four.begin += 8) {
+        if (ssao_sat__is_open(s, strip->y, i)) {
+            sat__f32x4_store(r->open + i, sat__f32x4_set1(1));
+            sat__f32x4_store(r->z + i, sat__f32x4_set1(1));
             continue;
         }
-        ssao_sat__read_row(s, y, x, sat__min_int(x + 8, s->width), 2, r->z + i, r->nx + i, r->ny + i, r->nz + i,
-                           NULL);
-        ssao_sat__upsample_lanes(s, r, x0, y, i);
+        four.end = sat__min_int(four.begin + 8, strip->end);
+        ssao_sat__read_strip(s, r, (size_t)i, &four, NULL);
+        ssao_sat__upsample_lanes(s, r, strip, i);
     }
 }
 
-static void ssao_sat__write_row(const ssao_sat *s, float *out, const ssao_sat__picture_row *r, int x0, int y)
+static void ssao_sat__write_strip(const ssao_sat *s, float *out, const ssao_sat__pixels *r,
+                                  const ssao_sat__strip *strip)
 {
-    int x, i;
-    (void)y;
-    for (x = x0, i = 0; x < s->width; x += 2, i++) out[x] = r->z[i] > 0 ? r->open[i] : s->is_signed ? 0.0f : 1.0f;
+    int x, i = 0;
+    for (x = strip->begin; x < strip->end; x += strip->step, i++)
+        out[x] = r->z[i] > 0 ? r->open[i] : s->to.is_signed ? 0.0f : 1.0f;
 #ifndef SSAO_SAT_NO_BENT
-    if (s->bent_wanted) {
-        float *bent = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
-        for (x = x0, i = 0; x < s->width; x += 2, i++)
-            ssao_sat__write_bent(s, bent + 3 * x, r->z[i], r->nx[i], r->ny[i], r->nz[i], r->blocked[0][i],
-                                 r->blocked[1][i], r->blocked[2][i]);
-    }
+    if (s->to.bent) ssao_sat__write_bents(s, r, 0, strip);
 #endif
 }
 
@@ -2242,26 +2309,29 @@ static void ssao_sat__write_rows(int begin, int end, int worker, void *context)
 {
     ssao_sat *s = (ssao_sat *)context;
     float *scratch = s->scratch + (size_t)worker * 8 * s->stride;
-    ssao_sat__picture_row r;
+    ssao_sat__pixels r;
+    ssao_sat__strip strip = {0, 0, 0, 2};
     float *out;
-    int y, x0, c;
+    int c;
     r.z = scratch;
     r.nx = scratch + s->stride;
     r.ny = scratch + 2 * s->stride;
     r.nz = scratch + 3 * s->stride;
     r.open = scratch + 4 * s->stride;
     for (c = 0; c < 3; c++) r.blocked[c] = scratch + (size_t)(5 + c) * s->stride;
-    for (y = s->begin * s->step + begin; y < s->begin * s->step + end; y++) {
+    strip.end = s->width;
+    for (strip.y = s->begin * s->step + begin; strip.y < s->begin * s->step + end; strip.y++) {
         if (s->step == 1) {
-            ssao_sat__copy_row(s, y);
+            ssao_sat__copy_row(s, strip.y);
             continue;
         }
-        out = s->element == 4 ? ssao_sat__out_row(s->out, s->out_stride, y) : r.blocked[0]; /* not bent then */
-        for (x0 = 0; x0 < 2 && x0 < s->width; x0++) {
-            ssao_sat__upsample_row(s, &r, x0, y);
-            ssao_sat__write_row(s, out, &r, x0, y);
+        out = r.blocked[0]; /* not bent then */
+        if (s->to.element == 4) out = ssao_sat__out_row(s->to.out, s->to.stride, strip.y);
+        for (strip.begin = 0; strip.begin < 2 && strip.begin < s->width; strip.begin++) {
+            ssao_sat__upsample_strip(s, &r, &strip);
+            ssao_sat__write_strip(s, out, &r, &strip);
         }
-        if (s->element != 4) ssao_sat__pack_row(s, y, out);
+        if (s->to.element != 4) ssao_sat__pack_row(s, strip.y, out);
     }
 }
 
@@ -2272,7 +2342,7 @@ static void ssao_sat__write_rows(int begin, int end, int worker, void *context)
 static void ssao_sat__run_band(ssao_sat *s, int begin, int end)
 {
     const sat_threads *threads = &s->options.threads;
-    int sparse = s->options.method == SSAO_SAT_SLABS && !s->is_signed && s->options.tolerance > 0;
+    int sparse = s->options.method == SSAO_SAT_SLABS && !s->to.is_signed && s->options.tolerance > 0;
     int reserve = s->reserve, i, last,
         tables = s->options.method == SSAO_SAT_SLABS ? s->frame_slabs + s->options.skip_flat : 1;
     s->begin = begin;
@@ -2305,12 +2375,12 @@ static void ssao_sat__fill(ssao_sat *s)
 {
     int y, x;
     for (y = 0; y < s->height; y++) {
-        float *o = s->element == 4 ? ssao_sat__out_row(s->out, s->out_stride, y) : s->scratch;
-        for (x = 0; x < s->width; x++) o[x] = s->is_signed ? 0.0f : 1.0f;
-        if (s->element != 4) ssao_sat__pack_row(s, y, o);
+        float *o = s->to.element == 4 ? ssao_sat__out_row(s->to.out, s->to.stride, y) : s->scratch;
+        for (x = 0; x < s->width; x++) o[x] = s->to.is_signed ? 0.0f : 1.0f;
+        if (s->to.element != 4) ssao_sat__pack_row(s, y, o);
 #ifndef SSAO_SAT_NO_BENT
-        if (s->bent_wanted) {
-            float *b = ssao_sat__out_row(s->bent_out, s->bent_stride, y);
+        if (s->to.bent) {
+            float *b = ssao_sat__out_row(s->to.bent, s->to.bent_stride, y);
             for (x = 0; x < s->width; x++) {
                 float z = ssao_sat__distance(s, x, y);
                 ssao_sat__vector n = {0, 0, -1};
@@ -2438,17 +2508,34 @@ static void ssao_sat__run(ssao_sat *s, ssao_sat_stats *stats)
    >> entry points
    ------------------------------------------------------------------------------------------------ */
 
-/* Do two sets of rows share a byte? Interleaved rows of one buffer count as sharing. */
-static int ssao_sat__overlap(const void *a, ptrdiff_t a_stride, size_t a_bytes, const void *b, ptrdiff_t b_stride,
-                             size_t b_bytes, int height)
+typedef struct ssao_sat__rows { const void *at; ptrdiff_t stride; size_t bytes; } ssao_sat__rows; /* bytes of a row */
+
+static ssao_sat__rows ssao_sat__rows_of(const void *at, ptrdiff_t stride, int width, size_t pixel)
 {
-    uintptr_t a0 = (uintptr_t)a, a1 = a0, b0 = (uintptr_t)b, b1 = b0;
-    if (!a || !b) return 0;
-    if (a_stride < 0) a0 -= (uintptr_t)(0 - a_stride) * (uintptr_t)(height - 1);
-    else a1 += (uintptr_t)a_stride * (uintptr_t)(height - 1);
-    if (b_stride < 0) b0 -= (uintptr_t)(0 - b_stride) * (uintptr_t)(height - 1);
-    else b1 += (uintptr_t)b_stride * (uintptr_t)(height - 1);
-    return a0 < b1 + b_bytes && b0 < a1 + a_bytes;
+    ssao_sat__rows r;
+    r.at = at;
+    r.stride = stride;
+    r.bytes = (size_t)width * pixel;
+    return r;
+}
+
+/* First byte of the rows and the one after the last. */
+static void ssao_sat__extent(uintptr_t *first, uintptr_t *end, const ssao_sat__rows *r, int height)
+{
+    *first = *end = (uintptr_t)r->at;
+    if (r->stride < 0) *first -= (uintptr_t)(0 - r->stride) * (uintptr_t)(height - 1);
+    else *end += (uintptr_t)r->stride * (uintptr_t)(height - 1);
+    *end += r->bytes;
+}
+
+/* Do two sets of rows share a byte? Interleaved rows of one buffer count as sharing. */
+static int ssao_sat__overlap(ssao_sat__rows a, ssao_sat__rows b, int height)
+{
+    uintptr_t first[2], end[2];
+    if (!a.at || !b.at) return 0;
+    ssao_sat__extent(&first[0], &end[0], &a, height);
+    ssao_sat__extent(&first[1], &end[1], &b, height);
+    return first[0] < end[1] && first[1] < end[0];
 }
 
 static const char *ssao_sat__bad_buffer(ssao_sat_input *in);
@@ -2463,16 +2550,26 @@ static sat_result ssao_sat__check_input(ssao_sat *s, const ssao_sat_input *input
     return ssao_sat__read_camera(&s->camera, in, s->step, s->options.bottom_up) ? SAT_OK : SAT_ERR_ARGUMENT;
 }
 
-static int ssao_sat__output_is_valid(const ssao_sat *s, const void *out, ptrdiff_t *stride, size_t pixel,
-                                     size_t element)
+static int ssao_sat__rows_are_free(const ssao_sat *s, ssao_sat__rows out)
 {
     const ssao_sat_input *in = &s->input;
-    const void *depth = in->depth ? (const void *)in->depth : (const void *)in->half_depth;
-    size_t bytes = (size_t)s->width * pixel;
-    if (!sat__rows_are_valid(out, stride, s->width, s->height, pixel, element)) return 0;
-    return !ssao_sat__overlap(out, *stride, bytes, depth, in->depth_stride, (size_t)s->width * (in->depth ? 4 : 2),
-                              s->height) &&
-           !ssao_sat__overlap(out, *stride, bytes, in->normals, in->normal_stride, (size_t)s->width * 12, s->height);
+    return !ssao_sat__overlap(out, ssao_sat__rows_of(in->depth, in->depth_stride, s->width, 4), s->height) &&
+           !ssao_sat__overlap(out, ssao_sat__rows_of(in->half_depth, in->depth_stride, s->width, 2), s->height) &&
+           !ssao_sat__overlap(out, ssao_sat__rows_of(in->normals, in->normal_stride, s->width, 12), s->height);
+}
+
+/* Resolves strides of 0. */
+static int ssao_sat__output_is_valid(const ssao_sat *s, ssao_sat__output *to)
+{
+    const size_t element = (size_t)to->element;
+    ssao_sat__rows out, bent;
+    if (!sat__rows_are_valid(to->out, &to->stride, s->width, s->height, element, element)) return 0;
+    out = ssao_sat__rows_of(to->out, to->stride, s->width, element);
+    if (!ssao_sat__rows_are_free(s, out)) return 0;
+    if (!to->bent) return 1;
+    if (!sat__rows_are_valid(to->bent, &to->bent_stride, s->width, s->height, 12, 4)) return 0;
+    bent = ssao_sat__rows_of(to->bent, to->bent_stride, s->width, 12);
+    return ssao_sat__rows_are_free(s, bent) && !ssao_sat__overlap(out, bent, s->height);
 }
 
 static ssao_sat__fit ssao_sat__fit_of(const ssao_sat_options *o)
@@ -2482,59 +2579,61 @@ static ssao_sat__fit ssao_sat__fit_of(const ssao_sat_options *o)
     return fit;
 }
 
-/* `element`: bytes of an output, 4 for float, 2 for half, 1 for 8 bits. */
-static sat_result ssao_sat__apply(ssao_sat *s, void *out, ptrdiff_t stride, size_t element, float *bent,
-                                  ptrdiff_t bent_stride, const ssao_sat_input *input, ssao_sat_stats *stats,
-                                  int is_signed)
+static sat_result ssao_sat__apply_to(ssao_sat *s, ssao_sat__output *to, const ssao_sat_input *input,
+                                     ssao_sat_stats *stats)
 {
     sat_result result;
-    if (!s || !out || !input) return SAT_ERR_ARGUMENT;
+    if (!s || !to->out || !input) return SAT_ERR_ARGUMENT;
     result = ssao_sat__check_input(s, input);
     if (result != SAT_OK) return result;
-    if (!ssao_sat__output_is_valid(s, out, &stride, element, element)) return SAT_ERR_ARGUMENT;
-    if (bent) {
-        if (!ssao_sat__output_is_valid(s, bent, &bent_stride, 12, 4)) return SAT_ERR_ARGUMENT;
-        if (ssao_sat__overlap(out, stride, (size_t)s->width * 4, bent, bent_stride, (size_t)s->width * 12, s->height))
-            return SAT_ERR_ARGUMENT;
-    }
-    s->out = out;
-    s->out_stride = stride;
-    s->element = (int)element;
-    s->bent_out = bent;
-    s->bent_stride = bent_stride;
-    s->bent_wanted = bent != NULL;
-    s->is_signed = is_signed;
+    if (!ssao_sat__output_is_valid(s, to)) return SAT_ERR_ARGUMENT;
+    s->to = *to;
     s->geometric = s->options.geometric && s->input.normals != NULL;
     s->fit = ssao_sat__fit_of(&s->options);
     s->radius = (float)s->options.radius;
-    s->reach = is_signed ? s->radius : s->radius * s->fit.reach;
+    s->reach = to->is_signed ? s->radius : s->radius * s->fit.reach;
     s->range = s->radius * s->fit.range;
     ssao_sat__run(s, stats);
     return SAT_OK;
 }
 
+static ssao_sat__output ssao_sat__output_of(void *out, ptrdiff_t stride, int element)
+{
+    ssao_sat__output to;
+    memset(&to, 0, sizeof to);
+    to.out = out;
+    to.stride = stride;
+    to.element = element;
+    return to;
+}
+
 SSAO_SAT_DEF sat_result ssao_sat_apply(ssao_sat *ao, float *accessibility, ptrdiff_t out_stride,
                                        const ssao_sat_input *input, ssao_sat_stats *stats)
 {
-    return ssao_sat__apply(ao, accessibility, out_stride, 4, NULL, 0, input, stats, 0);
+    ssao_sat__output to = ssao_sat__output_of(accessibility, out_stride, 4);
+    return ssao_sat__apply_to(ao, &to, input, stats);
 }
 
 SSAO_SAT_DEF sat_result ssao_sat_apply_u8(ssao_sat *ao, uint8_t *accessibility, ptrdiff_t out_stride,
                                           const ssao_sat_input *input, ssao_sat_stats *stats)
 {
-    return ssao_sat__apply(ao, accessibility, out_stride, 1, NULL, 0, input, stats, 0);
+    ssao_sat__output to = ssao_sat__output_of(accessibility, out_stride, 1);
+    return ssao_sat__apply_to(ao, &to, input, stats);
 }
 
 SSAO_SAT_DEF sat_result ssao_sat_apply_half(ssao_sat *ao, uint16_t *accessibility, ptrdiff_t out_stride,
                                             const ssao_sat_input *input, ssao_sat_stats *stats)
 {
-    return ssao_sat__apply(ao, accessibility, out_stride, 2, NULL, 0, input, stats, 0);
+    ssao_sat__output to = ssao_sat__output_of(accessibility, out_stride, 2);
+    return ssao_sat__apply_to(ao, &to, input, stats);
 }
 
 SSAO_SAT_DEF sat_result ssao_sat_apply_signed(ssao_sat *ao, float *out, ptrdiff_t out_stride,
                                               const ssao_sat_input *input, ssao_sat_stats *stats)
 {
-    return ssao_sat__apply(ao, out, out_stride, 4, NULL, 0, input, stats, 1);
+    ssao_sat__output to = ssao_sat__output_of(out, out_stride, 4);
+    to.is_signed = 1;
+    return ssao_sat__apply_to(ao, &to, input, stats);
 }
 
 #ifndef SSAO_SAT_NO_BENT
@@ -2542,10 +2641,18 @@ SSAO_SAT_DEF sat_result ssao_sat_apply_bent(ssao_sat *ao, float *accessibility, 
                                             float *bent_normals, ptrdiff_t bent_stride, const ssao_sat_input *input,
                                             ssao_sat_stats *stats)
 {
+    ssao_sat__output to = ssao_sat__output_of(accessibility, out_stride, 4);
     if (!ao || !bent_normals || ao->options.method != SSAO_SAT_SLABS) return SAT_ERR_ARGUMENT;
-    return ssao_sat__apply(ao, accessibility, out_stride, 4, bent_normals, bent_stride, input, stats, 0);
+    to.bent = bent_normals;
+    to.bent_stride = bent_stride;
+    return ssao_sat__apply_to(ao, &to, input, stats);
 }
 #endif
+
+static int ssao_sat__size_is_valid(int width, int height)
+{
+    return width >= 1 && height >= 1 && width <= SSAO_SAT__MAX_SIDE && height <= SSAO_SAT__MAX_SIDE;
+}
 
 static int ssao_sat__options_are_valid(const ssao_sat_options *o)
 {
@@ -2558,8 +2665,9 @@ SSAO_SAT_DEF const char *ssao_sat_explain(char *text, size_t size, int width, in
     sat__text t = sat__text_begin(text, size);
     ssao_sat_options o = options ? *options : ssao_sat_defaults();
     const sat__field *field = sat__fields_check(&o, ssao_sat__fields, SSAO_SAT__FIELDS);
-    if (width < 1 || width > 32768) sat__text_range(&t, "width", width, 1, 32768, ' ');
-    else if (height < 1 || height > 32768) sat__text_range(&t, "height", height, 1, 32768, ' ');
+    if (width < 1 || width > SSAO_SAT__MAX_SIDE) sat__text_range(&t, "width", width, 1, SSAO_SAT__MAX_SIDE, ' ');
+    else if (height < 1 || height > SSAO_SAT__MAX_SIDE)
+        sat__text_range(&t, "height", height, 1, SSAO_SAT__MAX_SIDE, ' ');
     else if (field) sat__text_field(&t, field, &o);
     else if (o.max_pixels < o.min_pixels)
         sat__text_range(&t, "max_pixels (from min_pixels on)", o.max_pixels, o.min_pixels, 512, ' ');
@@ -2622,13 +2730,13 @@ static int ssao_sat__lay_out(ssao_sat *s, sat__arena *arena)
         !sat__multiply_size(&s->table_plane, rows + 1, s->table_stride) ||
         !sat__multiply_size(&words, s->table_plane, (size_t)s->tables))
         return 0;
-    s->z = (float *)sat__carve(arena, picture, 4);
+    s->work.z = (float *)sat__carve(arena, picture, 4);
     s->affine = (float *)sat__carve(arena, picture, 4);
-    s->nx = (float *)sat__carve(arena, picture, 4);
-    s->ny = (float *)sat__carve(arena, picture, 4);
-    s->nz = (float *)sat__carve(arena, picture, 4);
-    s->open = (float *)sat__carve(arena, picture, 4);
-    for (i = 0; i < 3; i++) s->blocked[i] = (float *)sat__carve(arena, bent ? picture : 0, 4);
+    s->work.nx = (float *)sat__carve(arena, picture, 4);
+    s->work.ny = (float *)sat__carve(arena, picture, 4);
+    s->work.nz = (float *)sat__carve(arena, picture, 4);
+    s->work.open = (float *)sat__carve(arena, picture, 4);
+    for (i = 0; i < 3; i++) s->work.blocked[i] = (float *)sat__carve(arena, bent ? picture : 0, 4);
     s->lower = (float *)sat__carve(arena, s->tables > 1 && s->step == 2 ? picture : 0, 4);
     s->word_stride = ((size_t)s->columns * (size_t)s->step + 15) / 16 * 16;
     s->words = (uint32_t *)sat__carve(arena, s->tables > 1 ? rows * (size_t)s->step * s->word_stride : 0, 4);
@@ -2643,10 +2751,9 @@ static int ssao_sat__lay_out(ssao_sat *s, sat__arena *arena)
     return !arena->overflow;
 }
 
-/* The sizes of everything for s->options; 0 when they overflow. `used` gets the bytes. */
-static int ssao_sat__measure(ssao_sat *s, int width, int height, size_t *used)
+/* The sizes of everything for s->options, into an arena that measures; 0 when they overflow. */
+static int ssao_sat__measure(ssao_sat *s, sat__arena *arena, int width, int height)
 {
-    sat__arena arena;
     s->width = width;
     s->height = height;
     s->step = s->options.half_resolution ? 2 : 1;
@@ -2657,11 +2764,9 @@ static int ssao_sat__measure(ssao_sat *s, int width, int height, size_t *used)
     s->stride = ((size_t)s->columns + 15) / 16 * 16 + 3 * SSAO_SAT__PAD;
     s->table_stride = ((size_t)s->columns + 1 + 15) / 16 * 16;
     s->tables = s->options.method == SSAO_SAT_SLABS ? 4 * s->options.slabs : 1;
-    memset(&arena, 0, sizeof arena);
-    sat__carve(&arena, 1, sizeof *s);
-    if (!ssao_sat__lay_out(s, &arena)) return 0;
-    *used = arena.used;
-    return 1;
+    memset(arena, 0, sizeof *arena);
+    sat__carve(arena, 1, sizeof *s);
+    return ssao_sat__lay_out(s, arena);
 }
 
 /* Lays the block out anew for `s`, the object itself at its start. */
@@ -2673,7 +2778,7 @@ static ssao_sat *ssao_sat__place(const ssao_sat *s)
     arena.base = sat__align64(s->block);
     made = (ssao_sat *)sat__carve(&arena, 1, sizeof copy);
     ssao_sat__lay_out(&copy, &arena);
-    memset(arena.base, 0, s->bytes - 64); /* the padding must be sky; the rest costs one touch */
+    memset(arena.base, 0, s->bytes - 63); /* the padding must be sky; the rest costs one touch */
     *made = copy;
     return made;
 }
@@ -2682,33 +2787,32 @@ SSAO_SAT_DEF sat_result ssao_sat_create(ssao_sat **out, int width, int height, c
 {
     ssao_sat s;
     sat_allocator allocator;
+    sat__arena arena;
+    sat_result result;
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
     memset(&s, 0, sizeof s);
     s.options = options ? *options : ssao_sat_defaults();
-    if (width < 1 || height < 1 || width > 32768 || height > 32768 || !ssao_sat__options_are_valid(&s.options))
-        return SAT_ERR_ARGUMENT;
+    if (!ssao_sat__size_is_valid(width, height) || !ssao_sat__options_are_valid(&s.options)) return SAT_ERR_ARGUMENT;
     if (!sat__resolve_allocator(&allocator, &s.options.allocator)) return SAT_ERR_ARGUMENT;
     s.options.allocator = allocator;
-    if (!ssao_sat__measure(&s, width, height, &s.bytes)) return SAT_ERR_SIZE;
-    s.bytes += 64;
-    s.block = sat__alloc(&allocator, s.bytes);
-    if (!s.block) return SAT_ERR_MEMORY;
-    *out = ssao_sat__place(&s);
-    return SAT_OK;
+    if (!ssao_sat__measure(&s, &arena, width, height)) return SAT_ERR_SIZE;
+    result = sat__arena_allocate(&arena, &s.block, &s.bytes, &allocator);
+    if (result == SAT_OK) *out = ssao_sat__place(&s);
+    return result;
 }
 
 SSAO_SAT_DEF sat_result ssao_sat_resize(ssao_sat *ao, int width, int height, const ssao_sat_options *options)
 {
     ssao_sat s;
-    size_t used;
-    if (!ao || width < 1 || height < 1 || width > 32768 || height > 32768) return SAT_ERR_ARGUMENT;
+    sat__arena arena;
+    if (!ao || !ssao_sat__size_is_valid(width, height)) return SAT_ERR_ARGUMENT;
     if (options && !ssao_sat__options_are_valid(options)) return SAT_ERR_ARGUMENT;
     s = *ao;
     if (options) s.options = *options;
     s.options.allocator = ao->options.allocator;
-    if (!ssao_sat__measure(&s, width, height, &used) || used + 64 > ao->bytes) return SAT_ERR_SIZE;
+    if (!ssao_sat__measure(&s, &arena, width, height) || arena.used + 63 > ao->bytes) return SAT_ERR_SIZE;
     if (width == ao->width && height == ao->height && s.step == ao->step && s.capacity == ao->capacity &&
         s.tables == ao->tables && sat__worker_count(&s.options.threads) == sat__worker_count(&ao->options.threads)) {
         ao->options = s.options; /* the same layout */
@@ -2751,7 +2855,7 @@ SSAO_SAT_DEF float ssao_sat_edge(const float *position, const float *normal, con
     z = fabsf(position[2]);
     plane = 1 - fabsf(off) * SSAO_SAT__SHARPNESS / (z > 1 / SSAO_SAT__FAR ? z : 1 / SSAO_SAT__FAR);
     alike = alike > 0 ? alike * alike : 0;
-    return (plane > 0 ? plane : 0) * alike * alike + 1e-4f;
+    return (plane > 0 ? plane : 0) * alike * alike + SSAO_SAT__ELSEWHERE;
 }
 
 SSAO_SAT_DEF void ssao_sat_destroy(ssao_sat *ao)
@@ -2783,86 +2887,92 @@ SAT__IEEE_BEGIN
 extern "C" {
 #endif
 
-SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void)
-{
-    return
-        "#ifndef SSAO_SAT_GLSL\n"
-        "#define SSAO_SAT_GLSL\n"
-        SAT__GLSL(
-            float ssao_sat_distance(vec4 view[3], ivec2 pixel, float d) {
-                float z = d;
-                if (isnan(d) || isinf(d)) return 0.0;
-                if (view[1].z > 0.5) {
-                    if (view[1].z < 1.5 ? d < 0.0 || d >= 1.0 : d <= 0.0 || d > 1.0) return 0.0;
-                    z = view[1].x * d + view[1].y + dot(view[2].yz, vec2(pixel));
-                    if (!(z > 1e-30)) return 0.0;
-                    if (view[1].w < 0.5) z = 1.0 / z;
-                } else if (view[2].x > 0.0 && d >= view[2].x) return 0.0;
-                return z > 1e-18 && z < 1e18 ? z : 0.0;
-            })
-        SAT__GLSL(float ssao_sat_distance(vec4 view[3], float d) { return ssao_sat_distance(view, ivec2(0), d); })
-        SAT__GLSL(
-            vec3 ssao_sat_position(vec4 view[3], ivec2 pixel, float z) {
-                return vec3((view[0].xz * (vec2(pixel) + 0.5) + view[0].yw) * (view[1].w > 0.5 ? 1.0 : z), z);
-            })
-        SAT__GLSL(
-            /* part: where the picture lies in the texture: corner and size */
-            vec3 ssao_sat_tangent(vec4 view[3], sampler2D depth, ivec4 part, ivec2 pixel, float z, ivec2 along) {
-                vec3 p = ssao_sat_position(view, pixel, z), t = vec3(0.0);
-                float nearest = 0.0;
-                bool found = false;
-                for (int side = -1; side <= 1; side += 2) {
-                    ivec2 q = pixel + side * along;
-                    if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, part.zw))) continue;
-                    float zq = ssao_sat_distance(view, q, texelFetch(depth, part.xy + q, 0).r);
-                    if (!(zq > 0.0)) continue;
-                    float off = abs(view[1].w > 0.5 ? zq - z : 1.0 / zq - 1.0 / z);
-                    if (found && off >= nearest) continue;
-                    found = true;
-                    nearest = off;
-                    t = (ssao_sat_position(view, q, zq) - p) * float(side);
-                }
-                return t;
-            })
-        SAT__GLSL(
-            vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec4 part, ivec2 pixel, float z) {
-                vec3 u = ssao_sat_tangent(view, depth, part, pixel, z, ivec2(1, 0)),
-                    v = ssao_sat_tangent(view, depth, part, pixel, z, ivec2(0, 1));
-                float facing = view[1].w > 0.5 ? 1.0 : 0.0;
-                if (dot(u, u) * dot(v, v) <= 0.0) return vec3(0.0, 0.0, -1.0);
-                vec3 n = cross(normalize(u), normalize(v));
-                if (!(dot(n, n) > 1e-24)) return vec3(0.0, 0.0, -1.0);
-                n = normalize(n);
-                facing = facing > 0.5 ? n.z : dot(n, ssao_sat_position(view, pixel, z));
-                return facing > 0.0 ? -n : n;
-            })
-        SAT__GLSL(
-            float ssao_sat_edge(vec3 p, vec3 n, vec3 from, vec3 from_n) {
-                float alike = max(dot(n, from_n), 0.0), plane = max(0.0, 1.0 - abs(dot(n, from - p)) * 50.0 / p.z);
-                return plane * alike * alike * alike * alike + 1e-4;
-            })
-        SAT__GLSL(
-            vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z) {
-                return ssao_sat_depth_normal(view, depth, ivec4(ivec2(0), textureSize(depth, 0)), pixel, z);
-            })
-        "#endif\n";
-}
+/* A constant of C for the shaders: the macro's digits. */
+#define SSAO_SAT__CONSTANT(name, value) SSAO_SAT__CONSTANT_LINE(#name, value)
+#define SSAO_SAT__CONSTANT_LINE(name, value) "#define " name " " #value "\n"
+
+static const char ssao_sat__gl_functions[] =
+    "#ifndef SSAO_SAT_GLSL\n"
+    "#define SSAO_SAT_GLSL\n"
+    SSAO_SAT__CONSTANT(SSAO_SAT_FAR, SSAO_SAT__FAR)
+    SSAO_SAT__CONSTANT(SSAO_SAT_LEAST_AFFINE, SSAO_SAT__LEAST_AFFINE)
+    SSAO_SAT__CONSTANT(SSAO_SAT_SHARPNESS, SSAO_SAT__SHARPNESS)
+    SSAO_SAT__CONSTANT(SSAO_SAT_ELSEWHERE, SSAO_SAT__ELSEWHERE)
+    SAT__GLSL(
+        float ssao_sat_distance(vec4 view[3], ivec2 pixel, float d) {
+            float z = d;
+            if (isnan(d) || isinf(d)) return 0.0;
+            if (view[1].z > 0.5) {
+                if (view[1].z < 1.5 ? d < 0.0 || d >= 1.0 : d <= 0.0 || d > 1.0) return 0.0;
+                z = view[1].x * d + view[1].y + dot(view[2].yz, vec2(pixel));
+                if (!(z > SSAO_SAT_LEAST_AFFINE)) return 0.0;
+                if (view[1].w < 0.5) z = 1.0 / z;
+            } else if (view[2].x > 0.0 && d >= view[2].x) return 0.0;
+            return z > 1.0 / SSAO_SAT_FAR && z < SSAO_SAT_FAR ? z : 0.0;
+        })
+    SAT__GLSL(float ssao_sat_distance(vec4 view[3], float d) { return ssao_sat_distance(view, ivec2(0), d); })
+    SAT__GLSL(
+        vec3 ssao_sat_position(vec4 view[3], ivec2 pixel, float z) {
+            return vec3((view[0].xz * (vec2(pixel) + 0.5) + view[0].yw) * (view[1].w > 0.5 ? 1.0 : z), z);
+        })
+    SAT__GLSL(
+        /* part: where the picture lies in the texture: corner and size */
+        vec3 ssao_sat_tangent(vec4 view[3], sampler2D depth, ivec4 part, ivec2 pixel, float z, ivec2 along) {
+            vec3 p = ssao_sat_position(view, pixel, z), t = vec3(0.0);
+            float nearest = 0.0;
+            bool found = false;
+            for (int side = -1; side <= 1; side += 2) {
+                ivec2 q = pixel + side * along;
+                if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, part.zw))) continue;
+                float zq = ssao_sat_distance(view, q, texelFetch(depth, part.xy + q, 0).r);
+                if (!(zq > 0.0)) continue;
+                float off = abs(view[1].w > 0.5 ? zq - z : 1.0 / zq - 1.0 / z);
+                if (found && off >= nearest) continue;
+                found = true;
+                nearest = off;
+                t = (ssao_sat_position(view, q, zq) - p) * float(side);
+            }
+            return t;
+        })
+    SAT__GLSL(
+        vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec4 part, ivec2 pixel, float z) {
+            vec3 u = ssao_sat_tangent(view, depth, part, pixel, z, ivec2(1, 0)),
+                v = ssao_sat_tangent(view, depth, part, pixel, z, ivec2(0, 1));
+            if (dot(u, u) * dot(v, v) <= 0.0) return vec3(0.0, 0.0, -1.0);
+            vec3 n = cross(normalize(u), normalize(v));
+            if (!(dot(n, n) > 1e-24)) return vec3(0.0, 0.0, -1.0);
+            n = normalize(n);
+            return (view[1].w > 0.5 ? n.z : dot(n, ssao_sat_position(view, pixel, z))) > 0.0 ? -n : n;
+        })
+    SAT__GLSL(
+        float ssao_sat_edge(vec3 p, vec3 n, vec3 from, vec3 from_n) {
+            float alike = max(dot(n, from_n), 0.0),
+                plane = max(0.0, 1.0 - abs(dot(n, from - p)) * SSAO_SAT_SHARPNESS / p.z);
+            return plane * alike * alike * alike * alike + SSAO_SAT_ELSEWHERE;
+        })
+    SAT__GLSL(
+        vec3 ssao_sat_depth_normal(vec4 view[3], sampler2D depth, ivec2 pixel, float z) {
+            return ssao_sat_depth_normal(view, depth, ivec4(ivec2(0), textureSize(depth, 0)), pixel, z);
+        })
+    "#endif\n";
+
+SSAO_SAT_DEF const char *ssao_sat_gl_glsl(void) { return ssao_sat__gl_functions; }
 
 /* What the passes share. `work` is a pixel of the tables; size their columns and rows. */
 static const char ssao_sat__gl_common[] =
     SAT__GLSL(
-        uniform sampler2D depth, normals, edges;
+        uniform sampler2D depth, normals, finer, edges;
         uniform vec4 view[3];
         uniform ivec2 size, picture, sat_from;
         float distance_at(ivec2 pixel) {
             return ssao_sat_distance(view, pixel, texelFetch(depth, sat_from + min(pixel, picture - 1), 0).r);
         })
     SAT__GLSL(vec3 normal_at(ivec2 pixel, float z) {)
-    "#if NORMALS\n"
+    "#ifdef NORMALS\n"
     SAT__GLSL(
             vec3 n = texelFetch(normals, sat_from + pixel, 0).xyz * vec3(1.0, 1.0, view[2].w);
             float square = dot(n, n);
-            if (!isnan(square) && !isinf(square) && square > 1e-20) return n / sqrt(square);)
+            if (!isnan(square) && !isinf(square) && square > LEAST_SQUARE) return n / sqrt(square);)
     "#endif\n"
     SAT__GLSL(
             return ssao_sat_depth_normal(view, depth, ivec4(sat_from, picture), pixel, z);
@@ -2878,10 +2988,9 @@ static const char ssao_sat__gl_common[] =
    C. Where the sample meets nothing the range is that of nothing: 1 to 1. */
 static const char ssao_sat__gl_range[] =
     SAT__GLSL(
-        uniform sampler2D finer;
         out vec4 result;
         void main() {)
-    "#if FIRST\n"
+    "#ifdef FIRST\n"
     SAT__GLSL(
             ivec2 block = ivec2(gl_FragCoord.xy);
             vec2 r = vec2(3e38, 0.0);
@@ -2920,7 +3029,6 @@ static const char ssao_sat__gl_range[] =
 /* Texel b: share of the 32 x 32 sample in the first b of the bins of the depth range. */
 static const char ssao_sat__gl_shares[] =
     SAT__GLSL(
-        uniform sampler2D finer;
         out vec4 result;
         float scaled(float z) { return orthographic() ? z : log(z); })
     SAT__GLSL(
@@ -2930,7 +3038,7 @@ static const char ssao_sat__gl_shares[] =
                 bin = floor(gl_FragCoord.x);
             for (int j = 0; j < GRID * GRID; j++) {
                 float z = distance_at(STEP * ((2 * ivec2(j % GRID, j / GRID) + 1) * size / (2 * GRID)));
-                if (!(z >= 0.999 * range.x && z <= 1.001 * range.y)) continue;
+                if (!(z >= (1.0 - RANGE_SLACK) * range.x && z <= (1.0 + RANGE_SLACK) * range.y)) continue;
                 all += 1.0;
                 if ((width > 0.0 ? clamp(floor((scaled(z) - low) / width * float(BINS)), 0.0, float(BINS - 1)) : 0.0)
                     < bin) below += 1.0;
@@ -2942,7 +3050,7 @@ static const char ssao_sat__gl_shares[] =
    slabs. As in C. */
 static const char ssao_sat__gl_edges[] =
     SAT__GLSL(
-        uniform sampler2D finer, shares;
+        uniform sampler2D shares;
         uniform vec4 region; /* radius, reach, limit; parts of a side that a box of the table takes */
         out vec4 result;
         float filled(int bin) { return 0.5 * float(bin) / float(BINS) + 0.5 * texelFetch(shares, ivec2(bin, 0), 0).r; })
@@ -2970,18 +3078,18 @@ static const char ssao_sat__gl_edges[] =
                 * max(aspect(), 1.0);
             float side = 2.0 * largest / region.w + 2.0, first = cut(k, slabs, range),
                 second = cut(k + 1, slabs, range);
-            float spare = orthographic() ? min(range.y - range.x + MARGIN * region.x, 1e15) : 0.0, low = first,
-                high = second;
+            float spare = orthographic() ? min(range.y - range.x + MARGIN * region.x, LARGEST_RADIUS) : 0.0,
+                low = first, high = second;
             if (METHOD == 0) side *= float(STEP);
             if (k == 0) low = orthographic() ? low - spare : low / MARGIN;
             if (k == slabs - 1) high += spare;
             while (bits > 1 && side * side * exp2(float(bits)) > 2147483648.0) bits--;
-            bits = min(bits, 20);
+            bits = min(bits, LEVEL_BITS);
             if (METHOD == 0) ends = orthographic() ? vec2(low, high)
                 : vec2(k == slabs - 1 ? 0.0 : 1.0 / high, 1.0 / low);
-            else if (METHOD == 1) ends.y = orthographic() ? range.y - range.x + MARGIN * min(region.x, 1e15)
+            else if (METHOD == 1) ends.y = orthographic() ? range.y - range.x + MARGIN * min(region.x, LARGEST_RADIUS)
                 : MARGIN / range.x;
-            else ends.y = INVERTED == 1 ? MARGIN / range.x : 1.05 * range.y;
+            else ends.y = INVERTED == 1 ? MARGIN / range.x : BEHIND * range.y;
             float top = exp2(float(bits)) - 1.0;
             result = vec4(first, ends.x, (ends.y - ends.x) / top, k == SLABS ? float(slabs) : top);
         });
@@ -3016,7 +3124,7 @@ static const char ssao_sat__gl_words[] =
             float nearest = first.x, farthest = texelFetch(edges, ivec2(SLABS, 0), 0).x, v;
             if (METHOD == 1) v = z > 0.0 ? (orthographic() ? farthest - z : 1.0 / z) : 0.0;
             else if (INVERTED == 1) v = z > 0.0 ? 1.0 / z : 0.0;
-            else v = z > 0.0 ? z : 1.05 * farthest;
+            else v = z > 0.0 ? z : BEHIND * farthest;
             result.x = level(v, first);)
     "#endif\n"
     SAT__GLSL(});
@@ -3025,7 +3133,7 @@ static const char ssao_sat__gl_words[] =
 static const char ssao_sat__gl_scan[] =
     SAT__GLSL(
         uniform usampler2D table;
-        uniform ivec2 reach, size;
+        uniform ivec2 reach;
         out uvec4 result;
         void main() {
             ivec2 at = ivec2(gl_FragCoord.xy), work = at - at / size * size;
@@ -3062,7 +3170,8 @@ static const char ssao_sat__gl_slabs[] =
         vec4 occluder(uvec4 sums, vec4 edge, vec3 p, vec3 n, int ring) {
             vec4 s = vec4(ivec4(sums));
             if (s.x < 0.5) return vec4(0.0);
-            float mean = (edge.y * s.x + edge.z * s.y) / s.x, z = orthographic() ? mean : 1.0 / max(mean, 1e-30);
+            float mean = (edge.y * s.x + edge.z * s.y) / s.x,
+                z = orthographic() ? mean : 1.0 / max(mean, SSAO_SAT_LEAST_AFFINE);
             vec3 d = vec3((view[0].xz * (s.zw / s.x + 0.5) + view[0].yw) * (orthographic() ? 1.0 : z), z) - p;
             float square = dot(d, d), height = min(dot(d, n), dot(d, surface)), share = 1.0 - square / (fit.y * fit.y);
             if (height <= 0.0 || share <= 0.0) return vec4(0.0);
@@ -3113,7 +3222,8 @@ static const char ssao_sat__gl_slabs[] =
             if (!(z > 0.0) || !(strength > 0.0)) return;
             vec3 n = normal_at(STEP * work, z), p = vec3(ray(vec2(work)) * (orthographic() ? 1.0 : z), z);
             surface = n;
-            if (kernel[12].z > 0.0) surface = ssao_sat_depth_normal(view, depth, STEP * work, z);
+            if (kernel[12].z > 0.0)
+                surface = ssao_sat_depth_normal(view, depth, ivec4(sat_from, picture), STEP * work, z);
             int slabs = int(texelFetch(edges, ivec2(SLABS, 0), 0).w);
             for (int ring = 0; ring < RINGS; ring++, r /= 3.0) {
                 ivec2 inner = max(ivec2(vec2(r, r * aspect()) / 3.0 + 0.5), 1),
@@ -3151,6 +3261,10 @@ static const char ssao_sat__gl_single[] =
     SAT__GLSL(float deficit(float m, float z) { return INVERTED == 1 ? (m * z - 1.0) * z : z - m; });
 
 /* Eq 5.4 over four children. GLSL has no recursion: the text is there once for each level, under two names. */
+static const char ssao_sat__gl_refine_last[] = "#define NAME refine_last\n#define CHILD\n#define LEVEL 1\n";
+static const char ssao_sat__gl_refine_all[] =
+    "#undef NAME\n#undef CHILD\n#undef LEVEL\n#define NAME refine_all\n#define LEVEL 0\n"
+    "#define CHILD child = refine_last(c, z, edge);\n";
 static const char ssao_sat__gl_refine[] =
     SAT__GLSL(
         float NAME(ivec4 b, float z, vec4 edge) {
@@ -3178,12 +3292,12 @@ static const char ssao_sat__gl_single_main[] =
             float own, height, sum = 0.0;
             ivec2 x[3];
             if (orthographic()) {
-                float facing = min(n.z, -1e-3);
+                float facing = min(n.z, -GRAZING);
                 g = n.xy / facing * view[0].xz * float(STEP);
                 own = farthest - z;
                 height = -facing / region.x;
             } else {
-                float facing = min(dot(n.xy, r) + n.z, -1e-3);
+                float facing = min(dot(n.xy, r) + n.z, -GRAZING);
                 g = n.xy * view[0].xz * float(STEP) / (facing * z);
                 own = 1.0 / z;
                 height = -facing * z * z / region.x;
@@ -3281,7 +3395,7 @@ static const char ssao_sat__gl_upsample[] =
             float z = distance_at(at), total = 0.0;
             vec4 sum = vec4(0.0);
             result = vec4(BLANK);)
-    "#if BENT\n"
+    "#ifdef BENT\n"
     SAT__GLSL(result.xyz = vec3(0.0, 0.0, -view[2].w);)
     "#endif\n"
     SAT__GLSL(if (!(z > 0.0)) return;)
@@ -3305,10 +3419,10 @@ static const char ssao_sat__gl_upsample[] =
                 })
     "#endif\n"
     SAT__GLSL(sum = total > 0.0 ? sum / total : vec4(BLANK, 0.0, 0.0, 0.0);)
-    "#if BENT\n"
+    "#ifdef BENT\n"
     SAT__GLSL(
-            vec3 up = normal_at(at, z), bent = 2.0 / 3.0 * up - sum.yzw;
-            if (length(bent) > 1e-3) up = normalize(bent);
+            vec3 up = normal_at(at, z), bent = OPEN_LENGTH * up - sum.yzw;
+            if (length(bent) > NO_DIRECTION) up = normalize(bent);
             result = vec4(up * vec3(1.0, 1.0, view[2].w), sum.x);)
     "#else\n"
     SAT__GLSL(result.r = sum.x;)
@@ -3319,29 +3433,58 @@ static const char ssao_sat__gl_upsample[] =
    >> passes: programs, textures, frames
    ------------------------------------------------------------------------------------------------ */
 
-enum {
-    SSAO_SAT__GL_RANGE,
-    SSAO_SAT__GL_RANGE_FIRST,
-    SSAO_SAT__GL_SHARES,
-    SSAO_SAT__GL_EDGES,
-    SSAO_SAT__GL_WORDS,
-    SSAO_SAT__GL_SCAN,
-    SSAO_SAT__GL_ESTIMATE, /* from here on two a kind of output: see ssao_sat__gl_output */
-    SSAO_SAT__GL_UPSAMPLE,
-    SSAO_SAT__GL_PROGRAMS = SSAO_SAT__GL_ESTIMATE + 6
-};
-
 typedef enum ssao_sat__gl_output { SSAO_SAT__GL_OPEN, SSAO_SAT__GL_BENT, SSAO_SAT__GL_SIGNED } ssao_sat__gl_output;
 
-typedef struct ssao_sat__gl_target { unsigned texture, framebuffer; int width, height; } ssao_sat__gl_target;
+/* What is made for some options only. */
+enum { SSAO_SAT__IF_SLABS = 1, SSAO_SAT__IF_SINGLE = 2, SSAO_SAT__IF_BENT = 4, SSAO_SAT__IF_SIGNED = 8 };
+
+/* The programs, in the order of the table. Those from SSAO_SAT__GL_ESTIMATE on read normals, and are there without and
+   with them. */
+enum {
+    SSAO_SAT__GL_SAMPLE, SSAO_SAT__GL_RANGE, SSAO_SAT__GL_SHARES, SSAO_SAT__GL_EDGES, SSAO_SAT__GL_WORDS,
+    SSAO_SAT__GL_SCAN, SSAO_SAT__GL_DIFFERENCE, SSAO_SAT__GL_DIFFERENCE_SINGLE,
+    SSAO_SAT__GL_ESTIMATE, SSAO_SAT__GL_ESTIMATE_SINGLE,
+    SSAO_SAT__GL_UPSAMPLE, /* as ssao_sat__gl_output counts */
+    SSAO_SAT__GL_PROGRAMS = SSAO_SAT__GL_UPSAMPLE + 3
+};
+
+static const sat__gl_program ssao_sat__programs[SSAO_SAT__GL_PROGRAMS] = {
+    {"ssao_sat: sample", 0, "depth", "#define FIRST\n", NULL, {ssao_sat__gl_range}},
+    {"ssao_sat: range", 0, "finer", NULL, NULL, {ssao_sat__gl_range}},
+    {"ssao_sat: shares", SSAO_SAT__IF_SLABS, "depth finer", NULL, NULL, {ssao_sat__gl_shares}},
+    {"ssao_sat: edges", 0, "finer shares", NULL, NULL, {ssao_sat__gl_edges}},
+    {"ssao_sat: words", 0, "depth edges", NULL, NULL, {ssao_sat__gl_words}},
+    {"ssao_sat: sums", 0, "table", NULL, NULL, {ssao_sat__gl_scan}},
+    {"ssao_sat: signed", SSAO_SAT__IF_SIGNED | SSAO_SAT__IF_SLABS, "depth table edges", NULL, NULL,
+     {ssao_sat__gl_tone, ssao_sat__gl_signed_slabs, ssao_sat__gl_signed_main}},
+    {"ssao_sat: signed", SSAO_SAT__IF_SIGNED | SSAO_SAT__IF_SINGLE, "depth table edges", NULL, NULL,
+     {ssao_sat__gl_tone, ssao_sat__gl_single, ssao_sat__gl_signed_single, ssao_sat__gl_signed_main}},
+    {"ssao_sat: estimate", SSAO_SAT__IF_SLABS, "depth table edges normals", NULL, NULL,
+     {ssao_sat__gl_tone, ssao_sat__gl_slabs}},
+    {"ssao_sat: estimate", SSAO_SAT__IF_SINGLE, "depth table edges normals", NULL, NULL,
+     {ssao_sat__gl_tone, ssao_sat__gl_single, ssao_sat__gl_refine_last, ssao_sat__gl_refine, ssao_sat__gl_refine_all,
+      ssao_sat__gl_refine, ssao_sat__gl_single_main}},
+    {"ssao_sat: picture", 0, "depth coarse normals", "#define BLANK 1.0\n", NULL,
+     {SAT__GL_PIXEL, ssao_sat__gl_upsample}},
+    {"ssao_sat: picture with bent normals", SSAO_SAT__IF_BENT, "depth coarse normals",
+     "#define BLANK 1.0\n#define BENT\n", NULL, {SAT__GL_PIXEL, ssao_sat__gl_upsample}},
+    {"ssao_sat: signed picture", SSAO_SAT__IF_SIGNED, "depth coarse normals", "#define BLANK 0.0\n", NULL,
+     {SAT__GL_PIXEL, ssao_sat__gl_upsample}}};
+
+/* What they draw into. */
+enum {
+    SSAO_SAT__T_SAMPLE, SSAO_SAT__T_RANGE, SSAO_SAT__T_SHARES, SSAO_SAT__T_EDGES, SSAO_SAT__T_TABLE,
+    SSAO_SAT__T_TABLE_1, SSAO_SAT__T_OPEN, SSAO_SAT__T_OUT, SSAO_SAT__T_BENT, SSAO_SAT__TARGETS, SSAO_SAT__GL_UNITS = 4
+};
 
 struct ssao_sat_gl {
     sat__gl gl;
     ssao_sat_options options;
-    int width, height, step, columns, rows, tiles, is_built;
+    int width, height, step, tiles, given, is_built; /* as created */
+    struct { int width, height, columns, rows; } now; /* of this frame: not larger; all lies in the textures' corners */
     int from[2]; /* where the picture lies in the inputs of this call */
-    unsigned programs[2][SSAO_SAT__GL_PROGRAMS]; /* without and with normals */
-    ssao_sat__gl_target range[2], shares, edges, table[2], open, out, bent;
+    unsigned program[2][SSAO_SAT__GL_PROGRAMS]; /* without and with normals; [1] from SSAO_SAT__GL_ESTIMATE on */
+    sat__gl_target target[SSAO_SAT__TARGETS];   /* of the tables [0] holds the sums */
     ssao_sat__gl_output output; /* of this frame */
     ssao_sat__camera camera;
     ssao_sat__fit fit;
@@ -3373,134 +3516,87 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_view(float *view, const ssao_sat_input *inpu
     return SAT_OK;
 }
 
-/* Programs that read normals are there twice; the others once, under 0. */
-static int ssao_sat__gl_reads_normals(int which)
-{
-    return which >= SSAO_SAT__GL_ESTIMATE && which != SSAO_SAT__GL_ESTIMATE + 2 * SSAO_SAT__GL_SIGNED;
-}
-
-static int ssao_sat__gl_has_output(const ssao_sat_options *o, int output)
-{
-#ifdef SSAO_SAT_NO_BENT
-    if (output == SSAO_SAT__GL_BENT) return 0;
-#endif
-    return output == SSAO_SAT__GL_OPEN || (output == SSAO_SAT__GL_BENT && o->gl_bent && o->method == SSAO_SAT_SLABS) ||
-           (output == SSAO_SAT__GL_SIGNED && o->gl_signed);
-}
-
-static sat_result ssao_sat__gl_program(ssao_sat_gl *g, int which, const char *const *fragment, int normals)
+static void ssao_sat__gl_define(ssao_sat_gl *g)
 {
     const ssao_sat_options *o = &g->options;
-    sat__gl_shaders shaders;
-    const char *library[2];
-    int output = which < SSAO_SAT__GL_ESTIMATE ? SSAO_SAT__GL_OPEN : (which - SSAO_SAT__GL_ESTIMATE) / 2;
-    library[0] = which == SSAO_SAT__GL_SCAN ? "" : ssao_sat_gl_glsl();
-    library[1] = NULL;
-    memset(&shaders, 0, sizeof shaders);
-    shaders.name = "ssao_sat";
-    shaders.library = library;
-    shaders.fragment = fragment;
-    sat__gl_define(&g->gl, "NORMALS", normals);
-    sat__gl_define(&g->gl, "STEP", g->step);
-    sat__gl_define(&g->gl, "SLABS", o->slabs);
-    sat__gl_define(&g->gl, "RINGS", o->scales);
-    sat__gl_define(&g->gl, "GRID", SSAO_SAT__GRID);
-    sat__gl_define(&g->gl, "BINS", SSAO_SAT__BINS);
-    sat__gl_define(&g->gl, "TILES", g->tiles);
-    sat__gl_define(&g->gl, "METHOD", (int)o->method);
-    sat__gl_define(&g->gl, "INVERTED", o->inverted_depth != 0);
-    sat__gl_define(&g->gl, "PRINTED", o->as_printed != 0);
-    sat__gl_define(&g->gl, "LEVELS", o->refine_levels);
-    sat__gl_define(&g->gl, "BOXES", o->plane_boxes);
-    sat__gl_define(&g->gl, "FIRST", which == SSAO_SAT__GL_RANGE_FIRST);
-    sat__gl_define(&g->gl, "TRIM", SSAO_SAT__TRIM);
-    sat__gl_define_float(&g->gl, "BEYOND", SSAO_SAT__BEYOND);
-    sat__gl_define_float(&g->gl, "MARGIN", SSAO_SAT__MARGIN);
-    sat__gl_define(&g->gl, "BENT", output == SSAO_SAT__GL_BENT);
-    sat__gl_define_float(&g->gl, "BLANK", output == SSAO_SAT__GL_SIGNED ? 0 : 1);
-    sat__gl_define_float(&g->gl, "BLOCKED", SSAO_SAT__BLOCKED);
-    return sat__gl_build(&g->gl, &g->programs[normals][which], &shaders);
+    sat__gl *gl = &g->gl;
+    sat__gl_define(gl, "METHOD", (int)o->method);
+    sat__gl_define(gl, "STEP", g->step);
+    sat__gl_define(gl, "SLABS", o->slabs);
+    sat__gl_define(gl, "RINGS", o->scales);
+    sat__gl_define(gl, "TILES", g->tiles);
+    sat__gl_define(gl, "INVERTED", o->inverted_depth != 0);
+    sat__gl_define(gl, "PRINTED", o->as_printed != 0);
+    sat__gl_define(gl, "LEVELS", o->refine_levels);
+    sat__gl_define(gl, "BOXES", o->plane_boxes);
+    sat__gl_define(gl, "GRID", SSAO_SAT__GRID);
+    sat__gl_define(gl, "BINS", SSAO_SAT__BINS);
+    sat__gl_define(gl, "TRIM", SSAO_SAT__TRIM);
+    sat__gl_define(gl, "LEVEL_BITS", SSAO_SAT__LEVEL_BITS);
+    sat__gl_define_float(gl, "BEYOND", SSAO_SAT__BEYOND);
+    sat__gl_define_float(gl, "MARGIN", SSAO_SAT__MARGIN);
+    sat__gl_define_float(gl, "BLOCKED", SSAO_SAT__BLOCKED);
+    sat__gl_define_float(gl, "BEHIND", SSAO_SAT__BEHIND);
+    sat__gl_define_float(gl, "GRAZING", SSAO_SAT__GRAZING);
+    sat__gl_define_float(gl, "RANGE_SLACK", SSAO_SAT__RANGE_SLACK);
+    sat__gl_define_float(gl, "LEAST_SQUARE", SSAO_SAT__LEAST_SQUARE);
+    sat__gl_define_float(gl, "LARGEST_RADIUS", SSAO_SAT__LARGEST_RADIUS);
+    sat__gl_define_float(gl, "OPEN_LENGTH", SSAO_SAT__OPEN_LENGTH);
+    sat__gl_define_float(gl, "NO_DIRECTION", SSAO_SAT__NO_DIRECTION);
 }
 
-/* The texts of one program, in order, into parts[]. */
-static void ssao_sat__gl_texts(const ssao_sat_gl *g, int which, const char **parts)
+/* All without normals, then those that read them once more. */
+static sat_result ssao_sat__gl_make_programs(ssao_sat_gl *g)
 {
-    static const char last[] = "#define NAME refine_last\n#define CHILD\n#define LEVEL 1\n";
-    static const char first[] = "#undef NAME\n#undef CHILD\n#undef LEVEL\n#define NAME refine_all\n#define LEVEL 0\n"
-                                "#define CHILD child = refine_last(c, z, edge);\n";
-    static const char *const before[SSAO_SAT__GL_ESTIMATE] = {ssao_sat__gl_range, ssao_sat__gl_range,
-                                                              ssao_sat__gl_shares, ssao_sat__gl_edges,
-                                                              ssao_sat__gl_words, ssao_sat__gl_scan};
-    const int slabs = g->options.method == SSAO_SAT_SLABS;
-    if (which != SSAO_SAT__GL_SCAN) *parts++ = ssao_sat__gl_common;
-    if (which < SSAO_SAT__GL_ESTIMATE) *parts++ = before[which];
-    else if ((which - SSAO_SAT__GL_ESTIMATE) % 2) {
-        *parts++ = sat__gl_pixel();
-        *parts++ = ssao_sat__gl_upsample;
-    } else {
-        *parts++ = ssao_sat__gl_tone;
-        if (!slabs) *parts++ = ssao_sat__gl_single;
-        if (which == SSAO_SAT__GL_ESTIMATE + 2 * SSAO_SAT__GL_SIGNED) {
-            *parts++ = slabs ? ssao_sat__gl_signed_slabs : ssao_sat__gl_signed_single;
-            *parts++ = ssao_sat__gl_signed_main;
-        } else if (slabs) *parts++ = ssao_sat__gl_slabs;
-        else {
-            *parts++ = last;
-            *parts++ = ssao_sat__gl_refine;
-            *parts++ = first;
-            *parts++ = ssao_sat__gl_refine;
-            *parts++ = ssao_sat__gl_single_main;
-        }
-    }
-    *parts = NULL;
-}
-
-static sat_result ssao_sat__gl_build_programs(ssao_sat_gl *g)
-{
-    const char *parts[10];
-    sat_result result = SAT_OK;
-    int i, normals;
-    for (normals = 0; normals < 2; normals++)
-        for (i = 0; i < SSAO_SAT__GL_PROGRAMS && result == SAT_OK; i++) {
-            if (normals && !ssao_sat__gl_reads_normals(i)) continue;
-            if (i >= SSAO_SAT__GL_ESTIMATE && !ssao_sat__gl_has_output(&g->options, (i - SSAO_SAT__GL_ESTIMATE) / 2))
-                continue;
-            ssao_sat__gl_texts(g, i, parts);
-            result = ssao_sat__gl_program(g, i, parts, normals);
-        }
-    g->is_built = result == SAT_OK;
-    return result;
-}
-
-/* A texture one can draw into. */
-static sat_result ssao_sat__gl_make_target(ssao_sat_gl *g, ssao_sat__gl_target *t, unsigned internal, int width,
-                                           int height)
-{
-    sat_result result = sat__gl_texture(&g->gl, &t->texture, internal, width, height, NULL);
-    t->width = width;
-    t->height = height;
-    return result == SAT_OK ? sat__gl_framebuffer(&g->gl, &t->framebuffer, &t->texture, 1, 0) : result;
+    const char *const library[3] = {ssao_sat__gl_functions, ssao_sat__gl_common, NULL};
+    const int first = SSAO_SAT__GL_ESTIMATE;
+    sat_result result;
+    ssao_sat__gl_define(g);
+    result = sat__gl_build_table(&g->gl, g->program[0], ssao_sat__programs, SSAO_SAT__GL_PROGRAMS, g->given, library);
+    if (result != SAT_OK) return result;
+    ssao_sat__gl_define(g);
+    sat__gl_define_text(&g->gl, "NORMALS", "");
+    return sat__gl_build_table(&g->gl, g->program[1] + first, ssao_sat__programs + first, SSAO_SAT__GL_PROGRAMS - first,
+                               g->given, library);
 }
 
 static sat_result ssao_sat__gl_make_targets(ssao_sat_gl *g)
 {
-    int i, slabs = g->options.method == SSAO_SAT_SLABS, bent = ssao_sat__gl_has_output(&g->options, SSAO_SAT__GL_BENT);
-    int tile_rows = slabs ? (g->options.slabs + g->tiles - 1) / g->tiles : 1;
+    const int slabs = g->given & SSAO_SAT__IF_SLABS, bent = g->given & SSAO_SAT__IF_BENT;
+    const int columns = g->now.columns, rows = g->now.rows, width = columns * g->tiles,
+              height = rows * (slabs ? (g->options.slabs + g->tiles - 1) / g->tiles : 1);
+    const struct { unsigned internal; int width, height; } list[SSAO_SAT__TARGETS] = {
+        {SAT__GL_RG32F, SSAO_SAT__GRID / 2, SSAO_SAT__GRID / 2},
+        {SAT__GL_RG32F, 1, 1},
+        {SAT__GL_R32F, SSAO_SAT__BINS + 1, slabs ? 1 : 0},
+        {SAT__GL_RGBA32F, g->options.slabs + 1, 1},
+        {slabs ? SAT__GL_RGBA32UI : SAT__GL_R32UI, width, height},
+        {slabs ? SAT__GL_RGBA32UI : SAT__GL_R32UI, width, height},
+        {bent ? SAT__GL_RGBA16F : SAT__GL_R32F, columns, rows},
+        {SAT__GL_R32F, g->now.width, g->now.height},
+        {SAT__GL_RGBA16F, g->now.width, bent ? g->now.height : 0}};
     sat_result result = SAT_OK;
-    for (i = 0; i < 2 && result == SAT_OK; i++)
-        result = ssao_sat__gl_make_target(g, &g->range[i], SAT__GL_RG32F, i ? 1 : SSAO_SAT__GRID / 2,
-                                          i ? 1 : SSAO_SAT__GRID / 2);
-    if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->shares, SAT__GL_R32F, SSAO_SAT__BINS + 1, 1);
-    if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->edges, SAT__GL_RGBA32F, g->options.slabs + 1, 1);
-    for (i = 0; i < 2 && result == SAT_OK; i++)
-        result = ssao_sat__gl_make_target(g, &g->table[i], slabs ? SAT__GL_RGBA32UI : SAT__GL_R32UI,
-                                          g->columns * g->tiles, g->rows * tile_rows);
-    if (result == SAT_OK)
-        result = ssao_sat__gl_make_target(g, &g->open, bent ? SAT__GL_RGBA16F : SAT__GL_R32F, g->columns, g->rows);
-    if (result == SAT_OK) result = ssao_sat__gl_make_target(g, &g->out, SAT__GL_R32F, g->width, g->height);
-    if (result == SAT_OK && bent)
-        result = ssao_sat__gl_make_target(g, &g->bent, SAT__GL_RGBA16F, g->width, g->height);
+    int i;
+    for (i = 0; i < SSAO_SAT__TARGETS && result == SAT_OK; i++)
+        if (!list[i].height) continue;
+        else if (!g->target[i].texture)
+            result = sat__gl_make_target(&g->gl, &g->target[i], list[i].internal, list[i].width, list[i].height);
+        else {
+            g->target[i].width = list[i].width;
+            g->target[i].height = list[i].height;
+        }
     return result;
+}
+
+/* What passes draw into of the textures, for a picture of this size; the first time they are made. */
+static sat_result ssao_sat__gl_set_size(ssao_sat_gl *g, int width, int height)
+{
+    if (width == g->now.width && height == g->now.height) return SAT_OK;
+    g->now.width = width;
+    g->now.height = height;
+    g->now.columns = (width + g->step - 1) / g->step;
+    g->now.rows = (height + g->step - 1) / g->step;
+    return ssao_sat__gl_make_targets(g);
 }
 
 SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *get_proc, int width, int height,
@@ -3514,8 +3610,7 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *g
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (!sat__version_matches()) return SAT_ERR_VERSION;
-    if (width < 1 || height < 1 || width > 32768 || height > 32768 || !ssao_sat__options_are_valid(&o))
-        return SAT_ERR_ARGUMENT;
+    if (!ssao_sat__size_is_valid(width, height) || !ssao_sat__options_are_valid(&o)) return SAT_ERR_ARGUMENT;
     if (!sat__resolve_allocator(&allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     g = (ssao_sat_gl *)sat__alloc(&allocator, sizeof *g);
     if (!g) return SAT_ERR_MEMORY;
@@ -3526,15 +3621,19 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_create(ssao_sat_gl **out, sat_gl_get_proc *g
     g->width = width;
     g->height = height;
     g->step = o.half_resolution ? 2 : 1;
-    g->columns = (width + g->step - 1) / g->step;
-    g->rows = (height + g->step - 1) / g->step;
     g->tiles = o.method != SSAO_SAT_SLABS ? 1 : o.slabs > 4 ? 4 : o.slabs > 1 ? 2 : 1;
+    g->given = (o.method == SSAO_SAT_SLABS ? SSAO_SAT__IF_SLABS : SSAO_SAT__IF_SINGLE) |
+               (o.gl_signed ? SSAO_SAT__IF_SIGNED : 0);
+#ifndef SSAO_SAT_NO_BENT
+    if (o.gl_bent && o.method == SSAO_SAT_SLABS) g->given |= SSAO_SAT__IF_BENT;
+#endif
     result = sat__gl_open(&g->gl, get_proc);
     if (result != SAT_OK) return result;
-    sat__gl_begin(&g->gl, &state, 5);
-    result = ssao_sat__gl_make_targets(g);
-    if (result == SAT_OK) result = ssao_sat__gl_build_programs(g);
+    sat__gl_begin(&g->gl, &state, SSAO_SAT__GL_UNITS);
+    result = ssao_sat__gl_set_size(g, width, height);
+    if (result == SAT_OK) result = ssao_sat__gl_make_programs(g);
     sat__gl_end(&g->gl, &state);
+    g->is_built = result == SAT_OK;
     return result;
 }
 
@@ -3554,13 +3653,11 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_set_options(ssao_sat_gl *gl, const ssao_sat_
 }
 
 SSAO_SAT_DEF const char *ssao_sat_gl_message(const ssao_sat_gl *gl) { return gl ? gl->gl.message : ""; }
-SSAO_SAT_DEF unsigned ssao_sat_gl_texture(const ssao_sat_gl *gl) { return gl ? gl->out.texture : 0; }
-
-static void ssao_sat__gl_drop(ssao_sat_gl *g, ssao_sat__gl_target *t)
+SSAO_SAT_DEF unsigned ssao_sat_gl_texture(const ssao_sat_gl *gl)
 {
-    if (t->framebuffer) g->gl.DeleteFramebuffers(1, &t->framebuffer);
-    if (t->texture) g->gl.DeleteTextures(1, &t->texture);
+    return gl ? gl->target[SSAO_SAT__T_OUT].texture : 0;
 }
+
 
 SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl)
 {
@@ -3568,146 +3665,135 @@ SSAO_SAT_DEF void ssao_sat_gl_destroy(ssao_sat_gl *gl)
     int i;
     if (!gl) return;
     if (gl->gl.vertex_array) {
-        for (i = 0; i < 2 * SSAO_SAT__GL_PROGRAMS; i++)
-            if (gl->programs[i % 2][i / 2]) gl->gl.DeleteProgram(gl->programs[i % 2][i / 2]);
-        for (i = 0; i < 2; i++) ssao_sat__gl_drop(gl, &gl->range[i]);
-        for (i = 0; i < 2; i++) ssao_sat__gl_drop(gl, &gl->table[i]);
-        ssao_sat__gl_drop(gl, &gl->shares);
-        ssao_sat__gl_drop(gl, &gl->edges);
-        ssao_sat__gl_drop(gl, &gl->open);
-        ssao_sat__gl_drop(gl, &gl->out);
-        ssao_sat__gl_drop(gl, &gl->bent);
+        sat__gl_delete_programs(&gl->gl, gl->program[0], 2 * SSAO_SAT__GL_PROGRAMS);
+        for (i = 0; i < SSAO_SAT__TARGETS; i++) sat__gl_free_target(&gl->gl, &gl->target[i]);
         sat__gl_close(&gl->gl);
     }
     allocator = gl->options.allocator;
     sat__release(&allocator, gl, sizeof *gl);
 }
 
-/* Starts a pass with the uniforms that most of them share. */
-static unsigned ssao_sat__gl_pass(ssao_sat_gl *g, int which, const ssao_sat__gl_target *to, unsigned depth,
-                                  unsigned normals)
+/* The uniforms that all programs share; of one that was started. */
+static void ssao_sat__gl_set_frame(ssao_sat_gl *g, unsigned program)
 {
-    unsigned program = g->programs[normals && ssao_sat__gl_reads_normals(which)][which];
-    sat__gl *gl = &g->gl;
-    sat__gl_pass(gl, program, to->framebuffer, to->width, to->height);
-    gl->Uniform4fv(gl->GetUniformLocation(program, "view"), 3, g->view);
-    sat__gl_set_int2(gl, program, "size", g->columns, g->rows);
-    sat__gl_set_int2(gl, program, "picture", g->width, g->height);
-    sat__gl_set_int2(gl, program, "sat_from", g->from[0], g->from[1]);
-    sat__gl_set_texture(gl, program, "depth", 0, depth);
-    if (normals) sat__gl_set_texture(gl, program, "normals", 1, normals);
-    if (which >= SSAO_SAT__GL_WORDS) sat__gl_set_texture(gl, program, "edges", 2, g->edges.texture);
-    return program;
+    g->gl.Uniform4fv(g->gl.GetUniformLocation(program, "view"), 3, g->view);
+    sat__gl_set_int2(&g->gl, program, "size", g->now.columns, g->now.rows);
+    sat__gl_set_int2(&g->gl, program, "picture", g->now.width, g->now.height);
+    sat__gl_set_int2(&g->gl, program, "sat_from", g->from[0], g->from[1]);
 }
+
+/* A pass without uniforms of its own. */
+#define SSAO_SAT__GL_PASS(g, index, to, ...)                                                                           \
+    do {                                                                                                               \
+        SAT__GL_START(&(g)->gl, (g)->program[0][index], to, __VA_ARGS__);                                              \
+        ssao_sat__gl_set_frame(g, (g)->program[0][index]);                                                             \
+        sat__gl_draw(&(g)->gl);                                                                                        \
+    } while (0)
 
 /* Depth range, then the edges of the slabs. */
 static void ssao_sat__gl_find_edges(ssao_sat_gl *g, unsigned depth)
 {
-    sat__gl *gl = &g->gl;
+    const ssao_sat_options *o = &g->options;
+    const sat__gl_target *t = g->target;
+    unsigned program = g->program[0][SSAO_SAT__GL_EDGES];
     float region[4];
-    unsigned program;
-    int i;
-    for (i = 0; i < 2; i++) {
-        program = ssao_sat__gl_pass(g, i ? SSAO_SAT__GL_RANGE : SSAO_SAT__GL_RANGE_FIRST, &g->range[i], depth, 0);
-        if (i) sat__gl_set_texture(gl, program, "finer", 3, g->range[0].texture);
-        sat__gl_draw(gl);
-    }
-    if (g->options.method == SSAO_SAT_SLABS) {
-        program = ssao_sat__gl_pass(g, SSAO_SAT__GL_SHARES, &g->shares, depth, 0);
-        sat__gl_set_texture(gl, program, "finer", 3, g->range[1].texture);
-        sat__gl_draw(gl);
-    }
-    program = ssao_sat__gl_pass(g, SSAO_SAT__GL_EDGES, &g->edges, depth, 0);
-    sat__gl_set_texture(gl, program, "shares", 4, g->shares.texture);
-    region[0] = (float)g->options.radius;
-    region[1] = g->options.region_pixels > 0 ? 1e30f : (float)g->options.radius * g->fit.reach;
-    region[2] = g->options.region_pixels > 0 ? (float)g->options.region_pixels / (float)g->step : g->limit;
-    region[3] = g->options.method == SSAO_SAT_SLABS && g->output != SSAO_SAT__GL_SIGNED ? 3.0f : 1.0f;
-    sat__gl_set_float4(gl, program, "region", region);
-    sat__gl_set_texture(gl, program, "finer", 3, g->range[1].texture);
-    sat__gl_draw(gl);
+    SSAO_SAT__GL_PASS(g, SSAO_SAT__GL_SAMPLE, &t[SSAO_SAT__T_SAMPLE], depth);
+    SSAO_SAT__GL_PASS(g, SSAO_SAT__GL_RANGE, &t[SSAO_SAT__T_RANGE], t[SSAO_SAT__T_SAMPLE].texture);
+    if (g->given & SSAO_SAT__IF_SLABS)
+        SSAO_SAT__GL_PASS(g, SSAO_SAT__GL_SHARES, &t[SSAO_SAT__T_SHARES], depth, t[SSAO_SAT__T_RANGE].texture);
+    region[0] = (float)o->radius;
+    region[1] = o->region_pixels > 0 ? 1e30f : (float)o->radius * g->fit.reach;
+    region[2] = o->region_pixels > 0 ? (float)o->region_pixels / (float)g->step : g->limit;
+    region[3] = o->method == SSAO_SAT_SLABS && g->output != SSAO_SAT__GL_SIGNED ? 3.0f : 1.0f;
+    SAT__GL_START(&g->gl, program, &t[SSAO_SAT__T_EDGES], t[SSAO_SAT__T_RANGE].texture, t[SSAO_SAT__T_SHARES].texture);
+    ssao_sat__gl_set_frame(g, program);
+    sat__gl_set_float4(&g->gl, program, "region", region);
+    sat__gl_draw(&g->gl);
 }
 
-/* Words of all slabs, and their sums along x, then y; the index of the table that holds them. */
-static int ssao_sat__gl_sum(ssao_sat_gl *g, unsigned depth)
+/* Words of all slabs, and their sums along x, then y. */
+static void ssao_sat__gl_sum(ssao_sat_gl *g, unsigned depth)
 {
     sat__gl *gl = &g->gl;
-    unsigned program;
-    int axis, reach, now = 0;
-    ssao_sat__gl_pass(g, SSAO_SAT__GL_WORDS, &g->table[0], depth, 0);
-    sat__gl_draw(gl);
+    sat__gl_target *t = g->target, *table = &t[SSAO_SAT__T_TABLE];
+    unsigned program = g->program[0][SSAO_SAT__GL_SCAN];
+    int axis, reach;
+    SSAO_SAT__GL_PASS(g, SSAO_SAT__GL_WORDS, table, depth, t[SSAO_SAT__T_EDGES].texture);
     for (axis = 0; axis < 2; axis++)
-        for (reach = 1; reach < (axis ? g->rows : g->columns); reach *= 4, now = !now) {
-            program = ssao_sat__gl_pass(g, SSAO_SAT__GL_SCAN, &g->table[!now], depth, 0);
-            sat__gl_set_texture(gl, program, "table", 3, g->table[now].texture);
+        for (reach = 1; reach < (axis ? g->now.rows : g->now.columns); reach *= 4) {
+            const sat__gl_target from = table[0];
+            SAT__GL_START(gl, program, &table[1], from.texture);
+            ssao_sat__gl_set_frame(g, program);
             sat__gl_set_int2(gl, program, "reach", axis ? 0 : reach, axis ? reach : 0);
             sat__gl_draw(gl);
+            table[0] = table[1];
+            table[1] = from;
         }
-    return now;
 }
 
-static void ssao_sat__gl_estimate(ssao_sat_gl *g, unsigned depth, unsigned normals, int table)
+static void ssao_sat__gl_estimate(ssao_sat_gl *g, unsigned depth, unsigned normals)
 {
     sat__gl *gl = &g->gl;
     const ssao_sat_options *o = &g->options;
-    int which = SSAO_SAT__GL_ESTIMATE + 2 * (int)g->output;
-    unsigned program = ssao_sat__gl_pass(g, which, &g->open, depth, normals);
-    float v[4];
-    v[0] = (float)o->radius * g->fit.reach;
-    v[1] = o->method == SSAO_SAT_SLABS ? (float)o->radius * g->fit.range : g->fit.range;
-    v[2] = g->fit.bias;
-    v[3] = g->fit.gain;
-    sat__gl_set_float4(gl, program, "fit", v);
-    v[0] = (float)o->radius;
-    v[1] = g->limit;
-    v[2] = (float)o->min_pixels;
-    v[3] = (float)o->region_pixels;
-    sat__gl_set_float4(gl, program, "region", v);
-    v[0] = g->fit.power;
-    v[1] = (float)o->power;
-    sat__gl_set_float4(gl, program, "tone", v);
-    v[0] = (float)(o->method == SSAO_SAT_MINIMALIST ? 0 : o->normal_offset);
-    v[1] = (float)o->refine_threshold;
-    v[2] = (float)o->depth_gain;
-    sat__gl_set_float4(gl, program, "published", v);
-    if (o->method == SSAO_SAT_SLABS && g->output != SSAO_SAT__GL_SIGNED) {
+    const sat__gl_target *t = g->target;
+    const int single = g->given & SSAO_SAT__IF_SINGLE ? 1 : 0, is_signed = g->output == SSAO_SAT__GL_SIGNED;
+    unsigned program = is_signed ? g->program[0][SSAO_SAT__GL_DIFFERENCE + single]
+                                 : g->program[normals != 0][SSAO_SAT__GL_ESTIMATE + single];
+    const float fit[4] = {(float)o->radius * g->fit.reach, (single ? 1 : (float)o->radius) * g->fit.range, g->fit.bias,
+                          g->fit.gain};
+    const float region[4] = {(float)o->radius, g->limit, (float)o->min_pixels, (float)o->region_pixels};
+    const float tone[4] = {g->fit.power, (float)o->power, 0, 0};
+    const float published[4] = {o->method == SSAO_SAT_MINIMALIST ? 0 : (float)o->normal_offset,
+                                (float)o->refine_threshold, (float)o->depth_gain, 0};
+    SAT__GL_START(gl, program, &t[SSAO_SAT__T_OPEN], depth, t[SSAO_SAT__T_TABLE].texture, t[SSAO_SAT__T_EDGES].texture,
+                  normals);
+    ssao_sat__gl_set_frame(g, program);
+    sat__gl_set_float4(gl, program, "fit", fit);
+    sat__gl_set_float4(gl, program, "region", region);
+    sat__gl_set_float4(gl, program, "tone", tone);
+    sat__gl_set_float4(gl, program, "published", published);
+    if (!single && !is_signed) {
         const ssao_sat__kernel *kernel = &ssao_sat__kernels[o->scales - 1];
-        float k[52];
-        memset(k, 0, sizeof k);
+        float k[52] = {0};
         memcpy(k, kernel->term, sizeof kernel->term);
         k[48] = kernel->grazing;
         k[49] = kernel->facing;
         k[50] = (float)o->geometric;
         gl->Uniform4fv(gl->GetUniformLocation(program, "kernel"), 13, k);
     }
-    sat__gl_set_texture(gl, program, "table", 3, g->table[table].texture);
     sat__gl_draw(gl);
 }
 
 static sat_result ssao_sat__gl_run(ssao_sat_gl *g, const sat_gl_target *to, unsigned depth, unsigned normals)
 {
     sat__gl *gl = &g->gl;
-    const ssao_sat__gl_target *own = g->output == SSAO_SAT__GL_BENT ? &g->bent : &g->out;
+    const sat__gl_target *t = g->target;
+    unsigned program = g->program[normals != 0][SSAO_SAT__GL_UPSAMPLE + (int)g->output];
+    unsigned own = t[g->output == SSAO_SAT__GL_BENT ? SSAO_SAT__T_BENT : SSAO_SAT__T_OUT].framebuffer;
     sat_result result;
-    unsigned program;
-    int table;
     if (g->options.radius > 0 && g->fit.gain > 0) {
         ssao_sat__gl_find_edges(g, depth);
-        table = ssao_sat__gl_sum(g, depth);
-        ssao_sat__gl_estimate(g, depth, normals, table);
+        ssao_sat__gl_sum(g, depth);
+        ssao_sat__gl_estimate(g, depth, normals);
     } else {
-        float open[4] = {1, 0, 0, 0};
-        if (g->output == SSAO_SAT__GL_SIGNED) open[0] = 0;
-        gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, g->open.framebuffer);
+        const float open[4] = {g->output == SSAO_SAT__GL_SIGNED ? 0.0f : 1.0f, 0, 0, 0};
+        gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, t[SSAO_SAT__T_OPEN].framebuffer);
         gl->ClearBufferfv(SAT__GL_COLOR, 0, open);
     }
-    program = ssao_sat__gl_pass(g, SSAO_SAT__GL_UPSAMPLE + 2 * (int)g->output, own, depth, normals);
-    result = sat__gl_pass_to(gl, program, to, own->framebuffer, g->width, g->height);
+    result = sat__gl_pass_to(gl, program, to, own, g->now.width, g->now.height);
     if (result != SAT_OK) return result;
-    sat__gl_set_texture(gl, program, "coarse", 3, g->open.texture);
+    SAT__GL_INPUTS(gl, depth, t[SSAO_SAT__T_OPEN].texture, normals);
+    ssao_sat__gl_set_frame(g, program);
     sat__gl_draw(gl);
     sat__gl_release_target(gl, to);
     return SAT_OK;
+}
+
+/* What the object was made for. */
+static int ssao_sat__gl_has_output(const ssao_sat_gl *g, ssao_sat__gl_output output)
+{
+    return output == SSAO_SAT__GL_OPEN ||
+           g->given & (output == SSAO_SAT__GL_BENT ? SSAO_SAT__IF_BENT : SSAO_SAT__IF_SIGNED);
 }
 
 static sat_result ssao_sat__gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth, unsigned normals,
@@ -3717,9 +3803,11 @@ static sat_result ssao_sat__gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, u
     sat_result result;
     double side;
     if (!gl || !input || !depth || !gl->is_built || !sat__gl_target_is_valid(to)) return SAT_ERR_ARGUMENT;
-    if (!ssao_sat__gl_has_output(&gl->options, (int)output)) return SAT_ERR_ARGUMENT;
+    if (!ssao_sat__gl_has_output(gl, output)) return SAT_ERR_ARGUMENT;
     if (sat__gl_target_is(to, depth) || sat__gl_target_is(to, normals)) return SAT_ERR_ARGUMENT;
-    if (input->width != gl->width || input->height != gl->height) return SAT_ERR_MISMATCH;
+    if (input->width < 1 || input->height < 1) return SAT_ERR_ARGUMENT;
+    if (input->width > gl->width || input->height > gl->height) return SAT_ERR_SIZE;
+    if (to && to->width && (to->width != input->width || to->height != input->height)) return SAT_ERR_MISMATCH;
     if ((unsigned)input->depth_kind > (unsigned)SSAO_SAT_DEPTH_REVERSED || !(input->sky >= 0)) return SAT_ERR_ARGUMENT;
     if (!ssao_sat__read_camera(&gl->camera, input, gl->step, gl->options.bottom_up)) return SAT_ERR_ARGUMENT;
     ssao_sat__gl_pack_view(gl->view, &gl->camera, input);
@@ -3729,12 +3817,13 @@ static sat_result ssao_sat__gl_apply(ssao_sat_gl *gl, const sat_gl_target *to, u
         gl->fit.reach = 1;
         gl->fit.gain = (float)gl->options.gain;
     }
-    side = ssao_sat__largest_side(gl->columns, gl->rows, gl->step);
+    ssao_sat__gl_set_size(gl, input->width, input->height); /* makes nothing */
+    side = ssao_sat__largest_side(gl->now.columns, gl->now.rows, gl->step);
     gl->limit = (float)(gl->options.max_pixels < side ? gl->options.max_pixels : side);
     if (gl->camera.aspect > 1) gl->limit /= gl->camera.aspect;
     gl->from[0] = to ? to->from_x : 0;
     gl->from[1] = to ? to->from_y : 0;
-    sat__gl_begin(&gl->gl, &state, 5);
+    sat__gl_begin(&gl->gl, &state, SSAO_SAT__GL_UNITS);
     result = ssao_sat__gl_run(gl, to, depth, normals);
     sat__gl_end(&gl->gl, &state);
     return result;
@@ -3753,7 +3842,10 @@ SSAO_SAT_DEF sat_result ssao_sat_gl_apply_bent(ssao_sat_gl *gl, const sat_gl_tar
     return ssao_sat__gl_apply(gl, to, depth, normals, input, SSAO_SAT__GL_BENT);
 }
 
-SSAO_SAT_DEF unsigned ssao_sat_gl_bent_texture(const ssao_sat_gl *gl) { return gl ? gl->bent.texture : 0; }
+SSAO_SAT_DEF unsigned ssao_sat_gl_bent_texture(const ssao_sat_gl *gl)
+{
+    return gl ? gl->target[SSAO_SAT__T_BENT].texture : 0;
+}
 #endif
 
 SSAO_SAT_DEF sat_result ssao_sat_gl_apply_signed(ssao_sat_gl *gl, const sat_gl_target *to, unsigned depth,

@@ -453,10 +453,8 @@ static inline double peer_apply(peer_picture *g, ssao_sat *s, const peer_method 
     }
     start = clock();
     if (ssao_sat__check_input(s, &in) != SAT_OK) exit(1);
-    s->out = out;
-    s->out_stride = (ptrdiff_t)p->width * 4;
-    s->element = 4;
-    s->bent_wanted = s->is_signed = s->first = s->begin = 0;
+    s->to = ssao_sat__output_of(out, (ptrdiff_t)p->width * 4, 4);
+    s->first = s->begin = 0;
     s->end = s->held = s->rows;
     memset(s->workers, 0, sizeof *s->workers);
     ssao_sat__hold_rows(0, s->rows, 0, s);
@@ -466,15 +464,15 @@ static inline double peer_apply(peer_picture *g, ssao_sat *s, const peer_method 
     for (y = 0; y < s->rows; y++)
         for (x = 0; x < s->columns; x++) {
             size_t from = ssao_sat__at(s, y) + (size_t)x, at = (size_t)y * g->stride + (size_t)x;
-            g->mip[0][at] = s->z[from] > 0 ? s->z[from] : 1e18f;
-            g->n[0][at] = s->nx[from];
-            g->n[1][at] = -s->ny[from];
-            g->n[2][at] = s->nz[from];
+            g->mip[0][at] = s->work.z[from] > 0 ? s->work.z[from] : 1e18f;
+            g->n[0][at] = s->work.nx[from];
+            g->n[1][at] = -s->work.ny[from];
+            g->n[2][at] = s->work.nz[from];
         }
     peer_run(g, m, radius);
     for (y = 0; y < s->rows; y++)
         for (x = 0; x < s->columns; x++)
-            s->open[ssao_sat__at(s, y) + (size_t)x] = peer_tone(m, g->open[(size_t)y * g->stride + (size_t)x]);
+            s->work.open[ssao_sat__at(s, y) + (size_t)x] = peer_tone(m, g->open[(size_t)y * g->stride + (size_t)x]);
     ssao_sat__write_rows(0, p->height, 0, s);
     return clock() - start;
 }

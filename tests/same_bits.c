@@ -1,6 +1,5 @@
-/* Prints a hash of everything the lanes of sat.h, tonemap.h, raindrop.h, fiv.h or softassign.h compute from inputs of
-   all kinds. Compiled with and without SAT_NO_SIMD it prints the same: vectors and plain C give the same bits.
-   tests/check_house.sh compares. */
+/* Prints a hash of everything the lanes of a header compute from inputs of all kinds. Compiled with
+   and without SAT_NO_SIMD it prints the same: vectors and plain C give the same bits. tests/check_house.sh compares. */
 #define LIGHTSCAN_IMPLEMENTATION
 #ifdef SAME_BITS_TONEMAP
 #include "tonemap.h"
@@ -10,6 +9,8 @@
 #include "fiv.h"
 #elif defined(SAME_BITS_SOFTASSIGN)
 #include "softassign.h"
+#elif defined(SAME_BITS_SSAO_SAT)
+#include "ssao_sat.h"
 #else
 #define SAT_SIBLING
 #include "sat.h"
@@ -28,7 +29,7 @@ static void add(const void *p, size_t size)
 }
 
 #if !defined(SAME_BITS_TONEMAP) && !defined(SAME_BITS_FIV) && !defined(SAME_BITS_RAINDROP) && \
-    !defined(SAME_BITS_SOFTASSIGN)
+    !defined(SAME_BITS_SOFTASSIGN) && !defined(SAME_BITS_SSAO_SAT)
 /* NaN counts as NaN: its bits are the processor's. */
 static void add_floats(sat__f32x4 v)
 {
@@ -197,6 +198,72 @@ int main(void)
     }
     raindrop_environment_destroy(e);
     printf("raindrop %016llx\n", (unsigned long long)hash);
+    return 0;
+}
+
+#elif defined(SAME_BITS_SSAO_SAT)
+enum { WIDE = 131, HIGH = 131 };
+
+static float draw_unit(void) { return (float)(draw() >> 8) / 16777216.0f; }
+
+/* Boxes before a slanted wall, sky, a few pixels of any bits; of normals too. */
+static void fill(float *depth, float *normals, int width, int height, float scale)
+{
+    int i;
+    for (i = 0; i < width * height; i++) {
+        int x = i % width, y = i / width;
+        depth[i] = scale * (3 + 0.01f * (float)x - 0.4f * (float)(x / 9 % 3 == 1 && y / 7 % 2) + 1e-4f * draw_unit());
+        if (draw() % 211 == 0 || y < height / 9) depth[i] = sat__float_from_bits(draw() % 3 ? 0x7f800000u : draw());
+        normals[3 * i] = 0.4f * draw_unit() - 0.2f;
+        normals[3 * i + 1] = 0.4f * draw_unit() - 0.2f;
+        normals[3 * i + 2] = draw() % 301 ? 1 : sat__float_from_bits(draw());
+    }
+}
+
+static void picture(int width, int height, int variant)
+{
+    static float depth[WIDE * HIGH], normals[3 * WIDE * HIGH], out[WIDE * HIGH], bent[3 * WIDE * HIGH];
+    static uint8_t codes[WIDE * HIGH];
+    ssao_sat_input in = ssao_sat_input_linear(depth, width, height, 1);
+    ssao_sat_options o = ssao_sat_defaults();
+    ssao_sat *ao;
+    size_t n = (size_t)width * (size_t)height;
+    fill(depth, normals, width, height, variant & 16 ? 1e4f : 1);
+    if (variant & 1) in.normals = normals;
+    if (variant & 2) {
+        in.projection[0] = in.projection[5] = 0.1f, in.projection[11] = 0, in.projection[15] = 1;
+    }
+    o.radius = variant & 16 ? 3e3 : 0.4;
+    o.half_resolution = !(variant & 4);
+    o.method = (ssao_sat_method)(variant & 8 ? variant % 5 : 0);
+    o.scales = 1 + variant % 4;
+    o.slabs = variant % 3 ? 8 : 3;
+    o.tolerance = variant % 5 ? 0.04 : 0;
+    o.band_rows = variant % 7 ? 0 : 16;
+    o.geometric = variant & 1 && variant & 4;
+    o.plane_boxes = 1 + variant / 5 % 2;
+    if (ssao_sat_create(&ao, width, height, &o) != SAT_OK) return;
+    ssao_sat_apply(ao, out, 0, &in, NULL);
+    add(out, n * sizeof *out);
+    ssao_sat_apply_u8(ao, codes, 0, &in, NULL);
+    add(codes, n);
+    ssao_sat_apply_signed(ao, out, 0, &in, NULL);
+    add(out, n * sizeof *out);
+    if (o.method == SSAO_SAT_SLABS) {
+        ssao_sat_apply_bent(ao, out, 0, bent, 0, &in, NULL);
+        add(out, n * sizeof *out);
+        add(bent, 3 * n * sizeof *bent);
+    }
+    ssao_sat_destroy(ao);
+}
+
+int main(void)
+{
+    static const int sides[][2] = {{1, 1}, {1, 40}, {40, 1}, {2, 3}, {7, 5}, {33, 18}, {64, 47}, {131, 131}};
+    int variant, i;
+    for (variant = 0; variant < 64; variant++)
+        for (i = 0; i < 8; i++) picture(sides[i][0], sides[i][1], variant);
+    printf("ssao_sat %016llx\n", (unsigned long long)hash);
     return 0;
 }
 

@@ -432,9 +432,10 @@ TEST(table_errors_at_every_width)
         if (EXPECT_EQ(ssao_sat_create(&ao, w, h, &o), SAT_OK)) EXPECT_EQ(ssao_sat_apply(ao, out, 0, &in, NULL), SAT_OK);
         for (i = 0; ao && i < 2000; i++) {
             int x = support_below(&state, w - 17), y = support_below(&state, h - 17), u, v;
+            ssao_sat__rect box = {x, y, x + 17, y + 17};
             uint64_t exact = 0;
             double real = 0;
-            uint32_t got = ssao_sat__box(ao, ao->table, 1, x, y, x + 17, y + 17);
+            uint32_t got = ssao_sat__box(ao, ao->table, 1, box);
             for (v = 0; v < 17; v++)
                 for (u = 0; u < 17; u++) {
                     float value = 1 / z[(size_t)(y + v) * (size_t)w + (size_t)(x + u)];
@@ -470,6 +471,7 @@ TEST(slab_sums_are_exact)
         int x0 = support_below(&state, SIDE), y0 = support_below(&state, SIDE),
             x1 = x0 + support_below(&state, SIDE - x0) + 1;
         int y1 = y0 + support_below(&state, SIDE - y0) + 1, word;
+        ssao_sat__rect box = {x0, y0, x1, y1};
         for (k = 0; k < ao->frame_slabs; k++) {
             uint32_t sum[4] = {0, 0, 0, 0};
             for (y = y0; y < y1; y++)
@@ -485,8 +487,7 @@ TEST(slab_sums_are_exact)
                     sum[3] += (uint32_t)y;
                 }
             for (word = 0; word < 4; word++)
-                wrong += ssao_sat__box(ao, ao->table + 4 * (size_t)k * ao->table_plane + word, 4, x0, y0, x1, y1) !=
-                         sum[word];
+                wrong += ssao_sat__box(ao, ao->table + 4 * (size_t)k * ao->table_plane + word, 4, box) != sum[word];
         }
     }
     EXPECT_EQ(wrong, 0);
@@ -1693,7 +1694,7 @@ TEST(edges_of_the_upsample)
                                        p->normals + 3 * (v[1] * SIDE + u[1])) /
                          (float)((1 + dx * dx) * (1 + dy * dy));
                 total += weight;
-                sum += weight * ao->open[ssao_sat__at(ao, j) + (size_t)(u[1] / 2)];
+                sum += weight * ao->work.open[ssao_sat__at(ao, j) + (size_t)(u[1] / 2)];
             }
             if (total > 0) worst = support_larger(worst, fabs((double)out[y * SIDE + x] - (double)(sum / total)));
         }

@@ -356,7 +356,13 @@ TEST(gpu_errors_have_names)
     EXPECT_EQ(ssao_sat_gl_apply(gl, &to, texture, 0, &in), SAT_ERR_ARGUMENT);
     bad = in;
     bad.width = 9;
-    EXPECT_EQ(ssao_sat_gl_apply(gl, 0, texture, 0, &bad), SAT_ERR_MISMATCH);
+    EXPECT_EQ(ssao_sat_gl_apply(gl, 0, texture, 0, &bad), SAT_ERR_SIZE);
+    to = sat_gl_to_texture(0);
+    to.place = SAT_GL_OWN;
+    to.width = to.height = 7;
+    EXPECT_EQ(ssao_sat_gl_apply(gl, &to, texture, 0, &in), SAT_ERR_MISMATCH);
+    to.height = -1;
+    EXPECT_EQ(ssao_sat_gl_apply(gl, &to, texture, 0, &in), SAT_ERR_ARGUMENT);
     bad = in;
     bad.projection[11] = 1;
     EXPECT_EQ(ssao_sat_gl_apply(gl, 0, texture, 0, &bad), SAT_ERR_ARGUMENT);
@@ -566,5 +572,137 @@ TEST(gpu_options_change_in_the_frame)
     EXPECT_EQ(ssao_sat_gl_set_options(NULL, &o), SAT_ERR_ARGUMENT);
     ssao_sat_gl_destroy(gl);
     test_f.DeleteTextures(1, &depth);
+    ref_free(&p);
+}
+
+/* All outputs of an object, one behind the other; `to` draws into a texture of GL_WIDTH x GL_HEIGHT. */
+static void all_outputs(float *out, ssao_sat_gl *gl, const ssao_sat_input *in, const unsigned *textures, int from)
+{
+    const size_t picture = (size_t)GL_WIDTH * GL_HEIGHT;
+    sat_gl_target to = sat_gl_to_texture(textures[2]);
+    sat__gl_state state;
+    to.from_x = to.from_y = from;
+    EXPECT_EQ(ssao_sat_gl_apply(gl, &to, textures[0], textures[1], in), SAT_OK);
+    download(out, textures[2], GL_WIDTH, GL_HEIGHT);
+    EXPECT_EQ(ssao_sat_gl_apply(gl, &to, textures[0], 0, in), SAT_OK);
+    download(out + picture, textures[2], GL_WIDTH, GL_HEIGHT);
+    EXPECT_EQ(ssao_sat_gl_apply_signed(gl, &to, textures[0], textures[1], in), SAT_OK);
+    download(out + 2 * picture, textures[2], GL_WIDTH, GL_HEIGHT);
+#ifndef SSAO_SAT_NO_BENT
+    if (gl->options.method != SSAO_SAT_SLABS) return;
+    to.name = textures[3];
+    EXPECT_EQ(ssao_sat_gl_apply_bent(gl, &to, textures[0], textures[1], in), SAT_OK);
+    sat__gl_begin(&test_f, &state, 1);
+    EXPECT_EQ(sat__gl_read(&test_f, out + 3 * picture, textures[3], SAT__GL_RGBA16F, GL_WIDTH, GL_HEIGHT), SAT_OK);
+    sat__gl_end(&test_f, &state);
+#else
+    (void)state;
+#endif
+}
+
+static void another_size(ssao_sat_method method, int half_resolution, const unsigned *textures, int from)
+{
+    enum { SMALL_WIDTH = 41, SMALL_HEIGHT = 29 };
+    static float out[2][7 * GL_WIDTH * GL_HEIGHT], noise[GL_WIDTH * GL_HEIGHT];
+    ssao_sat_input in = ssao_sat_input_linear(noise, GL_WIDTH, GL_HEIGHT, 1);
+    ssao_sat_options o = ssao_sat_defaults();
+    ssao_sat_gl *large = NULL, *small_one = NULL;
+    unsigned rough;
+    int i;
+    o.method = method;
+    o.half_resolution = half_resolution;
+    o.geometric = o.gl_bent = o.gl_signed = 1;
+    support_fill(noise, GL_WIDTH * GL_HEIGHT, 1, 9, 7);
+    rough = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, noise);
+    EXPECT_EQ(ssao_sat_gl_create(&large, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, &o), SAT_OK);
+    EXPECT_EQ(ssao_sat_gl_create(&small_one, test_gl.get_proc, SMALL_WIDTH, SMALL_HEIGHT, &o), SAT_OK);
+    EXPECT_EQ(ssao_sat_gl_apply(large, NULL, rough, 0, &in), SAT_OK);
+    in = ssao_sat_input_linear(noise, SMALL_WIDTH, SMALL_HEIGHT, 1);
+    memset(out, 0, sizeof out);
+    all_outputs(out[1], small_one, &in, textures, from);
+    all_outputs(out[0], large, &in, textures, from);
+    if (!EXPECT(memcmp(out[0], out[1], sizeof out[0]) == 0))
+        printf("    method %d, half %d, from %d\n", (int)method, half_resolution, from);
+    for (i = 0; i < 3 * GL_WIDTH * GL_HEIGHT; i++) {
+        int x = i % GL_WIDTH, y = i / GL_WIDTH % GL_HEIGHT;
+        if (x < SMALL_WIDTH && y < SMALL_HEIGHT) continue;
+        if (!EXPECT_NEAR(out[0][i], -7, 0)) break; /* what the texture was filled with */
+    }
+    EXPECT_EQ(ssao_sat_gl_apply(large, NULL, textures[0], 0, &in), SAT_OK); /* the own texture's corner */
+    download(out[0], ssao_sat_gl_texture(large), GL_WIDTH, GL_HEIGHT);
+    EXPECT_EQ(ssao_sat_gl_apply(small_one, NULL, textures[0], 0, &in), SAT_OK);
+    download(out[1], ssao_sat_gl_texture(small_one), SMALL_WIDTH, SMALL_HEIGHT);
+    for (i = 0; i < SMALL_HEIGHT; i++)
+        EXPECT(memcmp(out[0] + i * GL_WIDTH, out[1] + i * SMALL_WIDTH, SMALL_WIDTH * sizeof(float)) == 0);
+    in.width = GL_WIDTH + 1;
+    EXPECT_EQ(ssao_sat_gl_apply(large, NULL, textures[0], 0, &in), SAT_ERR_SIZE);
+    in.width = 0;
+    EXPECT_EQ(ssao_sat_gl_apply(large, NULL, textures[0], 0, &in), SAT_ERR_ARGUMENT);
+    ssao_sat_gl_destroy(large);
+    ssao_sat_gl_destroy(small_one);
+    test_f.DeleteTextures(1, &rough);
+}
+
+/* What was created for a size takes any smaller one in a frame: the bits of an object of that size, whatever a larger
+   frame left in the textures, and nothing beyond the picture is written. The picture lies anywhere in its inputs. */
+TEST(gpu_takes_another_size_a_frame)
+{
+    static float filler[4 * GL_WIDTH * GL_HEIGHT];
+    unsigned textures[4];
+    ref_picture p;
+    int i;
+    if (!open_gl()) SKIP(test_gl.message);
+    p = small_picture(1, 0);
+    for (i = 0; i < 4 * GL_WIDTH * GL_HEIGHT; i++) filler[i] = -7;
+    textures[0] = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, p.z);
+    textures[1] = upload(SAT__GL_RGB32F, GL_WIDTH, GL_HEIGHT, p.normals);
+    textures[2] = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, filler);
+    textures[3] = upload(SAT__GL_RGBA16F, GL_WIDTH, GL_HEIGHT, NULL);
+    another_size(SSAO_SAT_SLABS, 1, textures, 0);
+    another_size(SSAO_SAT_SLABS, 1, textures, 11);
+    another_size(SSAO_SAT_SLABS, 0, textures, 7);
+    another_size(SSAO_SAT_PLANE, 1, textures, 3);
+    another_size((ssao_sat_method)SSAO_SAT__LAST_METHOD, 0, textures, 0);
+    test_f.DeleteTextures(4, textures);
+    ref_free(&p);
+}
+
+/* With normals smoother than the mesh: the surface itself, from the depths where the picture lies in its texture. */
+TEST(gpu_geometric_normals_anywhere)
+{
+    static float z[GL_WIDTH * GL_HEIGHT], a[GL_WIDTH * GL_HEIGHT], b[GL_WIDTH * GL_HEIGHT];
+    enum { FROM = 13 };
+    ssao_sat_input in = ssao_sat_input_linear(z, GL_WIDTH - FROM, GL_HEIGHT - FROM, 1);
+    ssao_sat_options o = ssao_sat_defaults();
+    ssao_sat_gl *gl = NULL;
+    sat_gl_target to;
+    unsigned textures[3];
+    ref_picture p;
+    double off = 0;
+    int i, x, y;
+    if (!open_gl()) SKIP(test_gl.message);
+    p = small_picture(1, 0);
+    for (i = 0; i < GL_WIDTH * GL_HEIGHT; i++) p.normals[3 * i] = p.normals[3 * i + 1] = 0, p.normals[3 * i + 2] = 1;
+    o.geometric = 1;
+    o.tolerance = 0;
+    o.half_resolution = 0;
+    textures[0] = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, p.z);
+    textures[1] = upload(SAT__GL_RGB32F, GL_WIDTH, GL_HEIGHT, p.normals);
+    textures[2] = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, NULL);
+    to = sat_gl_to_texture(textures[2]);
+    to.from_x = to.from_y = FROM;
+    EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, in.width, in.height, &o), SAT_OK);
+    EXPECT_EQ(ssao_sat_gl_apply(gl, &to, textures[0], textures[1], &in), SAT_OK);
+    download(b, textures[2], GL_WIDTH, GL_HEIGHT);
+    in.depth = p.z + FROM * GL_WIDTH + FROM;
+    in.depth_stride = in.normal_stride = GL_WIDTH * (ptrdiff_t)sizeof(float);
+    in.normals = p.normals;
+    in.normal_stride *= 3;
+    EXPECT_EQ(run_c(a, &in, &o), SAT_OK);
+    for (y = 0; y < in.height; y++)
+        for (x = 0; x < in.width; x++) off += fabs((double)a[y * in.width + x] - (double)b[y * GL_WIDTH + x]);
+    EXPECT_NEAR(off / (in.width * in.height), 0, 2e-3);
+    ssao_sat_gl_destroy(gl);
+    test_f.DeleteTextures(3, textures);
     ref_free(&p);
 }

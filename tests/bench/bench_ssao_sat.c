@@ -656,12 +656,13 @@ static double format_error(const float *z, int size, int kind)
         ssao_sat_stats stats;
         if (!(0.25 * 0.5 * size / tan(0.4) > centre)) continue;
         memset(&stats, 0, sizeof stats);
-        ssao_sat__set_region(&r, ao, (float)x + 8.5f, (float)y + 8.5f, 8.5f, 8.5f);
-        ssao_sat__look_up(&r, ao, 4, 0, &stats);
+        r.stats = &stats;
+        ssao_sat__set_region(&r, ao, (float)x + 8.5f, (float)y + 8.5f, 8.5f);
+        ssao_sat__look_up(&r, ao, 4, 0);
         for (v = r.y[0]; v < r.y[4]; v++)
             for (u = r.x[0]; u < r.x[4]; u++) sum += 1 / (double)z[(size_t)v * (size_t)size + (size_t)u];
         sum /= (r.x[4] - r.x[0]) * (r.y[4] - r.y[0]);
-        worst = fmax(worst, fabs((double)ssao_sat__mean(&r, ao, 0, 0, 4, 4) - sum) * centre * centre / 0.25);
+        worst = fmax(worst, fabs((double)ssao_sat__mean(&r, ao, 0, 0, 4) - sum) * centre * centre / 0.25);
     }
     ssao_sat_destroy(ao);
     free(result);

@@ -34,20 +34,18 @@ static int rings;
 static int is_fitted(int scene) { return scene < 3 || scene == REF_YARD; }
 static double weight_of(int scene) { return scene == REF_YARD ? thin : 1; }
 
-/* What one slab holds in one cell, added to the terms of the ring. */
-static void add_cell(float *x, const ssao_sat *s, const ssao_sat__point *p, int k, const ssao_sat__cells *c, int i,
-                     int j, const float *weight)
+/* What the slab holds in cell (i, j), added to the terms of the ring. */
+static void add_cell(float *x, const ssao_sat *s, const ssao_sat__point *p, const ssao_sat__cells *c, int i, int j)
 {
-    const uint32_t *table = s->table + 4 * (size_t)k * s->table_plane;
+    const uint32_t *table = s->table + 4 * (size_t)c->slab * s->table_plane;
+    const ssao_sat__rect box = {c->column.border[i], c->row.border[j], c->column.border[i + 1], c->row.border[j + 1]};
     const size_t at = ssao_sat__at(s, p->y) + (size_t)p->x;
     float word[4], d[3], own[3], scale = s->camera.orthographic ? 1 : p->z, mean, z, square, sine, distance, share,
                                  power;
     int t, a, b;
-    for (t = 0; t < 4; t++)
-        word[t] =
-            (float)(int32_t)ssao_sat__box(s, table + t, 4, c->column[i], c->row[j], c->column[i + 1], c->row[j + 1]);
+    for (t = 0; t < 4; t++) word[t] = (float)(int32_t)ssao_sat__box(s, table + t, 4, box);
     if (!(word[0] > 0)) return;
-    mean = (s->slabs[k].low * word[0] + s->slabs[k].quantum * word[1]) / word[0];
+    mean = (s->slabs[c->slab].low * word[0] + s->slabs[c->slab].quantum * word[1]) / word[0];
     z = s->camera.orthographic ? mean : 1 / mean;
     own[0] = (s->camera.ax * (float)p->x + s->camera.bx) * scale;
     own[1] = (s->camera.ay * (float)p->y + s->camera.by) * scale;
@@ -57,9 +55,10 @@ static void add_cell(float *x, const ssao_sat *s, const ssao_sat__point *p, int 
     square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     share = 1 - square / (s->range * s->range);
     distance = sqrtf(square) / s->radius;
-    sine = (d[0] * s->nx[at] + d[1] * s->ny[at] + d[2] * s->nz[at]) / sqrtf(square + 1e-30f) - s->fit.bias;
+    sine = d[0] * s->work.nx[at] + d[1] * s->work.ny[at] + d[2] * s->work.nz[at];
+    sine = sine / sqrtf(square + 1e-30f) - s->fit.bias;
     if (!(share > 0) || !(sine > 0)) return;
-    share *= word[0] * weight[3 * j + i] * sine;
+    share *= word[0] * (c->column.weight[i] * c->row.weight[j]) * sine;
     for (a = 0; a < SINES; a++, share *= sine)
         for (b = 0, power = share; b < DISTANCES; b++, power *= distance) x[a * DISTANCES + b] += power;
 }
@@ -82,26 +81,22 @@ static int read_pixel(sample *o, const ssao_sat *s, int x, int y)
     ssao_sat__point p;
     ssao_sat__cells c;
     float r, rx = s->camera.ax * (float)x + s->camera.bx, ry = s->camera.ay * (float)y + s->camera.by;
-    int cut, ring, k, i;
+    int cut, ring, i;
     memset(o, 0, sizeof *o);
-    if (!(s->z[at] > 0)) return 0;
-    r = ssao_sat__half_side(s, s->z[at], &cut);
-    o->header = s->open[at];
+    if (!(s->work.z[at] > 0)) return 0;
+    r = ssao_sat__half_side(s, s->work.z[at], &cut);
+    o->header = s->work.open[at];
     o->fade = ssao_sat__is_flat(s, x, y, r) ? 0 : ssao_sat__fade(s, r);
     if (!(o->fade > 0)) return 1;
     ssao_sat__set_point(&p, s, x, y, at);
     o->facing = ref_clamp(s->camera.orthographic ? -p.facing : -p.facing / sqrtf(1 + rx * rx + ry * ry), 0, 1);
     for (ring = 0; ring < rings; ring++, r *= 1 / 3.0f) {
-        int inner[2], outer[2];
-        float u[3], v[3], weight[9];
-        inner[0] = inner[1] = sat__max_int(1, (int)(r / 3 + 0.5f));
-        outer[0] = outer[1] = sat__max_int(inner[0] + 1, (int)(r + 0.5f));
-        ssao_sat__cut_axis(c.column, u, x, inner[0], outer[0], s->columns, s->step, s->width);
-        ssao_sat__cut_axis(c.row, v, y, inner[1], outer[1], s->rows, s->step, s->height);
-        for (i = 0; i < 9; i++) weight[i] = u[i % 3] * v[i / 3];
-        for (k = 0; k < s->frame_slabs; k++)
+        const ssao_sat__ring size = ssao_sat__ring_of(r);
+        ssao_sat__cut_axis(&c.column, x, size, s->columns, s->step, s->width);
+        ssao_sat__cut_axis(&c.row, y, size, s->rows, s->step, s->height);
+        for (c.slab = 0; c.slab < s->frame_slabs; c.slab++)
             for (i = 0; i < 9; i++)
-                if (i != 4) add_cell(o->x[ring], s, &p, k, &c, i % 3, i / 3, weight);
+                if (i != 4) add_cell(o->x[ring], s, &p, &c, i % 3, i / 3);
     }
     return 1;
 }
