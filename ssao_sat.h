@@ -94,7 +94,8 @@
    down, as OpenGL's. A create that fails sets *out to NULL and holds nothing (OpenGL: an object for its message, to be
    destroyed). On OpenGL pixels come in and go out by textures: the depth texture you drew to; out or
    ssao_sat_gl_texture sampled, or attached to a framebuffer for glReadPixels. Another radius each frame:
-   ssao_sat_resize, on OpenGL ssao_sat_gl_set_options; both cost nothing.
+   ssao_sat_resize, on OpenGL ssao_sat_gl_set_options; both cost nothing. Another size: ssao_sat_resize, a hundredth of
+   a frame; on OpenGL smaller width and height in the input, nothing.
 
    NUMERICS
 

@@ -161,6 +161,38 @@ check_contents() {
         }' "$lib.h")"
 }
 
+# What users ask first is answered by the interface alone, under a word they search for: picture upside down, threads, what a failed
+# create leaves, reversed depth (where there is depth), another radius each frame, pixels into and out of OpenGL, NaN, memory, the
+# unit of strides, linear or sRGB.
+check_questions() {
+    local question words text
+    # comments of the interface, on one line
+    text=$(sed '/^ *Stop here if you only want to use the library/,$d' "$lib.h" | perl -0ne 's/\s+/ /g for @c = m{/\*.*?\*/}gs; print join " ", @c')
+    while IFS='|' read -r question words; do
+        [ "$question" != "reversed depth" ] || case $lib in ssao_sat | fiv | raindrop) ;; *) continue ;; esac
+        if grep -qE -- "${words//;/|}" <<<"$text"; then pass; else fail "no answer to: $question" "none of $words in the comments of the interface"; fi
+    done <<'END'
+a picture upside down|bottom row first
+threads|[Tt]hreads?
+what a create that fails leaves|create that fails
+reversed depth|reversed
+another radius each frame|each frame;any frame;next frame;every frame;between frames
+pixels into and out of OpenGL|On OpenGL [a-z ]+ (come|go|is|are|up)
+NaN|NaN
+memory|bytes a [a-z]+;[Bb]ytes;MB
+the unit of strides|[Ss]trides?[a-z ]* (is|are) (in )?(bytes|floats)
+linear or sRGB|sRGB;srgb
+END
+}
+
+# A function holds one idea: at most 60 lines from its brace to the last.
+check_functions() {
+    empty "functions of more than 60 lines" "$(awk '
+        /^[A-Za-z].*\(/ { name = $0; sub(/\(.*/, "", name); sub(/.*[ *]/, "", name) }
+        /^\{$/ { begin = NR }
+        /^\}$/ && begin { if (NR - begin > 61) print name " has " NR - begin - 1 " lines"; begin = 0 }' "$lib.h")"
+}
+
 # Options change between frames: every OpenGL object has set_options, and structs are compared by their rows, never as
 # memory, whose padding is anything.
 check_options() {
@@ -202,6 +234,8 @@ check_comments
 check_shape
 check_snippets
 check_contents
+check_questions
+check_functions
 check_options
 check_same_bits
 finish
