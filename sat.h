@@ -563,8 +563,9 @@ typedef struct sat_gl_options {
     sat_scan_algorithm algorithm; /* SAT_SCAN_BALANCED_TREE; or RECURSIVE_DOUBLING: half the passes, log_k n times the
                                      pixels, ahead for small tables only */
     int k;                        /* 4; 2..64; texels read for one written */
-    int compute;                  /* 0; 0..1; 1: the tree's second half by compute shaders where there is GL 4.3: one
-                                     invocation writes k texels, so that k = 32 or 64 is best */
+    int compute;                  /* 0; 0..1; 1: by compute shaders where there is GL 4.3, else as 0; the same bits.
+                                     TILED: a work group a tile, which reads it once; trees: their second half, of which
+                                     an invocation writes k texels, so that k = 32 or 64 is best */
     int channel;                  /* 0; 0..3; the (first) channel of the input texture */
     int channels;                 /* 1; 1..4; TILED: so many channels in one build */
     int moments;                  /* 0; 0..1; 1 (TILED, at most two channels): for sat_gl_variance; sat_sum and
@@ -576,7 +577,8 @@ typedef struct sat_gl_options {
     double max_value;             /* 1e30; 1e-300..1e300; pixels beyond +-max_value are clamped to it; NaN counts as 0.
                                      Lower it for FIXED32: the quantum is proportional to it */
     double max_box_area;          /* 0; 0..1e300; 0: the whole table; FIXED32: no larger box is ever asked for */
-    int width;                    /* 0; 0..16777216; with height: create makes all textures; no other size is taken */
+    int width;                    /* 0; 0..16777216; with height: create makes all textures, and smaller sizes take a part of them:
+                                     lookups in flat tables are then to be clipped to the size, tiles know it */
     int height;                   /* 0; 0..16777216 */
     sat_allocator allocator;      /* malloc; used by create and destroy only */
 } sat_gl_options;
@@ -6369,6 +6371,14 @@ static const char sat__glsl_mean[] =
 static const char sat__glsl_tile_numbers[] =
     "#ifndef SAT_GLSL_NUMBERS\n"
     "#define SAT_GLSL_NUMBERS\n"
+    "#ifdef GL_ES\n"
+    SAT__GLSL(precision highp usampler2DArray;)
+    "#endif\n"
+    SAT__GLSL(
+        /* width, height and planes of the table, which may be less than its textures have room for */
+        ivec3 sat_shape(usampler2DArray tiles) {
+            return ivec3(texelFetch(tiles, ivec3(textureSize(tiles, 0).x - 1, 0, 0), 0).xyz);
+        })
     SAT__GLSL(
         uvec2 sat_left64(uvec2 v, int n) {
             return n == 0 ? v : n > 31 ? uvec2(0u, v.x << (n - 32)) : uvec2(v.x << n, v.y << n | v.x >> (32 - n));
@@ -6420,17 +6430,18 @@ static const char sat__glsl_tile_numbers[] =
             if (which > 6) at += (n.x + 2) * supers * min(size.x, 32) * 32;
             return at;
         }
-        uvec2 sat_cell(usampler2D strips, ivec2 size, int index) {
-            return texelFetch(strips, ivec2(index % size.x, index / size.x), 0).xy;
+        uvec2 sat_cell(usampler2D strips, int index) {
+            int pitch = textureSize(strips, 0).x;
+            return texelFetch(strips, ivec2(index % pitch, index / pitch), 0).xy;
         }
         int sat_wide_exponent(uint quantum) { return max(int(quantum >> 23) - 158, -149); })
     SAT__GLSL(
-        vec2 sat_wide_part(usampler2D strips, ivec2 size, int base, uint quantum, ivec2 a, ivec2 b) {
-            int stride = min(size.x, 32), low = base + (b.y - 1) * stride - 1, top = low - (b.y - a.y) * stride;
-            uvec2 d = sat_cell(strips, size, low + b.x), less = uvec2(0u);
-            if (a.x > 0) less = sat_cell(strips, size, low + a.x);
-            if (a.y > 0) less = sat_add64(less, sat_cell(strips, size, top + b.x));
-            if (a.x > 0 && a.y > 0) d = sat_add64(d, sat_cell(strips, size, top + a.x));
+        vec2 sat_wide_part(usampler2D strips, int width, int base, uint quantum, ivec2 a, ivec2 b) {
+            int stride = min(width, 32), low = base + (b.y - 1) * stride - 1, top = low - (b.y - a.y) * stride;
+            uvec2 d = sat_cell(strips, low + b.x), less = uvec2(0u);
+            if (a.x > 0) less = sat_cell(strips, low + a.x);
+            if (a.y > 0) less = sat_add64(less, sat_cell(strips, top + b.x));
+            if (a.x > 0 && a.y > 0) d = sat_add64(d, sat_cell(strips, top + a.x));
             d = sat_add64(d, sat_negate64(less));
             uint negative = d.y >> 31;
             if (negative > 0u) d = sat_negate64(d);
@@ -6441,13 +6452,13 @@ static const char sat__glsl_tile_numbers[] =
             int room = clamp(size.x, 8, 64), supers = sat_at(5, size, planes), list = sat_at(4, size, planes);
             vec2 sum = vec2(0.0);
             for (int band = a.y >> 5; band <= (b.y - 1) >> 5; band++) {
-                if (sat_cell(strips, size, supers + (band >> 5) * planes + plane).x == 0u) {
+                if (sat_cell(strips, supers + (band >> 5) * planes + plane).x == 0u) {
                     band |= 31;
                     continue;
                 }
-                int at = list + (band * planes + plane) * (1 + room), count = int(sat_cell(strips, size, at).x);
+                int at = list + (band * planes + plane) * (1 + room), count = int(sat_cell(strips, at).x);
                 for (int i = 1; i <= count; i++) {
-                    uvec2 g = sat_cell(strips, size, at + i);
+                    uvec2 g = sat_cell(strips, at + i);
                     ivec2 p = ivec2(int(g.x & 67108863u), band * 32 + int(g.x >> 26));
                     if (all(greaterThanEqual(p, a)) && all(lessThan(p, b)))
                         sum = sat_add(sum, vec2(uintBitsToFloat(g.y), 0.0), one);
@@ -6460,24 +6471,21 @@ static const char sat__glsl_tile_numbers[] =
 static const char sat__glsl_tile_lookups[] =
     "#ifndef SAT_GLSL_TILES\n"
     "#define SAT_GLSL_TILES\n"
-    "#ifdef GL_ES\n"
-    SAT__GLSL(precision highp usampler2DArray;)
-    "#endif\n"
     SAT__GLSL(
-        vec2 sat_tile_part(usampler2D cells, usampler2DArray tiles, usampler2D strips, int plane, ivec2 tile, ivec2 a,
-                           ivec2 b, float one) {
-            ivec2 first = tile * 32, size = textureSize(cells, 0);
-            int across = (size.x + 31) / 32, planes = textureSize(tiles, 0).x / across;
+        vec2 sat_tile_part(usampler2D cells, usampler2DArray tiles, usampler2D strips, ivec3 shape, int plane,
+                           ivec2 tile, ivec2 a, ivec2 b, float one) {
+            ivec2 first = tile * 32, size = shape.xy;
+            int across = (size.x + 31) / 32, planes = shape.z;
             ivec2 at = ivec2(tile.x + plane * across, tile.y);
             uvec4 record = texelFetch(tiles, ivec3(at, 0), 0);
             float quantum = uintBitsToFloat(record.x);
             int count = int(record.z & 15u), slot = 0;
             vec2 sum;
             if (record.z >> 30 > 0u)
-                slot = int(sat_cell(strips, size, sat_at(3, size, planes) + (tile.y * planes + plane) * across
+                slot = int(sat_cell(strips, sat_at(3, size, planes) + (tile.y * planes + plane) * across
                                                   + tile.x).x);
             if (slot > 0)
-                sum = sat_wide_part(strips, size, sat_at(6, size, planes) + (slot - 1) * min(size.x, 32) * 32,
+                sum = sat_wide_part(strips, size.x, sat_at(6, size, planes) + (slot - 1) * min(size.x, 32) * 32,
                                     record.x, a - first, b - first);
             else {
                 uint d = texelFetch(cells, b - 1, 0)[plane];
@@ -6497,36 +6505,37 @@ static const char sat__glsl_tile_lookups[] =
             return sum;
         })
     SAT__GLSL(
-        vec2 sat_corner(usampler2D cells, usampler2DArray tiles, usampler2D strips, int plane, ivec2 first,
-                              ivec2 p, float one) {
-            ivec2 size = textureSize(cells, 0), t = p >> 5, inside = p & 31;
-            int across = (size.x + 31) / 32, planes = textureSize(tiles, 0).x / across;
+        vec2 sat_corner(usampler2D cells, usampler2DArray tiles, usampler2D strips, ivec3 shape, int plane,
+                        ivec2 first, ivec2 p, float one) {
+            ivec2 size = shape.xy, t = p >> 5, inside = p & 31;
+            int across = (size.x + 31) / 32, planes = shape.z;
             int row = (t.y - 1) * planes + plane;
             int above = sat_at(1, size, planes), whole = sat_at(2, size, planes);
             bool x = t.x > first.x, y = t.y > first.y;
             vec2 sum = vec2(0.0);
-            if (x && y) sum = sat_floats(sat_cell(strips, size, whole + row * across + t.x - 1));
+            if (x && y) sum = sat_floats(sat_cell(strips, whole + row * across + t.x - 1));
             if (y && inside.x > 0)
-                sum = sat_add(sum, sat_floats(sat_cell(strips, size, above + row * size.x + p.x - 1)), one);
+                sum = sat_add(sum, sat_floats(sat_cell(strips, above + row * size.x + p.x - 1)), one);
             if (x && inside.y > 0)
-                sum = sat_add(sum, sat_floats(sat_cell(strips, size, ((p.y - 1) * planes + plane) * across
+                sum = sat_add(sum, sat_floats(sat_cell(strips, ((p.y - 1) * planes + plane) * across
                                                                          + t.x - 1)), one);
             if (inside.x > 0 && inside.y > 0)
-                sum = sat_add(sum, sat_tile_part(cells, tiles, strips, plane, t, t * 32, p, one), one);
+                sum = sat_add(sum, sat_tile_part(cells, tiles, strips, shape, plane, t, t * 32, p, one), one);
             return sum;
         })
     SAT__GLSL(
         float sat_sum(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high) {
-            ivec2 size = textureSize(cells, 0), a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size), p, q;
+            ivec3 shape = sat_shape(tiles);
+            ivec2 size = shape.xy, a = clamp(low, ivec2(0), size), b = clamp(high, ivec2(0), size), p, q;
             float one = size.x > 0 ? 1.0 : 0.0;
             if (any(lessThanEqual(b, a))) return 0.0;
             ivec2 s = a >> 5, e = (b - 1) >> 5;
             vec2 sum = vec2(0.0);
-            vec2 giants = sat_giants(strips, size, textureSize(tiles, 0).x / ((size.x + 31) / 32), channel, a, b, one);
+            vec2 giants = sat_giants(strips, size, shape.z, channel, a, b, one);
             if (all(lessThan(e - s, ivec2(3)))) {
                 for (int y = s.y; y <= e.y; y++)
                     for (int x = s.x; x <= e.x; x++)
-                        sum = sat_add(sum, sat_tile_part(cells, tiles, strips, channel, ivec2(x, y),
+                        sum = sat_add(sum, sat_tile_part(cells, tiles, strips, shape, channel, ivec2(x, y),
                                                          max(a, ivec2(x, y) * 32), min(b, ivec2(x + 1, y + 1) * 32),
                                                          one), one);
                 sum = sat_add(sum, giants, one);
@@ -6537,10 +6546,10 @@ static const char sat__glsl_tile_lookups[] =
                 for (p.x = a.x; p.x < b.x; p.x = q.x) {
                     q.x = min(b.x, (p.x | 1023) + 1);
                     ivec2 f = (p >> 10) << 5;
-                    vec2 v = sat_corner(cells, tiles, strips, channel, f, q, one);
-                    v = sat_add(v, -sat_corner(cells, tiles, strips, channel, f, ivec2(p.x, q.y), one), one);
-                    vec2 u = sat_corner(cells, tiles, strips, channel, f, ivec2(q.x, p.y), one);
-                    u = sat_add(u, -sat_corner(cells, tiles, strips, channel, f, p, one), one);
+                    vec2 v = sat_corner(cells, tiles, strips, shape, channel, f, q, one);
+                    v = sat_add(v, -sat_corner(cells, tiles, strips, shape, channel, f, ivec2(p.x, q.y), one), one);
+                    vec2 u = sat_corner(cells, tiles, strips, shape, channel, f, ivec2(q.x, p.y), one);
+                    u = sat_add(u, -sat_corner(cells, tiles, strips, shape, channel, f, p, one), one);
                     sum = sat_add(sum, sat_add(v, -u, one), one);
                 }
             }
@@ -6549,7 +6558,7 @@ static const char sat__glsl_tile_lookups[] =
         })
     SAT__GLSL(
         float sat_mean(usampler2D cells, usampler2DArray tiles, usampler2D strips, int channel, ivec2 low, ivec2 high) {
-         return sat_sum(cells, tiles, strips, channel, low, high) / sat_area(textureSize(cells, 0), low, high);
+            return sat_sum(cells, tiles, strips, channel, low, high) / sat_area(sat_shape(tiles).xy, low, high);
         })
     "#endif\n";
 
@@ -6561,6 +6570,7 @@ static const char sat__glsl_tile_values[] =
         uniform usampler2D cells, gauges, facts, means;
         uniform usampler2DArray tiles;
         uniform ivec2 size;
+        uniform int pitch;
         uniform float limit;
         int across() { return (size.x + 31) / 32; }
         int room() { return MOMENTS > 0 ? 0 : clamp(size.x, 8, 64); })
@@ -6574,11 +6584,22 @@ static const char sat__glsl_tile_values[] =
         })
     "#if MOMENTS\n"
     SAT__GLSL(
+        float about(float v, float mean, int plane, int kind) {)
+    "#if __VERSION__ >= 400\n"
+    SAT__GLSL(precise float square;)
+    "#else\n"
+    SAT__GLSL(float square;)
+    "#endif\n"
+    SAT__GLSL(
+            v -= mean;
+            if (kind == 1 || kind == 2 || abs(v) > 1e18) v = 0.0;
+            square = v * v;
+            return plane < CHANNELS ? v : square;
+        }
         float value(ivec2 p, int plane, out int kind) {
             float v = pixel(p, plane, kind);
-            v -= uintBitsToFloat(texelFetch(means, ivec2(p.x / 32 + across() * (plane % CHANNELS), p.y / 32), 0).x);
-            if (kind == 1 || kind == 2 || abs(v) > 1e18) v = 0.0;
-            return plane < CHANNELS ? v : v * v;
+            ivec2 tile = ivec2(p.x / 32 + across() * (plane % CHANNELS), p.y / 32);
+            return about(v, uintBitsToFloat(texelFetch(means, tile, 0).x), plane, kind);
         })
     "#else\n"
     "#define value pixel\n"
@@ -6789,9 +6810,9 @@ static const char sat__glsl_settle[] =
         });
 
 /* What the cells of a tile sum: no spikes, no giants. */
+static const char sat__glsl_tile_output[] = SAT__GLSL(layout(location = 0) out uvec4 result;);
 static const char sat__glsl_tile_kept[] =
     SAT__GLSL(
-        layout(location = 0) out uvec4 result;
         float kept(ivec2 p, int plane, out uint quantum) {
             ivec3 at = ivec3(p.x / 32 + plane * across(), p.y / 32, 0);
             uvec4 record = texelFetch(tiles, at, 0);
@@ -6860,8 +6881,7 @@ static const char sat__glsl_owners[] =
                     if (texelFetch(cells, ivec2(x, y), 0).x == slot) result = uvec4(x + 1, y, 0, 0);
         });
 
-/* A 64-bit cell: the sum of its tile up to it. */
-static const char sat__glsl_wide[] =
+static const char sat__glsl_wide_integer[] =
     SAT__GLSL(
         uvec2 integer(float v, int exponent) {
             uint bits = floatBitsToUint(v), m = bits & 0x7fffffu, e = bits >> 23 & 255u;
@@ -6875,14 +6895,17 @@ static const char sat__glsl_wide[] =
                 if (rest > half_of || (rest == half_of && (n.x & 1u) > 0u)) n.x++;
             } else n = sat_left64(n, shift);
             return bits > 0x7fffffffu ? sat_negate64(n) : n;
-        })
+        });
+
+/* A 64-bit cell: the sum of its tile up to it. */
+static const char sat__glsl_wide[] =
     SAT__GLSL(
         void main() {
-            int stride = min(size.x, 32), i = int(gl_FragCoord.y) * size.x + int(gl_FragCoord.x);
+            int stride = min(size.x, 32), i = int(gl_FragCoord.y) * pitch + int(gl_FragCoord.x);
             int slot = i / (stride * 32), n = across() + 2;
             uvec2 sum = uvec2(0u), owner = texelFetch(cells, ivec2(slot % n, slot / n), 0).xy;
             result = uvec4(0u);
-            if (slot / n >= textureSize(cells, 0).y || owner.x == 0u) return;
+            if (slot / n >= (size.y + 1023) / 1024 * PLANES || owner.x == 0u) return;
             int plane = (int(owner.x) - 1) / across(), x, y;
             ivec2 first = ivec2((int(owner.x) - 1) % across(), owner.y) * 32;
             ivec2 last = ivec2(i % stride, i / stride % 32);
@@ -6927,7 +6950,7 @@ static const char sat__glsl_strip_sums[] =
             uvec2 d = uvec2(0u);
             if (slot > 0u) {
                 int i = ((int(slot) - 1) * 32 + p.y % 32) * stride + p.x % 32;
-                d = texelFetch(facts, ivec2(i % size.x, i / size.x), 0).xy;
+                d = texelFetch(facts, ivec2(i % pitch, i / pitch), 0).xy;
                 negative = d.y >> 31;
                 if (negative > 0u) d = sat_negate64(d);
                 exponent = sat_wide_exponent(record.x);
@@ -6996,7 +7019,7 @@ static const char sat__glsl_strips[] =
         })
     SAT__GLSL(
         void main() {
-            int i = int(gl_FragCoord.y) * size.x + int(gl_FragCoord.x), n = across(), section = 0;
+            int i = int(gl_FragCoord.y) * pitch + int(gl_FragCoord.x), n = across(), section = 0;
             int counts[7] = int[7](n, size.x, n, n, 1 + clamp(size.x, 8, 64), 1, 1), row, plane, x, y;
             while (section < 7 && i >= sat_at(section + 1, size, PLANES)) section++;
             i -= sat_at(section, size, PLANES);
@@ -7006,16 +7029,357 @@ static const char sat__glsl_strips[] =
             x = i % counts[section];
             y = row / PLANES;
             plane = row % PLANES;
-            if (section == 0) result.xy = left(plane, x, y);
-            if (section == 1) result.xy = above(plane, x, y);
-            if (section == 2) result.xy = whole(plane, x, y);
+            if (RUNS == 0 && section == 0) result.xy = left(plane, x, y);
+            if (RUNS == 0 && section == 1) result.xy = above(plane, x, y);
+            if (RUNS == 0 && section == 2) result.xy = whole(plane, x, y);
             if (section == 3) result.x = texelFetch(gauges, ivec2(x + plane * n, y), 0).x;
             if (section == 4) result.xy = giant(plane, y, x);
             if (section == 5)
                 for (int b = y * 32; b < min(y * 32 + 32, (size.y + 31) / 32); b++)
                     result.x += giant(plane, b, 0).x;
-            if (section == 6) result = texelFetch(facts, ivec2(i % size.x, i / size.x), 0);
+            if (section == 6) result = texelFetch(facts, ivec2(i % pitch, i / pitch), 0);
         });
+
+/* ---- the same by compute shaders */
+
+/* A work group a tile: means, gauges, quantum, spikes and integers of a plane after the other in shared memory. A lane
+   is a fourth of a row, as on the CPU. Only a tile with giants reads more than itself: it counts those before it. */
+static const char sat__glsl_group[] =
+    SAT__GLSL(
+        layout(local_size_x = 128) in;
+        layout(binding = 0, rgba32ui) writeonly uniform uimage2DArray tiles_out;
+        layout(binding = 1, CELL) writeonly uniform uimage2D cells_out;)
+    "#if MOMENTS\n"
+    SAT__GLSL(layout(binding = 2, r32ui) writeonly uniform uimage2D means_out;)
+    "#else\n"
+    SAT__GLSL(float about(float v, float mean, int plane, int kind) { return v; })
+    "#endif\n"
+    SAT__GLSL(
+        shared float held[1024], lanes[128], lane_sums[4], mean_of[CHANNELS], taken[8];
+        shared uint summed[PLANES * 1024], counted, largest;
+        shared int place[8], first_clamped;
+        int lane, cut, count;
+        ivec2 tile, first;
+        ivec2 at(int i) { return first + ivec2(i % 32, i / 32); }
+        bool is_inside(int i) { return all(lessThan(at(i), size)); })
+    SAT__GLSL(
+        uint sum_of(uint mine) {
+            barrier();
+            if (lane == 0) counted = 0u;
+            barrier();
+            if (mine > 0u) atomicAdd(counted, mine);
+            barrier();
+            return counted;
+        }
+        float largest_of(float mine) {
+            barrier();
+            if (lane == 0) largest = 0u;
+            barrier();
+            atomicMax(largest, floatBitsToUint(mine));
+            barrier();
+            return uintBitsToFloat(largest);
+        })
+    "#if MOMENTS\n"
+    SAT__GLSL(
+        void find_mean(int channel) {
+            uint usable = 0u;
+            int kind;
+            barrier();
+            for (int i = lane; i < 1024; i += 128) {
+                held[i] = is_inside(i) ? pixel(at(i), channel, kind) : 0.0;
+                if (!is_inside(i)) continue;
+                if (kind == 1 || kind == 2) held[i] = 0.0;
+                else usable++;
+            }
+            usable = sum_of(usable);
+            if (lane < 32) {
+                float row = 0.0;
+                for (int x = 0; x < 32; x++) row += held[32 * lane + x];
+                lanes[lane] = row;
+            }
+            barrier();
+            if (lane == 0) {
+                float sum = 0.0;
+                for (int y = 0; y < 32; y++) sum += lanes[y];
+                mean_of[channel] = usable > 0u ? sum / float(usable) : 0.0;
+                imageStore(means_out, ivec2(tile.x + across() * channel, tile.y),
+                           uvec4(floatBitsToUint(mean_of[channel]), 0u, 0u, 0u));
+            }
+            barrier();
+        })
+    "#endif\n"
+    SAT__GLSL(
+        /* NaN and infinities; clamped pixels and giants: two numbers of 16 bits each */
+        uvec2 load(int plane, out float full) {
+            uvec2 bad = uvec2(0u);
+            float most = 0.0;
+            barrier();
+            for (int i = lane; i < 1024; i += 128) {
+                int kind;
+                float v = 0.0;
+                if (is_inside(i)) {
+                    v = pixel(at(i), plane, kind);
+                    v = about(v, mean_of[plane % CHANNELS], plane, kind);
+                    if (kind == 1) bad.x++;
+                    if (kind == 2) bad.x += 65536u;
+                    if (kind == 3) bad.y++;
+                    if (abs(v) > 1e20) bad.y += 65536u;
+                    else most = max(most, abs(v));
+                }
+                held[i] = v;
+            }
+            full = largest_of(most);
+            if (!(full > 0.0)) full = 65504.0;
+            return uvec2(sum_of(bad.x), sum_of(bad.y));
+        });
+
+static const char sat__glsl_group_spikes[] =
+    SAT__GLSL(
+        int list_giants(int plane, int giants, float full) {
+            int before = 0, listed, kind;
+            for (int x = 0; x < tile.x && before < room(); x++) {
+                uint mine = 0u;
+                for (int i = lane; i < 1024; i += 128) {
+                    ivec2 p = ivec2(x, tile.y) * 32 + ivec2(i % 32, i / 32);
+                    if (p.y < size.y && abs(pixel(p, plane, kind)) > 1e20) mine++;
+                }
+                before += int(sum_of(mine));
+            }
+            listed = clamp(room() - before, 0, giants);
+            if (lane == 0 && listed < giants) {
+                int n = 0, i = 0;
+                for (; abs(held[i]) <= 1e20 || n++ < listed; i++) {}
+                first_clamped = i;
+            }
+            barrier();
+            if (listed < giants) cut = first_clamped;
+            for (int i = lane; i < 1024; i += 128)
+                if (abs(held[i]) > 1e20) held[i] = i < cut ? 0.0 : held[i] > 0.0 ? full : -full;
+            return listed;
+        })
+    SAT__GLSL(
+        vec2 extent() {
+            float sum = 0.0, most = 0.0;
+            barrier();
+            for (int i = lane / 4 * 32 + lane % 4, end = i + 32; i < end; i += 4) {
+                sum += abs(held[i]);
+                most = max(most, abs(held[i]));
+            }
+            lanes[lane] = sum;
+            most = largest_of(most);
+            if (lane < 4) {
+                sum = 0.0;
+                for (int y = 0; y < 32; y++) sum += lanes[4 * y + lane];
+                lane_sums[lane] = sum;
+            }
+            barrier();
+            return vec2(((lane_sums[0] + lane_sums[1]) + lane_sums[2]) + lane_sums[3], most);
+        })
+    SAT__GLSL(
+        /* which pixels lie above: into place[count] and on, in the order of rows; too many: no matter which */
+        int find_spikes(float above) {
+            barrier();
+            if (lane == 0) counted = 0u;
+            barrier();
+            for (int i = lane; i < 1024; i += 128)
+                if (abs(held[i]) > above) {
+                    int k = count + int(atomicAdd(counted, 1u));
+                    if (k < 8) place[k] = i;
+                }
+            barrier();
+            int found = int(counted);
+            if (lane == 0 && count + found <= 8)
+                for (int i = count + 1; i < count + found; i++)
+                    for (int j = i; j > count && place[j - 1] > place[j]; j--) {
+                        int other = place[j];
+                        place[j] = place[j - 1];
+                        place[j - 1] = other;
+                    }
+            barrier();
+            return found;
+        })
+    SAT__GLSL(
+        void take_spikes(inout vec2 e) {
+            while (e.y > e.x * 0.0625 && count < 8) {
+                int found = find_spikes(e.x * 0.0625);
+                if (found > 8 - count) break;
+                if (lane < found) {
+                    taken[count + lane] = held[place[count + lane]];
+                    held[place[count + lane]] = 0.0;
+                }
+                vec2 less = extent();
+                if (less.x > e.x * 0.25) {
+                    if (lane < found) held[place[count + lane]] = taken[count + lane];
+                    break;
+                }
+                count += found;
+                e = less;
+            }
+            barrier();
+        });
+
+static const char sat__glsl_group_sums[] =
+    SAT__GLSL(
+        uint quantum_of(float sum) {
+            uint bits = floatBitsToUint(sum), exponent = (bits >> 23) + ((bits & 0x7fffffu) >= 8386931u ? 1u : 0u);
+            return sum > 0.0 ? max(exponent, 31u) - 30u << 23 : 0u;
+        }
+        void write_tile(int plane, uvec4 record) {
+            uvec4 words = uvec4(0u), low = uvec4(0u), high = uvec4(0u);
+            ivec3 to = ivec3(tile.x + plane * across(), tile.y, 0);
+            for (int i = 0; i < count; i++) {
+                words[i / 2] |= uint(place[i] % 32 | place[i] / 32 << 7) << (14 * (i & 1));
+                if (i < 4) low[i] = floatBitsToUint(taken[i]);
+                else high[i - 4] = floatBitsToUint(taken[i]);
+            }
+            imageStore(tiles_out, to, record);
+            imageStore(tiles_out, to + ivec3(0, 0, 1), words);
+            imageStore(tiles_out, to + ivec3(0, 0, 2), low);
+            imageStore(tiles_out, to + ivec3(0, 0, 3), high);
+        })
+    SAT__GLSL(
+        /* 8 integers a lane, which lie `step` apart, then those of the lanes before in the same row or column */
+        void sum_line(int base, int step, int lanes_before, int lane_step) {
+            uint run = 0u;
+            for (int d = 0; d < 8; d++) {
+                run += summed[base + d * step];
+                summed[base + d * step] = run;
+            }
+            barrier();
+            run = 0u;
+            for (int k = 1; k <= lanes_before; k++) run += summed[base - k * lane_step + 7 * step];
+            barrier();
+            for (int d = 0; d < 8; d++) summed[base + d * step] += run;
+            barrier();
+        }
+        void sum_plane(int plane, uint quantum) {
+            float inverse = uintBitsToFloat((254u << 23) - quantum);
+            for (int i = lane; i < 1024; i += 128)
+                summed[plane * 1024 + i] = quantum > 0u ? uint(int(roundEven(held[i] * inverse))) : 0u;
+            barrier();
+            sum_line(plane * 1024 + 8 * lane, 1, lane % 4, 8);
+            sum_line(plane * 1024 + lane / 32 * 256 + lane % 32, 32, lane / 32, 256);
+        })
+    SAT__GLSL(
+        void main() {
+            lane = int(gl_LocalInvocationIndex);
+            tile = ivec2(gl_WorkGroupID.xy);
+            first = tile * 32;
+            for (int plane = 0; plane < PLANES; plane++) {
+                float full;)
+    "#if MOMENTS\n"
+    SAT__GLSL(if (plane < CHANNELS) find_mean(plane);)
+    "#endif\n"
+    SAT__GLSL(
+                uvec2 bad = load(plane, full);
+                int giants = int(bad.y >> 16), listed = 0;
+                uint small = 0u;
+                cut = 1024;
+                count = 0;
+                if (giants > 0) listed = list_giants(plane, giants, full);
+                vec2 e = extent();
+                take_spikes(e);
+                for (int i = lane; i < 1024; i += 128)
+                    if (abs(held[i]) > 0.0 && abs(held[i]) < e.x / 1048576.0) small++;
+                small = sum_of(small) < 8u ? 0u : 1u;
+                uvec4 record = uvec4(quantum_of(e.x), floatBitsToUint(full), 0u, 0u);
+                record.z = uint(count) | (bad.x & 65535u) << 4 | bad.x >> 16 << 17 | small << 30;
+                record.w = (bad.y & 65535u) + uint(giants - listed | listed << 12) | uint(cut) << 20;
+                if (lane == 0) write_tile(plane, record);
+                sum_plane(plane, record.x);
+            }
+            for (int i = lane; i < 1024; i += 128) {
+                uvec4 v = uvec4(0u);
+                for (int plane = 0; plane < PLANES; plane++) v[plane] = summed[plane * 1024 + i];
+                if (is_inside(i)) imageStore(cells_out, at(i), v);
+            }
+        });
+
+/* A work group a slot: rows, then columns. */
+static const char sat__glsl_wide_group[] =
+    SAT__GLSL(
+        layout(local_size_x = 32) in;
+        layout(binding = 0, rg32ui) writeonly uniform uimage2D wide_out;
+        shared uvec2 summed[1024];
+        void main() {
+            int lane = int(gl_LocalInvocationIndex), stride = min(size.x, 32), k;
+            ivec2 slot = ivec2(gl_WorkGroupID.xy);
+            uvec2 sum = uvec2(0u), owner = texelFetch(cells, slot, 0).xy;
+            if (owner.x == 0u) return;
+            int plane = (int(owner.x) - 1) / across(), base = (slot.y * (across() + 2) + slot.x) * 32;
+            ivec2 first = ivec2((int(owner.x) - 1) % across(), owner.y) * 32;
+            for (k = 0; k < 32; k++) {
+                uint quantum = 0u;
+                ivec2 p = first + ivec2(k, lane);
+                float v = all(lessThan(p, size)) ? kept(p, plane, quantum) : 0.0;
+                if (quantum > 0u) sum = sat_add64(sum, integer(v, sat_wide_exponent(quantum)));
+                summed[32 * lane + k] = sum;
+            }
+            barrier();
+            sum = uvec2(0u);
+            for (k = 0; k < 32 && lane < stride; k++) {
+                int i = (base + k) * stride + lane;
+                sum = sat_add64(sum, summed[32 * k + lane]);
+                imageStore(wide_out, ivec2(i % pitch, i / pitch), uvec4(sum, 0u, 0u));
+            }
+        });
+
+/* The strips' running sums, one after the other: rows of tiles (y 0), columns (1), and super tiles (2), of plane z. */
+static const char sat__glsl_runs[] =
+    SAT__GLSL(
+        layout(local_size_x = 32) in;
+        layout(binding = 0, rg32ui) writeonly uniform uimage2D strips_out;
+        shared uvec2 runs[1024];
+        void write(int section, int i, uvec2 v) {
+            i += sat_at(section, size, PLANES);
+            imageStore(strips_out, ivec2(i % pitch, i / pitch), uvec4(v, 0u, 0u));
+        }
+        void left(int plane, int i) {
+            int n = across(), y = i % size.y, x = i / size.y * 32, end = min(x + 32, n);
+            uvec2 run = uvec2(0u);
+            for (; x < end; x++) {
+                run = add(run, part(plane, ivec2(x, y / 32), ivec2(min(x * 32 + 31, size.x - 1), y), false));
+                write(0, (y * PLANES + plane) * n + x, run);
+            }
+        }
+        void above(int plane, int i) {
+            int x = i % size.x, band = i / size.x * 32, end = min(band + 32, (size.y + 31) / 32);
+            uvec2 sum = uvec2(0u);
+            for (; band < end; band++) {
+                sum = add(part(plane, ivec2(x / 32, band), ivec2(x, min(band * 32 + 31, size.y - 1)), true), sum);
+                write(1, (band * PLANES + plane) * size.x + x, sum);
+            }
+        })
+    SAT__GLSL(
+        void whole(int plane, int super, int lane) {
+            int n = across(), supers = (n + 31) / 32, k;
+            ivec2 first = ivec2(super % supers, super / supers) * 32, t;
+            ivec2 end = min(first + 32, ivec2(n, (size.y + 31) / 32));
+            uvec2 sum = uvec2(0u);
+            t.y = first.y + lane;
+            for (t.x = first.x; t.x < end.x && t.y < end.y; t.x++) {
+                sum = add(sum, part(plane, t, min(t * 32 + 31, size - 1), true));
+                runs[32 * lane + t.x - first.x] = sum;
+            }
+            barrier();
+            sum = uvec2(0u);
+            t.x = first.x + lane;
+            for (t.y = first.y; t.y < end.y && t.x < end.x; t.y++) {
+                sum = add(sum, runs[32 * (t.y - first.y) + lane]);
+                write(2, (t.y * PLANES + plane) * n + t.x, sum);
+            }
+        })
+    SAT__GLSL(
+        void main() {
+            int group = int(gl_WorkGroupID.x), plane = int(gl_WorkGroupID.z), lane = int(gl_LocalInvocationIndex);
+            int i = 32 * group + lane;
+            ivec2 supers = (size + 1023) / 1024;
+            if (gl_WorkGroupID.y == 0u && i < size.y * supers.x) left(plane, i);
+            if (gl_WorkGroupID.y == 1u && i < size.x * supers.y) above(plane, i);
+            if (gl_WorkGroupID.y == 2u && group < supers.x * supers.y) whole(plane, group, lane);
+        });
+
+/* ---- what is drawn from tiles */
 
 static const char sat__glsl_tile_filter[] =
     SAT__GLSL(
@@ -7042,8 +7406,8 @@ static const char sat__glsl_tile_variance[] =
                 for (t.x = s.x; t.x <= e.x; t.x++) {
                     ivec2 low = max(a, t * 32), high = min(b, (t + 1) * 32);
                     float m = uintBitsToFloat(texelFetch(means, ivec2(t.x + across() * c, t.y), 0).x);
-                    vec2 d = sat_tile_part(cells, tiles, strips, c, t, low, high, one),
-                         q = sat_tile_part(cells, tiles, strips, CHANNELS + c, t, low, high, one);
+                    vec2 d = sat_tile_part(cells, tiles, strips, ivec3(size, PLANES), c, t, low, high, one),
+                         q = sat_tile_part(cells, tiles, strips, ivec3(size, PLANES), CHANNELS + c, t, low, high, one);
                     float k = float((high.x - low.x) * (high.y - low.y)), both = n + k, sum = d.x + d.y;
                     float here = max(0.0, (q.x + q.y) - sum * sum / k), delta = m + sum / k - mean;
                     squares += here + delta * delta * (n / both * k);
@@ -7069,33 +7433,32 @@ SAT_DEF const char *sat_gl_glsl_tiles(int part)
 
 enum { SAT__GL_LEVELS = 32, SAT__GL_TILE = 32 }; /* the tile stands in the shaders, too */
 
-/* A program, and where its uniforms are (-1 where it has none). */
-typedef struct sat__gl_kernel {
-    unsigned program;
-    int axis, size, across, bounds, factor, limit, scale;
-} sat__gl_kernel;
+/* The programs, in the order of the table. Where two follow each other, the second reads the caller's texture. */
+enum {
+    SAT__GL_DOUBLE, SAT__GL_DOUBLE_INPUT, SAT__GL_REDUCE, SAT__GL_REDUCE_INPUT, SAT__GL_EXPAND, SAT__GL_EXPAND_INPUT,
+    SAT__GL_EXPAND_GROUPS, SAT__GL_EXPAND_GROUPS_INPUT, SAT__GL_MEAN, SAT__GL_MEAN_INPUT,
+    SAT__GL_GROUP, SAT__GL_MEANS, SAT__GL_GAUGE, SAT__GL_SETTLE, SAT__GL_SCAN, SAT__GL_ADD, SAT__GL_SLOTS,
+    SAT__GL_OWNERS, SAT__GL_WIDE, SAT__GL_WIDE_GROUP, SAT__GL_STRIPS, SAT__GL_RUNS, SAT__GL_FILTER, SAT__GL_VARIANCE,
+    SAT__GL_PROGRAMS
+};
 
-/* One level of the tree along an axis: sums of groups, then their scan. */
+/* One level of the tree along an axis: sums of groups, then their scan. The size is the part in use. */
 typedef struct sat__gl_level {
     sat__gl_target sums, scan;
-    int width, height;
 } sat__gl_level;
 
-/* SAT_GL_TILED: a program for each pass and what they draw into. */
-enum { SAT__GL_MEANS, SAT__GL_GAUGE, SAT__GL_SETTLE, SAT__GL_SCAN, SAT__GL_ADD, SAT__GL_SLOTS, SAT__GL_OWNERS,
-       SAT__GL_WIDE, SAT__GL_STRIPS, SAT__GL_FILTER, SAT__GL_VARIANCE, SAT__GL_TILE_PASSES };
-
+/* SAT_GL_TILED: what the passes draw into. */
 typedef struct sat__gl_tiled {
-    unsigned programs[SAT__GL_TILE_PASSES];
     sat__gl_target cells, partial, strips, means, pool, owners, wide;
     unsigned gauge[2], gauge_framebuffer, tiles, tiles_framebuffer;
-    int width, height, planes; /* of the last build; 0: there was none */
+    int tiles_width, planes;
+    int width, height; /* of the last build; 0: there was none */
 } sat__gl_tiled;
 
 struct sat_gl {
     sat__gl gl;
     sat_gl_options options;
-    sat__gl_kernel reduce[2], expand[2], doubling[2], mean[2]; /* [1] reads the caller's texture */
+    unsigned program[SAT__GL_PROGRAMS];
     int ready;   /* all programs are there */
     int compute, mean_k;
     int width, height; /* of the textures below; 0: there are none */
@@ -7175,85 +7538,72 @@ static unsigned sat__gl_internal(sat_gl_format format)
 
 /* ---- programs */
 
-static sat_result sat__gl_make_kernel(sat_gl *g, sat__gl_kernel *kernel, const char *name, const char *body,
-                                      int reads_input, sat_gl_format format, int k)
-{
-    sat__gl *gl = &g->gl;
-    const char *library[3], *text[3];
-    sat__gl_shaders shaders;
-    sat_result result;
-    int compute = body == sat__glsl_expand_groups;
-    memset(&shaders, 0, sizeof shaders);
-    library[0] = sat_gl_glsl();
-    library[1] = sat__glsl_values;
-    library[2] = NULL;
-    text[0] = compute ? body : sat__glsl_output;
-    text[1] = compute ? NULL : body;
-    text[2] = NULL;
-    shaders.name = name;
-    shaders.library = library;
-    if (compute) shaders.compute = text;
-    else shaders.fragment = text;
-    sat__gl_define(gl, "FORMAT", (int)format);
-    sat__gl_define(gl, "K", k);
-    sat__gl_define(gl, "CHANNEL", g->options.channel);
-    sat__gl_define(gl, "INPUT", !reads_input ? 0 : g->options.unsigned_input && format == SAT_GL_FIXED32 ? 2 : 1);
-    result = sat__gl_build(gl, &kernel->program, &shaders);
-    if (result != SAT_OK) return result;
-    kernel->axis = gl->GetUniformLocation(kernel->program, "axis");
-    kernel->size = gl->GetUniformLocation(kernel->program, "size");
-    kernel->across = gl->GetUniformLocation(kernel->program, "across");
-    kernel->bounds = gl->GetUniformLocation(kernel->program, "bounds");
-    kernel->factor = gl->GetUniformLocation(kernel->program, "factor");
-    kernel->limit = gl->GetUniformLocation(kernel->program, "limit");
-    kernel->scale = gl->GetUniformLocation(kernel->program, "scale");
-    gl->UseProgram(kernel->program);
-    sat__gl_set_int(gl, kernel->program, "source", 0);
-    sat__gl_set_int(gl, kernel->program, "uncles", 1);
-    return SAT_OK;
-}
-
-/* ---- tiles: programs and passes */
-
-/* The programs of tiles; samplers stand in the order of their units. */
-#define SAT__GL_KEPT sat__glsl_tile_kept
-#define SAT__GL_TILE_UNITS "source cells tiles gauges facts means"
-#define SAT__GL_DRAW_UNITS "source cells tiles strips facts means"
-enum { SAT__GL_ALWAYS = 1, SAT__GL_OF_PIXELS = 2, SAT__GL_OF_MOMENTS = 4 };
-
-static const sat__gl_program sat__gl_tile_programs[SAT__GL_TILE_PASSES] = {
-    {"sat: means of tiles", SAT__GL_OF_MOMENTS, SAT__GL_TILE_UNITS, NULL, NULL, {sat__glsl_tile_means}},
-    {"sat: gauge", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL, {sat__glsl_gauge}},
-    {"sat: quanta and spikes", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL, {sat__glsl_settle}},
-    {"sat: integers", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, "#define INPUT 1\n", NULL,
-     {SAT__GL_KEPT, sat__glsl_tile_scan}},
-    {"sat: sums in tiles", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, "#define INPUT 0\n", NULL,
-     {SAT__GL_KEPT, sat__glsl_tile_scan}},
-    {"sat: slots", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL, {SAT__GL_KEPT, sat__glsl_slots}},
-    {"sat: owners of slots", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL, {SAT__GL_KEPT, sat__glsl_owners}},
-    {"sat: 64-bit tiles", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL, {SAT__GL_KEPT, sat__glsl_wide}},
-    {"sat: strips", SAT__GL_ALWAYS, SAT__GL_TILE_UNITS, NULL, NULL,
-     {SAT__GL_KEPT, sat__glsl_strip_sums, sat__glsl_strips}},
-    {"sat: box filter", SAT__GL_OF_PIXELS, SAT__GL_DRAW_UNITS, NULL, NULL, {sat__glsl_tile_filter}},
-    {"sat: variance", SAT__GL_OF_MOMENTS, SAT__GL_DRAW_UNITS, NULL, NULL, {sat__glsl_tile_variance}},
+/* What is made for some options only. */
+enum {
+    SAT__GL_IF_TREE = 1, SAT__GL_IF_DOUBLING = 2, SAT__GL_IF_FLOATS = 4, SAT__GL_IF_TILED = 8, SAT__GL_IF_PIXELS = 16,
+    SAT__GL_IF_MOMENTS = 32, SAT__GL_IF_PASSES = 64, SAT__GL_IF_GROUPS = SAT__GL_COMPUTE
 };
 
-static sat_result sat__gl_make_tile_programs(sat_gl *g)
+#define SAT__GL_SUMS "#define FORMAT TABLE_FORMAT\n#define K TABLE_K\n#define INPUT 0\n"
+#define SAT__GL_FIRST "#define FORMAT TABLE_FORMAT\n#define K TABLE_K\n#define INPUT TABLE_INPUT\n"
+#define SAT__GL_FLAT(name, when, defines, body)                                                                        \
+    {name, when, "source uncles", defines, NULL, {sat__glsl_values, sat__glsl_output, body}}
+#define SAT__GL_TILES(name, when, units, defines, ...)                                                                 \
+    {name, SAT__GL_IF_TILED | (when), "source cells tiles " units " facts means", defines, NULL,                       \
+     {sat__glsl_tile_numbers, sat__glsl_tile_lookups, sat__glsl_tile_values, __VA_ARGS__}}
+#define SAT__GL_BUILDS(name, when, defines, ...) SAT__GL_TILES(name, when, "gauges", defines, __VA_ARGS__)
+#define SAT__GL_KEPT sat__glsl_tile_output, sat__glsl_tile_kept
+
+static const sat__gl_program sat__gl_programs[SAT__GL_PROGRAMS] = {
+    SAT__GL_FLAT("sat: recursive doubling", SAT__GL_IF_DOUBLING, SAT__GL_SUMS, sat__glsl_double),
+    SAT__GL_FLAT("sat: recursive doubling", SAT__GL_IF_DOUBLING, SAT__GL_FIRST, sat__glsl_double),
+    SAT__GL_FLAT("sat: reduction", SAT__GL_IF_TREE, SAT__GL_SUMS, sat__glsl_reduce),
+    SAT__GL_FLAT("sat: reduction", SAT__GL_IF_TREE, SAT__GL_FIRST, sat__glsl_reduce),
+    SAT__GL_FLAT("sat: expansion", SAT__GL_IF_TREE | SAT__GL_IF_PASSES, SAT__GL_SUMS, sat__glsl_expand),
+    SAT__GL_FLAT("sat: expansion", SAT__GL_IF_TREE | SAT__GL_IF_PASSES, SAT__GL_FIRST, sat__glsl_expand),
+    {"sat: expansion", SAT__GL_IF_TREE | SAT__GL_IF_GROUPS, "source uncles", SAT__GL_SUMS, NULL,
+     {sat__glsl_values, sat__glsl_expand_groups}},
+    {"sat: expansion", SAT__GL_IF_TREE | SAT__GL_IF_GROUPS, "source uncles", SAT__GL_FIRST, NULL,
+     {sat__glsl_values, sat__glsl_expand_groups}},
+    SAT__GL_FLAT("sat: mean", SAT__GL_IF_FLOATS, "#define FORMAT 0\n#define K MEAN_K\n#define INPUT 0\n", sat__glsl_mean),
+    SAT__GL_FLAT("sat: mean", SAT__GL_IF_FLOATS, "#define FORMAT 0\n#define K MEAN_K\n#define INPUT 1\n", sat__glsl_mean),
+    SAT__GL_BUILDS("sat: tiles", SAT__GL_IF_GROUPS, NULL, sat__glsl_group, sat__glsl_group_spikes, sat__glsl_group_sums),
+    SAT__GL_BUILDS("sat: means of tiles", SAT__GL_IF_MOMENTS | SAT__GL_IF_PASSES, NULL, sat__glsl_tile_means),
+    SAT__GL_BUILDS("sat: gauge", SAT__GL_IF_PASSES, NULL, sat__glsl_gauge),
+    SAT__GL_BUILDS("sat: quanta and spikes", SAT__GL_IF_PASSES, NULL, sat__glsl_settle),
+    SAT__GL_BUILDS("sat: integers", SAT__GL_IF_PASSES, "#define INPUT 1\n", SAT__GL_KEPT, sat__glsl_tile_scan),
+    SAT__GL_BUILDS("sat: sums in tiles", SAT__GL_IF_PASSES, "#define INPUT 0\n", SAT__GL_KEPT, sat__glsl_tile_scan),
+    SAT__GL_BUILDS("sat: slots", 0, NULL, SAT__GL_KEPT, sat__glsl_slots),
+    SAT__GL_BUILDS("sat: owners of slots", 0, NULL, SAT__GL_KEPT, sat__glsl_owners),
+    SAT__GL_BUILDS("sat: 64-bit tiles", SAT__GL_IF_PASSES, NULL, SAT__GL_KEPT, sat__glsl_wide_integer, sat__glsl_wide),
+    SAT__GL_BUILDS("sat: 64-bit tiles", SAT__GL_IF_GROUPS, NULL, sat__glsl_tile_kept, sat__glsl_wide_integer,
+                   sat__glsl_wide_group),
+    SAT__GL_BUILDS("sat: strips", 0, NULL, SAT__GL_KEPT, sat__glsl_strip_sums, sat__glsl_strips),
+    SAT__GL_BUILDS("sat: running sums", SAT__GL_IF_GROUPS, NULL, sat__glsl_tile_kept, sat__glsl_strip_sums,
+                   sat__glsl_runs),
+    SAT__GL_TILES("sat: box filter", SAT__GL_IF_PIXELS, "strips", NULL, sat__glsl_tile_filter),
+    SAT__GL_TILES("sat: variance", SAT__GL_IF_MOMENTS, "strips", NULL, sat__glsl_tile_variance)};
+
+static sat_result sat__gl_make_programs(sat_gl *g)
 {
-    const char *library[5];
-    int channels = g->options.channels;
-    library[0] = sat_gl_glsl();
-    library[1] = sat_gl_glsl_tiles(0);
-    library[2] = sat_gl_glsl_tiles(1);
-    library[3] = sat__glsl_tile_values;
-    library[4] = NULL;
-    sat__gl_define(&g->gl, "CHANNEL", g->options.channel);
-    sat__gl_define(&g->gl, "CHANNELS", channels);
-    sat__gl_define(&g->gl, "PLANES", g->options.moments ? 2 * channels : channels);
-    sat__gl_define(&g->gl, "MOMENTS", g->options.moments);
-    return sat__gl_build_table(&g->gl, g->tiled.programs, sat__gl_tile_programs, SAT__GL_TILE_PASSES,
-                               SAT__GL_ALWAYS | (g->options.moments ? SAT__GL_OF_MOMENTS : SAT__GL_OF_PIXELS), library);
+    const sat_gl_options *o = &g->options;
+    const char *const library[2] = {sat_gl_glsl(), NULL};
+    int planes = o->channels << o->moments, tiled = o->format == SAT_GL_TILED, i;
+    int given = tiled ? SAT__GL_IF_TILED | (o->moments ? SAT__GL_IF_MOMENTS : SAT__GL_IF_PIXELS)
+                : o->algorithm == SAT_SCAN_BALANCED_TREE ? SAT__GL_IF_TREE : SAT__GL_IF_DOUBLING;
+    sat__gl *gl = &g->gl;
+    static const char *const names[] = {"CHANNEL", "CHANNELS", "PLANES", "MOMENTS", "TABLE_FORMAT", "TABLE_K", "MEAN_K",
+                                        "TABLE_INPUT", "RUNS"};
+    const int values[] = {o->channel, o->channels, planes, o->moments, (int)o->format, o->k, g->mean_k,
+                          o->unsigned_input ? 2 : 1, g->compute};
+    for (i = 0; i < SAT__COUNT(values); i++) sat__gl_define(gl, names[i], values[i]);
+    sat__gl_define_text(gl, "CELL", planes == 1 ? "r32ui" : planes == 2 ? "rg32ui" : "rgba32ui");
+    if (!g->compute) given |= SAT__GL_IF_PASSES;
+    if (!o->unsigned_input) given |= SAT__GL_IF_FLOATS;
+    return sat__gl_build_table(gl, g->program, sat__gl_programs, SAT__GL_PROGRAMS, given, library);
 }
+
+/* ---- tiles: textures and passes */
 
 static void sat__gl_free_tiles(sat_gl *g)
 {
@@ -7309,113 +7659,205 @@ static double sat__gl_strip_texels(int width, int height, int planes, double *po
     return planes * (n * height + (width + 2 * n + 1 + sat__clamp_int(width, 8, 64)) * down + supers) + *pool;
 }
 
+static sat_result sat__gl_make_tiles(sat_gl *g, int width, int height)
+{
+    sat__gl_tiled *t = &g->tiled;
+    sat__gl *gl = &g->gl;
+    int planes = g->options.channels << g->options.moments, passes = !g->compute, i;
+    int tiles_x = (width - 1) / SAT__GL_TILE + 1, tiles_y = (height - 1) / SAT__GL_TILE + 1;
+    unsigned cells = planes == 1 ? SAT__GL_R32UI : planes == 2 ? SAT__GL_RG32UI : SAT__GL_RGBA32UI;
+    double room, strips = sat__gl_strip_texels(width, height, planes, &room);
+    const struct {
+        int when;
+        sat__gl_target *target;
+        unsigned internal;
+        int width, height;
+    } list[] = {{1, &t->cells, cells, width, height},
+                {passes, &t->partial, cells, width, height},
+                {1, &t->strips, SAT__GL_RG32UI, width, (int)((strips - 1) / width) + 1},
+                {1, &t->pool, SAT__GL_R32UI, tiles_x * planes, tiles_y},
+                {1, &t->owners, SAT__GL_RG32UI, tiles_x + 2, ((height - 1) / SAT__SUPER + 1) * planes},
+                {1, &t->wide, SAT__GL_RG32UI, width, (int)((room - 1) / width) + 1},
+                {g->options.moments, &t->means, SAT__GL_R32UI, tiles_x * g->options.channels, tiles_y}};
+    sat_result result = SAT_OK;
+    if (strips > 2e9) return sat__gl_fail(gl, SAT_ERR_SIZE, "an index into the strips does not fit into int", NULL);
+    for (i = 0; i < SAT__COUNT(list) && result == SAT_OK; i++)
+        if (list[i].when)
+            result = sat__gl_make_target(gl, list[i].target, list[i].internal, list[i].width, list[i].height);
+    for (i = 0; i < 2 && passes && result == SAT_OK; i++)
+        result = sat__gl_texture(gl, &t->gauge[i], SAT__GL_RGBA32UI, tiles_x * planes, height, NULL);
+    if (passes && result == SAT_OK) result = sat__gl_framebuffer(gl, &t->gauge_framebuffer, t->gauge, 2, 0);
+    if (result == SAT_OK)
+        result = sat__gl_make_layers(gl, &t->tiles, &t->tiles_framebuffer, tiles_x * planes + 1, tiles_y);
+    t->tiles_width = tiles_x * planes + 1;
+    t->planes = planes;
+    return result;
+}
+
+/* Textures for this size, or, where create has made them, the part of them that it takes. Their last column holds the
+   size for lookups. */
 static sat_result sat__gl_fit_tiles(sat_gl *g, int width, int height)
 {
     sat__gl_tiled *t = &g->tiled;
     sat__gl *gl = &g->gl;
-    int planes = g->options.channels << g->options.moments, tiles_x = (width - 1) / SAT__GL_TILE + 1,
-        tiles_y = (height - 1) / SAT__GL_TILE + 1, i;
-    unsigned cells = planes == 1 ? SAT__GL_R32UI : planes == 2 ? SAT__GL_RG32UI : SAT__GL_RGBA32UI;
-    double room, strips = sat__gl_strip_texels(width, height, planes, &room);
-    struct {
-        sat__gl_target *target;
-        unsigned internal;
-        int width, height;
-    } list[7];
+    unsigned shape[4];
     sat_result result = SAT_OK;
     if (t->width == width && t->height == height) return SAT_OK;
-    sat__gl_free_tiles(g);
-    if (strips > 2e9) return sat__gl_fail(gl, SAT_ERR_SIZE, "an index into the strips does not fit into int", NULL);
-    memset(list, 0, sizeof list);
-#define SAT__GL_ROW(i, where, format, w, h)                                                                            \
-    list[i].target = &t->where, list[i].internal = format, list[i].width = w, list[i].height = h
-    SAT__GL_ROW(0, cells, cells, width, height);
-    SAT__GL_ROW(1, partial, cells, width, height);
-    SAT__GL_ROW(2, strips, SAT__GL_RG32UI, width, (int)((strips - 1) / width) + 1);
-    SAT__GL_ROW(3, pool, SAT__GL_R32UI, tiles_x * planes, tiles_y);
-    SAT__GL_ROW(4, owners, SAT__GL_RG32UI, tiles_x + 2, ((height - 1) / SAT__SUPER + 1) * planes);
-    SAT__GL_ROW(5, wide, SAT__GL_RG32UI, width, (int)((room - 1) / width) + 1);
-    SAT__GL_ROW(6, means, SAT__GL_R32UI, tiles_x * g->options.channels, tiles_y);
-#undef SAT__GL_ROW
-    for (i = 0; i < 6 + g->options.moments && result == SAT_OK; i++)
-        result = sat__gl_make_target(gl, list[i].target, list[i].internal, list[i].width, list[i].height);
-    for (i = 0; i < 2 && result == SAT_OK; i++)
-        result = sat__gl_texture(gl, &t->gauge[i], SAT__GL_RGBA32UI, tiles_x * planes, height, NULL);
-    if (result == SAT_OK) result = sat__gl_framebuffer(gl, &t->gauge_framebuffer, t->gauge, 2, 0);
-    if (result == SAT_OK)
-        result = sat__gl_make_layers(gl, &t->tiles, &t->tiles_framebuffer, tiles_x * planes, tiles_y);
-    if (result != SAT_OK) sat__gl_free_tiles(g);
-    else {
-        t->width = width;
-        t->height = height;
-        t->planes = planes;
+    if (!g->options.width) sat__gl_free_tiles(g);
+    if (!t->tiles) result = sat__gl_make_tiles(g, width, height);
+    if (result != SAT_OK) {
+        sat__gl_free_tiles(g);
+        return result;
     }
-    return result;
+    t->width = width;
+    t->height = height;
+    shape[0] = (unsigned)width;
+    shape[1] = (unsigned)height;
+    shape[2] = (unsigned)t->planes;
+    shape[3] = 0;
+    gl->ActiveTexture(SAT__GL_TEXTURE0);
+    gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, t->tiles);
+    gl->TexSubImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, t->tiles_width - 1, 0, 0, 1, 1, 1, SAT__GL_RGBA_INTEGER,
+                      SAT__GL_UNSIGNED_INT, shape);
+    return SAT_OK;
 }
 
-/* Everything of a pass but what is special to it: it reads `source`, and what `cells`, `third` and `fourth` name. What
-   is drawn to is not bound. */
-static unsigned sat__gl_tile_pass(sat_gl *g, int pass, unsigned framebuffer, int width, int height, unsigned source,
-                                  unsigned cells, unsigned third, unsigned fourth)
+/* Program, uniforms and what it reads: `source`, and what `cells`, `gauges` and `facts` name, in this order. */
+static unsigned sat__gl_tile_inputs(sat_gl *g, int pass, const unsigned in[4])
 {
     const sat__gl_tiled *t = &g->tiled;
     sat__gl *gl = &g->gl;
-    unsigned program = t->programs[pass];
-    sat__gl_pass(gl, program, framebuffer, width, height);
-    SAT__GL_INPUTS(gl, source, cells, 0, third, fourth, pass == SAT__GL_MEANS ? 0 : t->means.texture);
+    unsigned program = g->program[pass];
+    gl->UseProgram(program);
+    SAT__GL_INPUTS(gl, in[0], in[1], 0, in[2], in[3], pass <= SAT__GL_MEANS ? 0 : t->means.texture);
     gl->ActiveTexture(SAT__GL_TEXTURE0 + 2u);
     gl->BindTexture(SAT__GL_TEXTURE_2D_ARRAY, pass <= SAT__GL_SETTLE ? 0 : t->tiles);
     sat__gl_set_int2(gl, program, "size", t->width, t->height);
+    sat__gl_set_int(gl, program, "pitch", t->strips.width);
     sat__gl_set_float(gl, program, "limit",
                       g->options.max_value < 3.4028234663852886e38 ? (float)g->options.max_value : 3.4028235e38f);
     return program;
 }
 
-static void sat__gl_tile_step(sat_gl *g, int pass, const sat__gl_target *to, unsigned source, unsigned cells,
-                              unsigned third, unsigned fourth)
+static void sat__gl_tile_pass(sat_gl *g, int pass, const sat__gl_target *to, const unsigned in[4])
 {
-    sat__gl_tile_pass(g, pass, to->framebuffer, to->width, to->height, source, cells, third, fourth);
+    g->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, to->framebuffer);
+    g->gl.Viewport(0, 0, to->width, to->height);
+    sat__gl_tile_inputs(g, pass, in);
     sat__gl_draw(&g->gl);
 }
 
-/* The sums of a row and of a column by eights, twice each, from one texture to the other and back. */
-static void sat__gl_scan_tiles(sat_gl *g, unsigned texture)
+static sat__gl_target sat__gl_part(unsigned framebuffer, int width, int height)
+{
+    sat__gl_target part = {0, 0, 0, 0};
+    part.framebuffer = framebuffer;
+    part.width = width;
+    part.height = height;
+    return part;
+}
+
+/* Gauges, quanta and spikes, then the sums of a row and of a column by eights, twice each, from one texture to the
+   other and back. */
+static void sat__gl_tiles_by_passes(sat_gl *g, unsigned texture, int tiles_x, int tiles_y)
 {
     sat__gl_tiled *t = &g->tiled;
+    sat__gl_target gauge = sat__gl_part(t->gauge_framebuffer, tiles_x * t->planes, t->height);
+    sat__gl_target settle = sat__gl_part(t->tiles_framebuffer, tiles_x * t->planes, tiles_y);
+    sat__gl_target means = sat__gl_part(t->means.framebuffer, tiles_x * g->options.channels, tiles_y);
+    unsigned in[4] = {0, 0, 0, 0};
     int i;
+    in[0] = texture;
+    if (g->options.moments) sat__gl_tile_pass(g, SAT__GL_MEANS, &means, in);
+    sat__gl_tile_pass(g, SAT__GL_GAUGE, &gauge, in);
+    in[2] = t->gauge[0];
+    in[3] = t->gauge[1];
+    sat__gl_tile_pass(g, SAT__GL_SETTLE, &settle, in);
+    in[2] = in[3] = 0;
     for (i = 0; i < 4; i++) {
         const sat__gl_target *from = i & 1 ? &t->partial : &t->cells, *to = i & 1 ? &t->cells : &t->partial;
-        unsigned program = sat__gl_tile_pass(g, i ? SAT__GL_ADD : SAT__GL_SCAN, to->framebuffer, t->width, t->height,
-                                             texture, i ? from->texture : 0, 0, 0);
         int step = i & 1 ? 8 : 1;
+        unsigned program;
+        in[1] = i ? from->texture : 0;
+        program = sat__gl_tile_inputs(g, i ? SAT__GL_ADD : SAT__GL_SCAN, in);
         sat__gl_set_int2(&g->gl, program, "axis", i < 2 ? step : 0, i < 2 ? 0 : step);
+        g->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, to->framebuffer);
+        g->gl.Viewport(0, 0, t->width, t->height);
         sat__gl_draw(&g->gl);
+    }
+}
+
+/* Nobody still reads what is written, and what comes next sees it. */
+static void sat__gl_dispatch(sat_gl *g, int x, int y, int z)
+{
+    g->gl.MemoryBarrier(SAT__GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+    g->gl.DispatchCompute((unsigned)x, (unsigned)y, (unsigned)z);
+    g->gl.MemoryBarrier(SAT__GL_TEXTURE_FETCH_BARRIER_BIT | SAT__GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
+                        SAT__GL_TEXTURE_UPDATE_BARRIER_BIT | SAT__GL_FRAMEBUFFER_BARRIER_BIT);
+}
+
+static void sat__gl_tiles_by_groups(sat_gl *g, unsigned texture, int tiles_x, int tiles_y)
+{
+    sat__gl_tiled *t = &g->tiled;
+    sat__gl *gl = &g->gl;
+    unsigned cells = t->planes == 1 ? SAT__GL_R32UI : t->planes == 2 ? SAT__GL_RG32UI : SAT__GL_RGBA32UI;
+    unsigned in[4] = {0, 0, 0, 0};
+    in[0] = texture;
+    sat__gl_tile_inputs(g, SAT__GL_GROUP, in);
+    gl->BindImageTexture(0, t->tiles, 0, 1, 0, SAT__GL_WRITE_ONLY, SAT__GL_RGBA32UI);
+    gl->BindImageTexture(1, t->cells.texture, 0, 0, 0, SAT__GL_WRITE_ONLY, cells);
+    if (g->options.moments) gl->BindImageTexture(2, t->means.texture, 0, 0, 0, SAT__GL_WRITE_ONLY, SAT__GL_R32UI);
+    sat__gl_dispatch(g, tiles_x, tiles_y, 1);
+}
+
+/* Slots of 64-bit tiles, their cells, and the strips. */
+static void sat__gl_sum_tiles(sat_gl *g, unsigned texture, int tiles_x, int tiles_y)
+{
+    sat__gl_tiled *t = &g->tiled;
+    sat__gl *gl = &g->gl;
+    int pitch = t->strips.width, supers_x = (t->width - 1) / SAT__SUPER + 1, supers = (t->height - 1) / SAT__SUPER + 1;
+    double room, texels = sat__gl_strip_texels(t->width, t->height, t->planes, &room);
+    sat__gl_target pool = sat__gl_part(t->pool.framebuffer, tiles_x * t->planes, tiles_y);
+    sat__gl_target owners = sat__gl_part(t->owners.framebuffer, tiles_x + 2, supers * t->planes);
+    sat__gl_target wide = sat__gl_part(t->wide.framebuffer, pitch, (int)((room - 1) / pitch) + 1);
+    sat__gl_target strips = sat__gl_part(t->strips.framebuffer, pitch, (int)((texels - 1) / pitch) + 1);
+    unsigned in[4] = {0, 0, 0, 0};
+    sat__gl_tile_pass(g, SAT__GL_SLOTS, &pool, in);
+    in[1] = t->pool.texture;
+    sat__gl_tile_pass(g, SAT__GL_OWNERS, &owners, in);
+    in[0] = texture;
+    in[1] = t->owners.texture;
+    if (g->compute) {
+        sat__gl_tile_inputs(g, SAT__GL_WIDE_GROUP, in);
+        gl->BindImageTexture(0, t->wide.texture, 0, 0, 0, SAT__GL_WRITE_ONLY, SAT__GL_RG32UI);
+        sat__gl_dispatch(g, owners.width, owners.height, 1);
+    } else {
+        sat__gl_tile_pass(g, SAT__GL_WIDE, &wide, in);
+    }
+    in[1] = t->cells.texture;
+    in[2] = t->pool.texture;
+    in[3] = t->wide.texture;
+    sat__gl_tile_pass(g, SAT__GL_STRIPS, &strips, in);
+    if (g->compute) {
+        int rows = (t->height * supers_x + 31) / 32, columns = (t->width * supers + 31) / 32;
+        sat__gl_tile_inputs(g, SAT__GL_RUNS, in);
+        gl->BindImageTexture(0, t->strips.texture, 0, 0, 0, SAT__GL_WRITE_ONLY, SAT__GL_RG32UI);
+        sat__gl_dispatch(g, sat__max_int(sat__max_int(rows, columns), supers_x * supers), 3, t->planes);
     }
 }
 
 static sat_result sat__gl_build_tiles(sat_gl *g, unsigned texture, int width, int height)
 {
-    sat__gl_tiled *t = &g->tiled;
-    sat__gl *gl = &g->gl;
+    int tiles_x = (width - 1) / SAT__GL_TILE + 1, tiles_y = (height - 1) / SAT__GL_TILE + 1;
     sat__gl_state state;
     sat_result result;
-    int tiles_x = (width - 1) / SAT__GL_TILE + 1, tiles_y = (height - 1) / SAT__GL_TILE + 1;
-    sat__gl_begin(gl, &state, 6);
+    sat__gl_begin(&g->gl, &state, 6);
     result = sat__gl_fit_tiles(g, width, height);
     if (result == SAT_OK) {
-        if (g->options.moments) sat__gl_tile_step(g, SAT__GL_MEANS, &t->means, texture, 0, 0, 0);
-        sat__gl_tile_pass(g, SAT__GL_GAUGE, t->gauge_framebuffer, tiles_x * t->planes, height, texture, 0, 0, 0);
-        sat__gl_draw(gl);
-        sat__gl_tile_pass(g, SAT__GL_SETTLE, t->tiles_framebuffer, tiles_x * t->planes, tiles_y, texture, 0,
-                          t->gauge[0], t->gauge[1]);
-        sat__gl_draw(gl);
-        sat__gl_scan_tiles(g, texture);
-        sat__gl_tile_step(g, SAT__GL_SLOTS, &t->pool, 0, 0, 0, 0);
-        sat__gl_tile_step(g, SAT__GL_OWNERS, &t->owners, 0, t->pool.texture, 0, 0);
-        sat__gl_tile_step(g, SAT__GL_WIDE, &t->wide, texture, t->owners.texture, 0, 0);
-        sat__gl_tile_step(g, SAT__GL_STRIPS, &t->strips, texture, t->cells.texture, t->pool.texture, t->wide.texture);
+        if (g->compute) sat__gl_tiles_by_groups(g, texture, tiles_x, tiles_y);
+        else sat__gl_tiles_by_passes(g, texture, tiles_x, tiles_y);
+        sat__gl_sum_tiles(g, texture, tiles_x, tiles_y);
     }
-    sat__gl_end(gl, &state);
+    sat__gl_end(&g->gl, &state);
     return result;
 }
 
@@ -7460,14 +7902,17 @@ static sat_result sat__gl_filter_tiles(sat_gl *g, int pass, unsigned texture, in
 {
     sat__gl_state state;
     sat_result result;
-    if (!g || !g->ready || !g->tiled.width || !texture || radius < 0 || radius > 0x3fffffff || !g->tiled.programs[pass])
+    if (!g || !g->ready || !g->tiled.width || !texture || radius < 0 || radius > 0x3fffffff || !g->program[pass])
         return SAT_ERR_ARGUMENT;
     sat__gl_begin(&g->gl, &state, 6);
     result = sat__gl_attach(&g->gl, g->borrowed, &texture, 1, 0);
     if (result == SAT_OK) {
-        unsigned program = sat__gl_tile_pass(g, pass, g->borrowed, g->tiled.width, g->tiled.height, 0,
-                                             g->tiled.cells.texture, g->tiled.strips.texture, 0);
+        unsigned in[4] = {0, 0, 0, 0}, program;
+        in[1] = g->tiled.cells.texture;
+        in[2] = g->tiled.strips.texture;
+        program = sat__gl_tile_inputs(g, pass, in);
         sat__gl_set_int(&g->gl, program, "radius", radius);
+        g->gl.Viewport(0, 0, g->tiled.width, g->tiled.height);
         sat__gl_draw(&g->gl);
     }
     sat__gl_end(&g->gl, &state);
@@ -7485,29 +7930,6 @@ SAT_DEF sat_result sat_gl_variance(sat_gl *gl, unsigned texture, int radius)
 }
 
 /* ---- >> passes of flat tables */
-
-static sat_result sat__gl_make_kernels(sat_gl *g)
-{
-    const sat_gl_options *o = &g->options;
-    const char *expand = g->compute ? sat__glsl_expand_groups : sat__glsl_expand;
-    sat_gl_format format = o->format;
-    sat_result result = SAT_OK;
-    int i, k = o->k;
-    if (format == SAT_GL_TILED) result = sat__gl_make_tile_programs(g);
-    for (i = 0; i < 2 && result == SAT_OK; i++) {
-        if (format == SAT_GL_TILED) result = SAT_OK;
-        else if (o->algorithm == SAT_SCAN_RECURSIVE_DOUBLING) {
-            result = sat__gl_make_kernel(g, &g->doubling[i], "sat: recursive doubling", sat__glsl_double, i, format, k);
-        } else {
-            result = sat__gl_make_kernel(g, &g->reduce[i], "sat: reduction", sat__glsl_reduce, i, format, k);
-            if (result == SAT_OK)
-                result = sat__gl_make_kernel(g, &g->expand[i], "sat: expansion", expand, i, format, k);
-        }
-        if (result == SAT_OK && !o->unsigned_input)
-            result = sat__gl_make_kernel(g, &g->mean[i], "sat: mean", sat__glsl_mean, i, SAT_GL_TWO_FLOAT, g->mean_k);
-    }
-    return result;
-}
 
 /* ---- textures of one size */
 
@@ -7533,7 +7955,16 @@ static void sat__gl_free_textures(sat_gl *g)
 static void sat__gl_free_means(sat_gl *g)
 {
     sat__gl_free_levels(&g->gl, g->means);
-    g->mean_width = g->mean_height = 0;
+    g->mean_width = g->mean_height = g->mean_levels = 0;
+}
+
+/* A texture that is there already is larger, and this size a part of it. */
+static sat_result sat__gl_have_target(sat_gl *g, sat__gl_target *target, unsigned internal, int width, int height)
+{
+    if (!target->texture) return sat__gl_make_target(&g->gl, target, internal, width, height);
+    target->width = width;
+    target->height = height;
+    return SAT_OK;
 }
 
 /* The tree along one axis ends above the level that one group can hold: its root is never asked for. */
@@ -7547,10 +7978,8 @@ static sat_result sat__gl_make_tree(sat_gl *g, int axis)
         sat__gl_level *level = &g->levels[axis][g->depth[axis]++];
         if (axis) height = (height + k - 1) / k;
         else width = (width + k - 1) / k;
-        level->width = width;
-        level->height = height;
-        result = sat__gl_make_target(&g->gl, &level->sums, internal, width, height);
-        if (result == SAT_OK) result = sat__gl_make_target(&g->gl, &level->scan, internal, width, height);
+        result = sat__gl_have_target(g, &level->sums, internal, width, height);
+        if (result == SAT_OK) result = sat__gl_have_target(g, &level->scan, internal, width, height);
     }
     return result;
 }
@@ -7594,12 +8023,12 @@ static sat_result sat__gl_fit(sat_gl *g, int width, int height, int own_table)
         if (own_table && !g->table.texture) result = sat__gl_make_target(&g->gl, &g->table, internal, width, height);
         return result;
     }
-    sat__gl_free_textures(g);
+    if (!g->options.width) sat__gl_free_textures(g);
     sat__gl_settle(g, width, height);
     g->width = width;
     g->height = height;
-    if (own_table) result = sat__gl_make_target(&g->gl, &g->table, internal, width, height);
-    if (result == SAT_OK) result = sat__gl_make_target(&g->gl, &g->partial, internal, width, height);
+    if (own_table) result = sat__gl_have_target(g, &g->table, internal, width, height);
+    if (result == SAT_OK) result = sat__gl_have_target(g, &g->partial, internal, width, height);
     if (result == SAT_OK && g->options.algorithm == SAT_SCAN_BALANCED_TREE) {
         result = sat__gl_make_tree(g, 0);
         if (result == SAT_OK) result = sat__gl_make_tree(g, 1);
@@ -7611,59 +8040,57 @@ static sat_result sat__gl_fit(sat_gl *g, int width, int height, int own_table)
 /* ---- passes */
 
 /* Everything of a pass but where it draws. */
-static void sat__gl_start(sat_gl *g, const sat__gl_kernel *kernel, int axis, int size, unsigned source, unsigned uncles)
+static unsigned sat__gl_start(sat_gl *g, int pass, int axis, int size, unsigned source, unsigned uncles)
 {
     sat__gl *gl = &g->gl;
-    gl->UseProgram(kernel->program);
-    gl->Uniform2i(kernel->axis, axis == 0, axis == 1);
-    gl->Uniform1i(kernel->size, size);
-    gl->Uniform1f(kernel->limit, g->limit);
-    if (g->quantum > 0) gl->Uniform1f(kernel->scale, (float)(1 / g->quantum));
-    gl->ActiveTexture(SAT__GL_TEXTURE0);
-    gl->BindTexture(SAT__GL_TEXTURE_2D, source);
-    gl->BindSampler(0, 0);
-    gl->ActiveTexture(SAT__GL_TEXTURE0 + 1);
-    gl->BindTexture(SAT__GL_TEXTURE_2D, uncles);
-    gl->BindSampler(1, 0);
+    unsigned program = g->program[pass];
+    gl->UseProgram(program);
+    sat__gl_set_int2(gl, program, "axis", axis == 0, axis == 1);
+    sat__gl_set_int(gl, program, "size", size);
+    sat__gl_set_float(gl, program, "limit", g->limit);
+    sat__gl_set_float(gl, program, "scale", g->quantum > 0 ? (float)(1 / g->quantum) : 1);
+    SAT__GL_INPUTS(gl, source, uncles);
+    return program;
 }
 
-static void sat__gl_expand(sat_gl *g, int axis, sat__gl_target target, int width, int height, unsigned source,
-                           int is_input, unsigned uncles)
+static void sat__gl_draw_to(sat_gl *g, const sat__gl_target *to)
+{
+    g->gl.BindFramebuffer(SAT__GL_FRAMEBUFFER, to->framebuffer);
+    g->gl.Viewport(0, 0, to->width, to->height);
+    sat__gl_draw(&g->gl);
+}
+
+static void sat__gl_expand(sat_gl *g, int axis, const sat__gl_target *to, unsigned source, int is_input,
+                           unsigned uncles)
 {
     sat__gl *gl = &g->gl;
-    const sat__gl_kernel *kernel = &g->expand[is_input];
-    int size = axis ? height : width, across = axis ? width : height, k = g->options.k;
-    sat__gl_start(g, kernel, axis, size, source, uncles);
+    int size = axis ? to->height : to->width, across = axis ? to->width : to->height, k = g->options.k;
+    unsigned program = sat__gl_start(g, (g->compute ? SAT__GL_EXPAND_GROUPS : SAT__GL_EXPAND) + is_input, axis, size,
+                                     source, uncles);
     if (g->compute) {
-        gl->Uniform1i(kernel->across, across);
-        gl->BindImageTexture(0, target.texture, 0, 0, 0, SAT__GL_WRITE_ONLY, sat__gl_internal(g->options.format));
-        gl->DispatchCompute((unsigned)(across + 63) / 64, (unsigned)((size + k - 1) / k), 1);
-        gl->MemoryBarrier(SAT__GL_TEXTURE_FETCH_BARRIER_BIT | SAT__GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
-                          SAT__GL_TEXTURE_UPDATE_BARRIER_BIT | SAT__GL_FRAMEBUFFER_BARRIER_BIT);
+        sat__gl_set_int(gl, program, "across", across);
+        gl->BindImageTexture(0, to->texture, 0, 0, 0, SAT__GL_WRITE_ONLY, sat__gl_internal(g->options.format));
+        sat__gl_dispatch(g, (across + 63) / 64, (size + k - 1) / k, 1);
     } else {
-        gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, target.framebuffer);
-        gl->Viewport(0, 0, width, height);
-        sat__gl_draw(gl);
+        sat__gl_draw_to(g, to);
     }
 }
 
 /* Up the tree and down again, along one axis. */
-static void sat__gl_tree(sat_gl *g, int axis, sat__gl_target target, unsigned source, int is_input)
+static void sat__gl_tree(sat_gl *g, int axis, const sat__gl_target *to, unsigned source, int is_input)
 {
-    sat__gl *gl = &g->gl;
     sat__gl_level *levels = g->levels[axis];
     int i, depth = g->depth[axis], length = axis ? g->height : g->width;
     for (i = 0; i < depth; i++) {
-        sat__gl_start(g, &g->reduce[is_input && i == 0], axis, length, i ? levels[i - 1].sums.texture : source, 0);
-        gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, levels[i].sums.framebuffer);
-        gl->Viewport(0, 0, levels[i].width, levels[i].height);
-        sat__gl_draw(gl);
-        length = axis ? levels[i].height : levels[i].width;
+        sat__gl_start(g, SAT__GL_REDUCE + (is_input && i == 0), axis, length, i ? levels[i - 1].sums.texture : source,
+                      0);
+        sat__gl_draw_to(g, &levels[i].sums);
+        length = axis ? levels[i].sums.height : levels[i].sums.width;
     }
     for (i = depth - 1; i >= 0; i--)
-        sat__gl_expand(g, axis, levels[i].scan, levels[i].width, levels[i].height, levels[i].sums.texture, 0,
+        sat__gl_expand(g, axis, &levels[i].scan, levels[i].sums.texture, 0,
                        i + 1 < depth ? levels[i + 1].scan.texture : 0);
-    sat__gl_expand(g, axis, target, g->width, g->height, source, is_input, depth ? levels[0].scan.texture : 0);
+    sat__gl_expand(g, axis, to, source, is_input, depth ? levels[0].scan.texture : 0);
 }
 
 static int sat__gl_doubling_passes(int n, int k)
@@ -7676,7 +8103,7 @@ static int sat__gl_doubling_passes(int n, int k)
 /* All passes of both axes alternate between two textures so that the last one writes the target. From the third pass
    along an axis on, the first k^(i-2) elements are left alone: they were complete two passes ago, in the same
    texture. */
-static void sat__gl_double(sat_gl *g, int axes, sat__gl_target target, unsigned source)
+static void sat__gl_double(sat_gl *g, int axes, const sat__gl_target *target, unsigned source)
 {
     sat__gl *gl = &g->gl;
     sat__gl_target halves[2];
@@ -7685,12 +8112,12 @@ static void sat__gl_double(sat_gl *g, int axes, sat__gl_target target, unsigned 
     passes[1] = axes == 2 ? sat__gl_doubling_passes(g->height, g->options.k) : 0;
     total = passes[0] + passes[1];
     halves[0] = g->partial;
-    halves[1] = target;
+    halves[1] = *target;
     for (axis = 0; axis < axes; axis++) {
         int distance = 1, skip = 0;
         for (i = 0; i < passes[axis]; i++, done++) {
             const sat__gl_target *to = &halves[(total - done) & 1], *from = &halves[(total - done + 1) & 1];
-            sat__gl_start(g, &g->doubling[done == 0], axis, distance, done ? from->texture : source, 0);
+            sat__gl_start(g, SAT__GL_DOUBLE + (done == 0), axis, distance, done ? from->texture : source, 0);
             gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, to->framebuffer);
             if (axis) gl->Viewport(0, skip, g->width, g->height - skip);
             else gl->Viewport(skip, 0, g->width - skip, g->height);
@@ -7701,22 +8128,22 @@ static void sat__gl_double(sat_gl *g, int axes, sat__gl_target target, unsigned 
     }
 }
 
-static void sat__gl_scan_axes(sat_gl *g, int axes, sat__gl_target target, unsigned source)
+static void sat__gl_scan_axes(sat_gl *g, int axes, const sat__gl_target *target, unsigned source)
 {
     if (g->options.algorithm == SAT_SCAN_RECURSIVE_DOUBLING) {
         sat__gl_double(g, axes, target, source);
     } else if (axes == 1 || g->height == 1) {
         sat__gl_tree(g, 0, target, source, 1);
     } else {
-        sat__gl_tree(g, 0, g->partial, source, 1);
+        sat__gl_tree(g, 0, &g->partial, source, 1);
         sat__gl_tree(g, 1, target, g->partial.texture, 0);
     }
 }
 
-/* Whether create left this size open, or has it. */
+/* Whether create left this size open, or has room for it. */
 static int sat__gl_size_fits(const sat_gl *g, int width, int height)
 {
-    return g->options.width == 0 || (g->options.width == width && g->options.height == height);
+    return g->options.width == 0 || (width <= g->options.width && height <= g->options.height);
 }
 
 static sat_result sat__gl_run(sat_gl *g, int axes, unsigned table, unsigned texture, int width, int height)
@@ -7732,11 +8159,12 @@ static sat_result sat__gl_run(sat_gl *g, int axes, unsigned table, unsigned text
     result = sat__gl_fit(g, width, height, !table);
     target = g->table;
     if (result == SAT_OK && table) {
+        target = g->partial; /* its size */
         target.texture = table;
         target.framebuffer = g->borrowed;
         result = sat__gl_attach(&g->gl, g->borrowed, &table, 1, 0);
     }
-    if (result == SAT_OK) sat__gl_scan_axes(g, axes, target, texture);
+    if (result == SAT_OK) sat__gl_scan_axes(g, axes, &target, texture);
     sat__gl_end(&g->gl, &state);
     return result;
 }
@@ -7759,18 +8187,17 @@ SAT_DEF double sat_gl_quantum(const sat_gl *gl) { return gl ? gl->quantum : 0; }
 static sat_result sat__gl_fit_means(sat_gl *g, int width, int height)
 {
     sat_result result = SAT_OK;
-    int k = g->mean_k;
+    int k = g->mean_k, i = 0;
     if (g->mean_width == width && g->mean_height == height) return SAT_OK;
-    sat__gl_free_means(g);
+    if (!g->options.width) sat__gl_free_means(g);
     g->mean_width = width;
     g->mean_height = height;
-    g->mean_levels = 0;
-    do {
-        sat__gl_level *level = &g->means[g->mean_levels++];
-        level->width = width = (width + k - 1) / k;
-        level->height = height = (height + k - 1) / k;
-        result = sat__gl_make_target(&g->gl, &level->sums, SAT__GL_RG32F, width, height);
-    } while (result == SAT_OK && (width > 1 || height > 1));
+    do { /* the last level is always the same texture */
+        width = (width + k - 1) / k;
+        height = (height + k - 1) / k;
+        result = sat__gl_have_target(g, &g->means[i++].sums, SAT__GL_RG32F, width, height);
+        g->mean_levels = sat__max_int(g->mean_levels, i);
+    } while (result == SAT_OK && (width > 1 || height > 1 || i < g->mean_levels));
     if (result != SAT_OK) sat__gl_free_means(g);
     return result;
 }
@@ -7781,18 +8208,15 @@ static void sat__gl_reduce_mean(sat_gl *g, unsigned source, int width, int heigh
     double area = (double)width * (double)height, largest = sat__gl_largest(g);
     int i;
     for (i = 0; i < g->mean_levels; i++) {
-        const sat__gl_kernel *kernel = &g->mean[i == 0];
-        const sat__gl_level *level = &g->means[i];
-        sat__gl_start(g, kernel, 0, 0, source, 0);
-        gl->Uniform2i(kernel->bounds, width, height);
-        gl->Uniform1f(kernel->limit, (float)largest);
-        gl->Uniform1f(kernel->factor, i + 1 < g->mean_levels ? 1.0f : (float)(1 / area));
-        gl->BindFramebuffer(SAT__GL_FRAMEBUFFER, level->sums.framebuffer);
-        gl->Viewport(0, 0, level->width, level->height);
-        sat__gl_draw(gl);
-        source = level->sums.texture;
-        width = level->width;
-        height = level->height;
+        const sat__gl_target *to = &g->means[i].sums;
+        unsigned program = sat__gl_start(g, SAT__GL_MEAN + (i == 0), 0, 0, source, 0);
+        sat__gl_set_int2(gl, program, "bounds", width, height);
+        sat__gl_set_float(gl, program, "limit", (float)largest);
+        sat__gl_set_float(gl, program, "factor", i + 1 < g->mean_levels ? 1.0f : (float)(1 / area));
+        sat__gl_draw_to(g, to);
+        source = to->texture;
+        width = to->width;
+        height = to->height;
     }
 }
 
@@ -7842,11 +8266,11 @@ SAT_DEF sat_result sat_gl_create(sat_gl **out, sat_gl_get_proc *get_proc, const 
     *out = g;
     result = sat__gl_open(&g->gl, get_proc);
     if (result != SAT_OK) return result;
-    g->compute = chosen.compute && g->gl.has_compute;
+    g->gl.has_compute = g->compute = chosen.compute && g->gl.has_compute; /* image units are touched by nothing else */
     g->mean_k = sat__min_int(chosen.k, 8); /* squared */
     sat__gl_begin(&g->gl, &state, 2);
     g->gl.GenFramebuffers(1, &g->borrowed);
-    result = sat__gl_make_kernels(g);
+    result = sat__gl_make_programs(g);
     if (result == SAT_OK && chosen.width) {
         if (chosen.format == SAT_GL_TILED) result = sat__gl_fit_tiles(g, chosen.width, chosen.height);
         else result = sat__gl_fit(g, chosen.width, chosen.height, 1);
@@ -7875,18 +8299,11 @@ SAT_DEF sat_result sat_gl_set_options(sat_gl *gl, const sat_gl_options *options)
 SAT_DEF void sat_gl_destroy(sat_gl *gl)
 {
     sat_allocator allocator;
-    int i;
     if (!gl) return;
     if (gl->gl.vertex_array) {
         sat__gl_free_textures(gl);
         sat__gl_free_means(gl);
-        for (i = 0; i < 2; i++) { /* 0 is ignored */
-            gl->gl.DeleteProgram(gl->reduce[i].program);
-            gl->gl.DeleteProgram(gl->expand[i].program);
-            gl->gl.DeleteProgram(gl->doubling[i].program);
-            gl->gl.DeleteProgram(gl->mean[i].program);
-        }
-        for (i = 0; i < SAT__GL_TILE_PASSES; i++) gl->gl.DeleteProgram(gl->tiled.programs[i]);
+        sat__gl_delete_programs(&gl->gl, gl->program, SAT__GL_PROGRAMS);
         gl->gl.DeleteFramebuffers(1, &gl->borrowed);
         sat__gl_close(&gl->gl);
     }

@@ -114,9 +114,9 @@ static void dump_sat(void)
         o.compute = d[3];
         o.channel = d[4];
         o.unsigned_input = d[5];
-        if (o.format == SAT_GL_TILED) { /* k and compute are not looked at: they say channels and moments */
-            if (d[1] || d[5]) continue;
-            o.k = 4, o.compute = 0, o.channel = 0;
+        if (o.format == SAT_GL_TILED) { /* algorithm and k are not looked at: channel and compute say moments and channels */
+            if (d[2] || d[5]) continue;
+            o.k = 4, o.compute = d[1], o.channel = 0;
             o.channels = 1 + d[4];
             o.moments = d[3];
         }

@@ -853,38 +853,52 @@ static void test_tile_case(sat_gl *g, int w, int h, int c, int which, int met[2]
     free(p);
 }
 
-TEST(tiles_equal_the_cpu_table_bit_for_bit)
+/* The objects live as long as their channels: what takes time is llvmpipe's compiler. */
+static void test_tiles_of(int compute, int es_too)
 {
     static const int sizes[][3] = {{1, 1, 1},     {130, 1, 1},   {1, 130, 1}, {64, 64, 1},
                                    {200, 150, 1}, {131, 97, 3}, {70, 200, 4}};
-    int size, which, es, met[2] = {0, 0};
+    int size, which, met[2] = {0, 0};
     sat_gl *g = NULL;
-    if (!test_open()) return;
-    for (es = 0; es < 2; es++)
-        for (size = 0; size < 7; size++) {
-            int w = sizes[size][0], h = sizes[size][1], c = sizes[size][2], made = 0;
-            sat_gl_options options = sat_gl_defaults();
-            test_as_es = es;
-            if (es != (size == 5)) continue; /* three objects: what takes time is llvmpipe's compiler */
-            options.channels = c;
-            if (!g && !EXPECT_EQ(sat_gl_create(&g, test_get_proc, &options), SAT_OK)) puts(sat_gl_message(g));
-            for (which = 0; which < 9; which++) {
-                test_tile_case(g, w, h, c, which, met);
-                EXPECT(!which || test_generated == made);
-                made = test_generated;
-            }
-            EXPECT_EQ(sat_gl_variance(g, 1, 3), SAT_ERR_ARGUMENT);
-            EXPECT_EQ(sat_gl_box_filter(g, 0, 3), SAT_ERR_ARGUMENT);
-            EXPECT_EQ(sat_gl_box_filter(g, 1, -1), SAT_ERR_ARGUMENT);
-            EXPECT_EQ(sat_gl_build(g, 1, 2, w, h), SAT_ERR_ARGUMENT);
-            EXPECT_EQ(sat_gl_scan(g, 0, 2, w, h), SAT_ERR_ARGUMENT);
-            if (size > 3) {
-                sat_gl_destroy(g);
-                g = NULL;
-            }
-            test_as_es = 0;
+    for (size = 0; size < 7; size++) {
+        int w = sizes[size][0], h = sizes[size][1], c = sizes[size][2], made = 0;
+        sat_gl_options options = sat_gl_defaults();
+        options.channels = c;
+        options.compute = compute;
+        test_as_es = es_too && c == 3;
+        if (!g && !EXPECT_EQ(sat_gl_create(&g, test_get_proc, &options), SAT_OK)) puts(sat_gl_message(g));
+        EXPECT_EQ(g->compute, compute);
+        for (which = 0; which < 9; which++) {
+            test_tile_case(g, w, h, c, which, met);
+            EXPECT(!which || test_generated == made);
+            made = test_generated;
         }
+        EXPECT_EQ(sat_gl_variance(g, 1, 3), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(sat_gl_box_filter(g, 0, 3), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(sat_gl_box_filter(g, 1, -1), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(sat_gl_build(g, 1, 2, w, h), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(sat_gl_scan(g, 0, 2, w, h), SAT_ERR_ARGUMENT);
+        if (size > 3) {
+            sat_gl_destroy(g);
+            g = NULL;
+        }
+        test_as_es = 0;
+    }
     EXPECT(met[0] > 20 && met[1] > 200);
+}
+
+TEST(tiles_equal_the_cpu_table_bit_for_bit)
+{
+    if (!test_open()) return;
+    test_tiles_of(0, 1);
+    test_close();
+}
+
+TEST(tiles_by_compute_equal_the_cpu_table_bit_for_bit)
+{
+    if (!test_open()) return;
+    if (!test_f.real.has_compute) expect_skip("needs OpenGL 4.3");
+    else test_tiles_of(1, 0);
     test_close();
 }
 
@@ -1010,7 +1024,7 @@ TEST(lookups_in_tiles)
     test_close();
 }
 
-TEST(variance_of_tiles)
+static void test_variance(int compute)
 {
     enum { W = 150, H = 140 };
     float *p = (float *)malloc(sizeof(float) * W * H * 2), *drawn = (float *)malloc(sizeof(float) * W * H * 4);
@@ -1021,7 +1035,6 @@ TEST(variance_of_tiles)
     unsigned input, target;
     uint64_t state = 3;
     int x, y, i, r;
-    if (!test_open()) return;
     for (i = 0; i < W * H; i++) {
         p[2 * i] = (float)(1e4 + support_gaussian(&state));
         p[2 * i + 1] = (float)(i % W / 64 + 3 * support_uniform(&state));
@@ -1029,6 +1042,7 @@ TEST(variance_of_tiles)
     p[40 * W] = sat__float_from_bits(0x7fc00000u);
     options.channels = 2;
     options.moments = 1;
+    options.compute = compute;
     if (!EXPECT_EQ(sat_gl_create(&g, test_get_proc, &options), SAT_OK)) puts(sat_gl_message(g));
     EXPECT_EQ(sat_moments_create(&m, W, H, 2, NULL), SAT_OK);
     EXPECT_EQ(sat_moments_build(m, &view), SAT_OK);
@@ -1060,6 +1074,13 @@ TEST(variance_of_tiles)
     sat_gl_destroy(g);
     free(p);
     free(drawn);
+}
+
+TEST(variance_of_tiles)
+{
+    if (!test_open()) return;
+    test_variance(0);
+    if (test_f.real.has_compute) test_variance(1);
     test_close();
 }
 
