@@ -328,8 +328,8 @@ typedef struct tonemap_gl tonemap_gl;
 /* On an OpenGL error *out only answers tonemap_gl_message, and is to be destroyed; on the others it is NULL. */
 TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_proc, int width, int height,
                                          const tonemap_options *options);
-/* Maps the first texels (or those at to->from) of the 2D texture hdr (float RGB or RGBA, at least of the created size,
-   level 0) to sRGB codes and alpha 1: in the target `to` (8 bits a channel; the window's framebuffer:
+/* Maps the first texels (or those at to->from) of the 2D texture hdr (float RGB or RGBA, at least of the created size
+   or the smaller one that `to` names, over which meter_weights are stretched; level 0) to sRGB codes and alpha 1: in the target `to` (8 bits a channel; the window's framebuffer:
    sat_gl_to_framebuffer(0, 0, 0)), or, when NULL, in tonemap_gl_texture(). */
 TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, const sat_gl_target *to, unsigned hdr, double dt);
 TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl);
@@ -2700,16 +2700,19 @@ static const char tonemap__glsl_library[] =
         })
     "#ifdef SAT_GLSL\n"
     SAT__GLSL(
-        float tonemap_local(usampler2D table, float quantum, ivec2 pixel, float scaled, float key) {
+        float tonemap_local_in(usampler2D table, float quantum, ivec2 size, ivec2 pixel, float scaled, float key) {
             const int reach[8] = int[8](0, 1, 2, 3, 5, 8, 13, 20);
             float c = min(scaled, 256.0);
             for (int k = 1; k < TONEMAP_SCALES; k++) {
                 float side = float(2 * reach[k - 1] + 1);
-                float v = sat_mean(table, quantum, pixel - reach[k], pixel + reach[k] + 1);
+                float v = sat_mean(table, quantum, pixel - reach[k], min(pixel + reach[k] + 1, size));
                 if (!(abs(c - v) < TONEMAP_EPSILON * c + TONEMAP_PHI_TERM * key / (side * side))) break;
                 c = v;
             }
             return c;
+        }
+        float tonemap_local(usampler2D table, float quantum, ivec2 pixel, float scaled, float key) {
+            return tonemap_local_in(table, quantum, textureSize(table, 0), pixel, scaled, key);
         })
     "#endif\n"
     "#endif\n";
@@ -2735,9 +2738,10 @@ static const char tonemap__glsl_reduce[] =
     "#ifdef TONEMAP_FIRST\n"
     SAT__GLSL(
         uniform sampler2D source, mask;
+        uniform ivec2 size;
         ivec4 tonemap_read(ivec2 p) {
             float y = texelFetch(source, p, 0).x;
-            int weight = TONEMAP_MASK == 1 ? int(texelFetch(mask, p, 0).x) : 1;
+            int weight = TONEMAP_MASK == 1 ? int(texelFetch(mask, p * textureSize(mask, 0) / size, 0).x) : 1;
             uint bits = floatBitsToUint(y);
             if (!(y > 0.0) || bits >= 0x71800000u) return ivec4(0);
             float t = uintBitsToFloat((bits & 0x007fffffu) | 0x3f800000u) - 1.0;
@@ -2748,10 +2752,10 @@ static const char tonemap__glsl_reduce[] =
     "#else\n"
     SAT__GLSL(
         uniform highp isampler2D source;
+        uniform ivec2 size;
         ivec4 tonemap_read(ivec2 p) { return texelFetch(source, p, 0); })
     "#endif\n"
     SAT__GLSL(
-        uniform ivec2 size;
         out ivec4 value;
         void main() {
             ivec2 low = 4 * ivec2(gl_FragCoord.xy), high = min(low + 4, size);
@@ -2769,18 +2773,19 @@ static const char tonemap__glsl_squares[] =
         layout(local_size_x = 256) in;
         layout(r32ui, binding = 0) uniform highp uimage2D counts;
         uniform sampler2D luminance, mask;
+        uniform ivec2 picture;
         shared uint bins[TONEMAP_BINS];
         void main() {
-            ivec2 size = textureSize(luminance, 0), low = 64 * ivec2(gl_WorkGroupID.xy);
+            ivec2 low = 64 * ivec2(gl_WorkGroupID.xy);
             int lane = int(gl_LocalInvocationIndex);
             for (int i = lane; i < TONEMAP_BINS; i += 256) bins[i] = 0u;
             barrier();
             for (int i = lane; i < 4096; i += 256) {
                 ivec2 p = low + ivec2(i % 64, i / 64);
-                float y = all(lessThan(p, size)) ? texelFetch(luminance, p, 0).x : 0.0;
+                float y = all(lessThan(p, picture)) ? texelFetch(luminance, p, 0).x : 0.0;
                 uint bits = floatBitsToUint(y);
                 if (!(y > 0.0) || bits >= 0x71800000u) continue;
-                uint weight = TONEMAP_MASK == 1 ? uint(texelFetch(mask, p, 0).x) : 1u;
+                uint weight = TONEMAP_MASK == 1 ? uint(texelFetch(mask, p * textureSize(mask, 0) / picture, 0).x) : 1u;
                 atomicAdd(bins[(bits - uint(TONEMAP_LOWEST)) >> 19], weight);
             }
             barrier();
@@ -2797,11 +2802,12 @@ static const char tonemap__glsl_nothing[] =
 static const char tonemap__glsl_scatter[] =
     SAT__GLSL(
         uniform sampler2D luminance, mask;
-        uniform int width;
+        uniform ivec2 picture;
         flat out float weight;
         void main() {
-            weight = TONEMAP_MASK == 1 ? texelFetch(mask, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x : 1.0;
-            float y = texelFetch(luminance, ivec2(gl_VertexID % width, gl_VertexID / width), 0).x;
+            ivec2 p = ivec2(gl_VertexID % picture.x, gl_VertexID / picture.x);
+            weight = TONEMAP_MASK == 1 ? texelFetch(mask, p * textureSize(mask, 0) / picture, 0).x : 1.0;
+            float y = texelFetch(luminance, p, 0).x;
             uint bits = floatBitsToUint(y);
             int bin = int((bits - uint(TONEMAP_LOWEST)) >> 19);
             gl_PointSize = 1.0;
@@ -2950,6 +2956,7 @@ static const char tonemap__glsl_state[] =
 static const char tonemap__glsl_frame[] =
     SAT__GLSL(
         uniform sampler2D luminance, state;
+        uniform ivec2 picture; /* its size; the textures may be larger */
         float tonemap_key() { vec4 s = texelFetch(state, ivec2(0), 0); return s.w > 0.0 ? exp2(s.y) : 0.18; })
     SAT__GLSL(float tonemap_scale() {)
     "#if TONEMAP_OPERATOR == 2 || TONEMAP_OPERATOR == 3\n"
@@ -2982,7 +2989,7 @@ static const char tonemap__glsl_steps[] =
         void main() {
             ivec2 p = ivec2(gl_FragCoord.xy);
             float y = tonemap_next(p, -1, -1);
-            if (y < 0.0) y = tonemap_next(p, 1, textureSize(luminance, 0).x);
+            if (y < 0.0) y = tonemap_next(p, 1, picture.x);
             y = clamp(y * tonemap_scale(), exp2(-TONEMAP_OCTAVES), TONEMAP_LOCAL_CAP);
             value = (log2(y) + TONEMAP_OCTAVES) * TONEMAP_OCTAVE;
         });
@@ -2998,10 +3005,11 @@ static const char tonemap__glsl_along[] =
         uvec2 tonemap_read(ivec2 p) { return texelFetch(source, p, 0).xy; })
     "#endif\n"
     SAT__GLSL(
+        uniform ivec2 picture;
         out uvec2 value;
         void main() {
             ivec2 p = ivec2(gl_FragCoord.xy);
-            int end = min(p.x + TONEMAP_RADIUS + 1, textureSize(source, 0).x);
+            int end = min(p.x + TONEMAP_RADIUS + 1, picture.x);
             value = uvec2(0u);
             for (int x = max(p.x - TONEMAP_RADIUS, 0); x < end; x++) value += tonemap_read(ivec2(x, p.y));
         });
@@ -3009,8 +3017,8 @@ static const char tonemap__glsl_along[] =
 /* The sums of 21 rows of such sums, as means. */
 static const char tonemap__glsl_down[] =
     SAT__GLSL(
-        vec2 tonemap_mean(highp usampler2D sums, ivec2 p) {
-            ivec2 size = textureSize(sums, 0), low = max(p - TONEMAP_RADIUS, 0);
+        vec2 tonemap_mean(highp usampler2D sums, ivec2 p, ivec2 size) {
+            ivec2 low = max(p - TONEMAP_RADIUS, 0);
             ivec2 high = min(p + TONEMAP_RADIUS + 1, size);
             uvec2 sum = uvec2(0u);
             for (int y = low.y; y < high.y; y++) sum += texelFetch(sums, ivec2(p.x, y), 0).xy;
@@ -3020,9 +3028,10 @@ static const char tonemap__glsl_down[] =
 static const char tonemap__glsl_fit[] =
     SAT__GLSL(
         uniform highp usampler2D source;
+        uniform ivec2 picture;
         out uvec2 value;
         void main() {
-            vec2 m = tonemap_mean(source, ivec2(gl_FragCoord.xy));
+            vec2 m = tonemap_mean(source, ivec2(gl_FragCoord.xy), picture);
             float var = max(m.y - m.x * m.x, 0.0), share = var / (var + TONEMAP_EDGE2);
             value = uvec2(share * 1048576.0, (m.x + 0.5) * (1.0 - share) * 1024.0);
         });
@@ -3034,14 +3043,14 @@ static const char tonemap__glsl_search[] =
     "#if TONEMAP_OPERATOR != 5\n"
     SAT__GLSL(
         float tonemap_box(ivec2 p, int reach) {
-            return sat_mean(table, 1.0 / TONEMAP_STEPS, p - reach, p + reach + 1);
+            return sat_mean(table, 1.0 / TONEMAP_STEPS, p - reach, min(p + reach + 1, picture));
         })
     "#endif\n"
     "#if TONEMAP_OPERATOR == 5\n"
     SAT__GLSL(
         uniform sampler2D steps;
         float tonemap_find(ivec2 p, float own, float key) {
-            vec2 m = tonemap_mean(table, p);
+            vec2 m = tonemap_mean(table, p, picture);
             float q = m.x / 1048576.0 * texelFetch(steps, p, 0).x + m.y / 1024.0;
             return exp2(q / TONEMAP_OCTAVE - TONEMAP_OCTAVES);
         })
@@ -3074,12 +3083,12 @@ static const char tonemap__glsl_search[] =
     "#else\n"
     SAT__GLSL(
         float tonemap_find(ivec2 p, float own, float key) {
-            return tonemap_local(table, 1.0 / TONEMAP_STEPS, p, own, key);
+            return tonemap_local_in(table, 1.0 / TONEMAP_STEPS, picture, p, own, key);
         })
     "#endif\n"
     SAT__GLSL(
         float tonemap_at(ivec2 p) {
-            return max(texelFetch(luminance, clamp(p, ivec2(0), textureSize(luminance, 0) - 1), 0).x, 0.0);
+            return max(texelFetch(luminance, clamp(p, ivec2(0), picture - 1), 0).x, 0.0);
         })
     SAT__GLSL(
         bool tonemap_is_edge(ivec2 p, float scale) {
@@ -3222,7 +3231,7 @@ static const char tonemap__glsl_map[] =
         })
     SAT__GLSL(
         void main() {
-            ivec2 p = sat_pixel(), high = textureSize(luminance, 0) - 1;
+            ivec2 p = sat_pixel(), high = picture - 1;
             vec4 sum = vec4(0.0);
             int radius = texelFetch(luminance, p, 0).x < 0.0 ? 1 : 0; /* an unusable pixel shows those around it */
             for (int last = radius * 3; radius <= last && sum.a == 0.0; radius++)
@@ -3304,10 +3313,12 @@ struct tonemap_gl {
     sat_gl *sat;                /* NULL without a table */
     tonemap__colours colours;
     int width, height, levels, given;
+    int frame_width, frame_height; /* of this picture; at most width and height */
     int histogram;              /* 0, or the estimates it serves, see the state shader */
     int ready;                  /* all programs are there */
     unsigned program[TONEMAP__GL_PROGRAMS], mask;
-    sat__gl_target target[TONEMAP__TARGETS]; /* from TONEMAP__T_LEVEL on those of the sums of 4 x 4, finest first */
+    sat__gl_target target[TONEMAP__TARGETS]; /* from TONEMAP__T_LEVEL on those of the sums of 4 x 4, finest first; their
+                                                sizes are the part in use */
 };
 
 TONEMAP_DEF const char *tonemap_gl_message(const tonemap_gl *gl)
@@ -3454,8 +3465,8 @@ TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_
     g->options = o;
     tonemap__prepare_colours(&g->colours, &o);
     g->allocator = allocator;
-    g->width = width;
-    g->height = height;
+    g->width = g->frame_width = width;
+    g->height = g->frame_height = height;
     *out = g;
     return tonemap__gl_make(g, get_proc);
 }
@@ -3505,6 +3516,38 @@ TONEMAP_DEF void tonemap_gl_destroy(tonemap_gl *gl)
 
 /* ---- the passes of a picture */
 
+/* Smaller pictures take a part of the textures. */
+static inline void tonemap__gl_set_size(tonemap_gl *g, int width, int height)
+{
+    int i;
+    if (g->frame_width == width && g->frame_height == height) return;
+    g->frame_width = width;
+    g->frame_height = height;
+    for (i = 0; i < TONEMAP__T_LEVEL + g->levels; i++) {
+        if (i >= TONEMAP__T_LEVEL) {
+            width = (width + 3) / 4;
+            height = (height + 3) / 4;
+        } else if (tonemap__targets[i].width) {
+            continue;
+        }
+        g->target[i].width = width;
+        g->target[i].height = height;
+    }
+}
+
+static inline void tonemap__gl_set_picture(tonemap_gl *g, int which)
+{
+    sat__gl_set_int2(&g->gl, g->program[which], "picture", g->frame_width, g->frame_height);
+}
+
+/* A pass that reads at most two textures, from one that is as large as the picture into another. */
+static inline void tonemap__gl_step(tonemap_gl *g, int which, int to, unsigned first, unsigned second)
+{
+    SAT__GL_START(&g->gl, g->program[which], &g->target[to], first, second);
+    tonemap__gl_set_picture(g, which);
+    sat__gl_draw(&g->gl);
+}
+
 static inline void tonemap__gl_measure(tonemap_gl *g, const sat_gl_target *to, unsigned hdr)
 {
     sat__gl *gl = &g->gl;
@@ -3528,15 +3571,14 @@ static inline void tonemap__gl_blend(tonemap_gl *g)
 {
     static const float nothing[4] = {0, 0, 0, 0};
     sat__gl *gl = &g->gl;
-    unsigned program = g->program[TONEMAP__GL_BLEND];
-    SAT__GL_START(gl, program, &g->target[TONEMAP__T_BINS], g->target[TONEMAP__T_LUMINANCE].texture, g->mask);
+    SAT__GL_START(gl, g->program[TONEMAP__GL_BLEND], &g->target[TONEMAP__T_BINS], g->target[TONEMAP__T_LUMINANCE].texture, g->mask);
     gl->ClearBufferfv(SAT__GL_COLOR, 0, nothing);
     gl->Enable(SAT__GL_BLEND);
     gl->BlendEquationSeparate(0x8006u, 0x8006u); /* GL_FUNC_ADD */
     gl->BlendFuncSeparate(SAT__GL_ONE, SAT__GL_ONE, SAT__GL_ONE, SAT__GL_ONE);
-    sat__gl_set_int(gl, program, "width", g->width);
+    tonemap__gl_set_picture(g, TONEMAP__GL_BLEND);
     gl->BindVertexArray(gl->vertex_array);
-    gl->DrawArrays(SAT__GL_POINTS, 0, g->width * g->height);
+    gl->DrawArrays(SAT__GL_POINTS, 0, g->frame_width * g->frame_height);
     gl->Disable(SAT__GL_BLEND);
 }
 
@@ -3550,7 +3592,8 @@ static inline void tonemap__gl_count(tonemap_gl *g)
         gl->UseProgram(g->program[TONEMAP__GL_COUNT]);
         SAT__GL_INPUTS(gl, t[TONEMAP__T_LUMINANCE].texture, g->mask);
         gl->BindImageTexture(0, counts->texture, 0, 0, 0, SAT__GL_READ_WRITE, SAT__GL_R32UI);
-        gl->DispatchCompute((unsigned)(g->width + 63) / 64, (unsigned)(g->height + 63) / 64, 1);
+        tonemap__gl_set_picture(g, TONEMAP__GL_COUNT);
+        gl->DispatchCompute((unsigned)(g->frame_width + 63) / 64, (unsigned)(g->frame_height + 63) / 64, 1);
         gl->MemoryBarrier(SAT__GL_TEXTURE_FETCH_BARRIER_BIT | SAT__GL_FRAMEBUFFER_BARRIER_BIT);
     } else {
         tonemap__gl_blend(g);
@@ -3577,25 +3620,24 @@ static inline void tonemap__gl_adapt(tonemap_gl *g, double dt)
     sat__gl_set_float(gl, program, "dead_band", o->adapt_seconds > 0 ? 1.0f : -1.0f);
     sat__gl_set_float(gl, program, "key", o->key > 0 ? (float)log2(o->key) : 0);
     sat__gl_set_float(gl, program, "white", o->white > 0 && !tonemap__is_infinite(o->white) ? (float)log2(o->white) : 0);
-    sat__gl_set_float(gl, program, "pixels", (float)((double)g->width * g->height));
+    sat__gl_set_float(gl, program, "pixels", (float)((double)g->frame_width * g->frame_height));
     sat__gl_draw(gl);
 }
 
 /* What La comes from: the table, or the guided filter's a and b. */
 static inline sat_result tonemap__gl_local(tonemap_gl *g)
 {
-    sat__gl *gl = &g->gl;
-    const sat__gl_target *t = g->target, *pair = &t[TONEMAP__T_PAIR], *steps = &t[TONEMAP__T_STEPS];
-    const unsigned *p = g->program, luminance = t[TONEMAP__T_LUMINANCE].texture, state = t[TONEMAP__T_STATE].texture;
+    const sat__gl_target *t = g->target;
+    const unsigned luminance = t[TONEMAP__T_LUMINANCE].texture, state = t[TONEMAP__T_STATE].texture;
     if (g->given & TONEMAP__IF_GUIDED) {
-        SAT__GL_PASS(gl, p[TONEMAP__GL_STEPS], steps, luminance, state);
-        SAT__GL_PASS(gl, p[TONEMAP__GL_SUMS], &pair[0], steps->texture);
-        SAT__GL_PASS(gl, p[TONEMAP__GL_FIT], &pair[1], pair[0].texture);
-        SAT__GL_PASS(gl, p[TONEMAP__GL_SUMS_OF_FITS], &pair[0], pair[1].texture);
+        tonemap__gl_step(g, TONEMAP__GL_STEPS, TONEMAP__T_STEPS, luminance, state);
+        tonemap__gl_step(g, TONEMAP__GL_SUMS, TONEMAP__T_PAIR, t[TONEMAP__T_STEPS].texture, 0);
+        tonemap__gl_step(g, TONEMAP__GL_FIT, TONEMAP__T_PAIR_1, t[TONEMAP__T_PAIR].texture, 0);
+        tonemap__gl_step(g, TONEMAP__GL_SUMS_OF_FITS, TONEMAP__T_PAIR, t[TONEMAP__T_PAIR_1].texture, 0);
     }
     if (!g->sat) return SAT_OK;
-    SAT__GL_PASS(gl, p[TONEMAP__GL_ROUND], &t[TONEMAP__T_QUANTA], luminance, state);
-    return sat_gl_build(g->sat, 0, t[TONEMAP__T_QUANTA].texture, g->width, g->height);
+    tonemap__gl_step(g, TONEMAP__GL_ROUND, TONEMAP__T_QUANTA, luminance, state);
+    return sat_gl_build(g->sat, 0, t[TONEMAP__T_QUANTA].texture, g->frame_width, g->frame_height);
 }
 
 static inline sat_result tonemap__gl_map(tonemap_gl *g, const sat_gl_target *to, unsigned hdr)
@@ -3603,11 +3645,13 @@ static inline sat_result tonemap__gl_map(tonemap_gl *g, const sat_gl_target *to,
     sat__gl *gl = &g->gl;
     const sat__gl_target *t = g->target;
     unsigned program = g->program[TONEMAP__GL_MAP];
-    sat_result result = sat__gl_pass_to(gl, program, to, t[TONEMAP__T_OUT].framebuffer, g->width, g->height);
+    sat_result result = sat__gl_pass_to(gl, program, to, t[TONEMAP__T_OUT].framebuffer, g->frame_width,
+                                        g->frame_height);
     if (result != SAT_OK) return result;
     SAT__GL_INPUTS(gl, hdr, t[TONEMAP__T_LUMINANCE].texture, t[TONEMAP__T_STATE].texture,
                    g->sat ? sat_gl_table(g->sat) : t[TONEMAP__T_PAIR].texture, t[TONEMAP__T_STEPS].texture);
     sat__gl_set_from(gl, program, to);
+    tonemap__gl_set_picture(g, TONEMAP__GL_MAP);
     sat__gl_set_float(gl, program, "cd_per_unit", (float)g->options.cd_per_unit);
     sat__gl_set_float(gl, program, "lux_per_cd", (float)g->options.lux_per_cd);
     sat__gl_set_float(gl, program, "peak", (float)g->options.peak);
@@ -3628,9 +3672,14 @@ TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, const sat_gl_target *to,
 {
     sat__gl_state state;
     sat_result result;
+    int width, height;
     if (!gl || !gl->ready || !hdr || !sat__gl_target_is_valid(to) || sat__gl_target_is(to, hdr))
         return SAT_ERR_ARGUMENT;
     if (!tonemap__in_range(dt, 0, 1e300) && !tonemap__is_infinite(dt)) return SAT_ERR_ARGUMENT;
+    width = gl->width;
+    height = gl->height;
+    if (!sat__gl_take_size(to, &width, &height)) return SAT_ERR_SIZE;
+    tonemap__gl_set_size(gl, width, height);
     sat__gl_begin(&gl->gl, &state, TONEMAP__GL_UNITS);
     tonemap__gl_measure(gl, to, hdr);
     if (gl->histogram) tonemap__gl_count(gl);

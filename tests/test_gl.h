@@ -310,6 +310,69 @@ TEST(inputs_may_lie_anywhere_in_their_textures)
     gl_close();
 }
 
+/* ---- dynamic resolution: a frame may be smaller than the object was created for */
+
+enum { GL_SMALL_W = 29, GL_SMALL_H = 13 };
+
+/* A scene whose objects have another size than GL_W x GL_H; the inputs stay. */
+static sat_result gl_small_call(gl_scene *s, int call, sat_gl_target *to, int whole)
+{
+    to->width = whole ? 0 : GL_SMALL_W, to->height = whole ? 0 : GL_SMALL_H;
+    s->input.width = whole ? GL_W : GL_SMALL_W, s->input.height = whole ? GL_H : GL_SMALL_H;
+    return gl_call(s, call, to);
+}
+
+/* Tables and means of the small picture, by an object that has made a larger one before, and by a new one. */
+static void gl_compare_tables(unsigned source, sat_gl_options go, int tiled)
+{
+    static float a[4 * GL_N], b[4 * GL_N];
+    sat_gl *tables[2];
+    sat__gl_state state;
+    int k, tries;
+    unsigned target = gl_texture(SAT__GL_RGBA32F, GL_W, GL_H, NULL);
+    for (k = 0; k < 2; k++) {
+        unsigned mean_texture, own;
+        float mean[2];
+        go.width = k ? 0 : GL_W, go.height = k ? 0 : GL_H;
+        EXPECT_EQ(sat_gl_create(&tables[k], gl_screen.get_proc, &go), SAT_OK);
+        if (!k) EXPECT_EQ(sat_gl_build(tables[k], 0, source, GL_W, GL_H), SAT_OK);
+        if (!k) EXPECT_EQ(sat_gl_mean(tables[k], NULL, source, GL_W, GL_H), SAT_OK);
+        mean_texture = sat_gl_mean_texture(tables[k]), own = sat_gl_table(tables[k]);
+        for (tries = 0; tries < 2; tries++) /* and again, with nothing to set up */
+            EXPECT_EQ(sat_gl_build(tables[k], 0, source, GL_SMALL_W, GL_SMALL_H), SAT_OK);
+        EXPECT_EQ(sat_gl_mean(tables[k], &mean[k], source, GL_SMALL_W, GL_SMALL_H), SAT_OK);
+        EXPECT(k || (sat_gl_mean_texture(tables[k]) == mean_texture && sat_gl_table(tables[k]) == own));
+        EXPECT(!k || (mean[0] <= mean[1] && mean[1] <= mean[0]));
+        if (tiled) EXPECT_EQ(sat_gl_box_filter(tables[k], target, 3), SAT_OK);
+        sat__gl_begin(&gl_f, &state, 1);
+        sat__gl_read(&gl_f, k ? b : a, tiled ? target : sat_gl_table(tables[k]),
+                     tiled ? SAT__GL_RGBA32F : SAT__GL_RG32F, GL_SMALL_W, GL_SMALL_H);
+        sat__gl_end(&gl_f, &state);
+    }
+    EXPECT(memcmp(a, b, (tiled ? 16 : 8) * GL_SMALL_W * GL_SMALL_H) == 0);
+    for (k = 0; k < 2; k++) sat_gl_destroy(tables[k]);
+    gl_f.DeleteTextures(1, &target);
+}
+
+TEST(tables_take_smaller_pictures)
+{
+    static float picture[4 * GL_N];
+    sat_gl_options go = sat_gl_defaults();
+    unsigned source;
+    int k;
+    if (!gl_open()) return;
+    support_fill(picture, 4 * GL_N, 0, 3, 9);
+    source = gl_texture(SAT__GL_RGBA32F, GL_W, GL_H, picture);
+    for (k = 0; k < 5; k++) {
+        go.compute = k & 1;
+        go.format = k < 2 ? SAT_GL_TILED : SAT_GL_TWO_FLOAT;
+        go.algorithm = k == 4 ? SAT_SCAN_RECURSIVE_DOUBLING : SAT_SCAN_BALANCED_TREE;
+        gl_compare_tables(source, go, k < 2);
+    }
+    gl_f.DeleteTextures(1, &source);
+    gl_close();
+}
+
 TEST(targets_that_cannot_be_are_refused)
 {
     static gl_scene s;
@@ -525,6 +588,9 @@ static void gl_frame_calls(gl_scene *s, sat_gl *tables, sat_gl *tiles, softassig
     EXPECT_EQ(sat_gl_scan(tables, 0, 5, GL_W, GL_H), SAT_OK);
     EXPECT_EQ(sat_gl_mean(tables, NULL, 5, GL_W, GL_H), SAT_OK);
     EXPECT_EQ(sat_gl_build(tables, 0, 5, GL_W + 1, GL_H), SAT_ERR_SIZE);
+    EXPECT_EQ(sat_gl_build(tables, 0, 5, GL_W - round, GL_H - 1), SAT_OK);
+    EXPECT_EQ(sat_gl_build(tiles, 0, 5, GL_W - 1, GL_H - round), SAT_OK);
+    EXPECT_EQ(sat_gl_mean(tiles, NULL, 5, 1 + round, GL_H - round), SAT_OK);
     EXPECT_EQ(sat_gl_build(tiles, 0, 5, GL_W, GL_H), SAT_OK);
     EXPECT_EQ(sat_gl_mean(tiles, NULL, 5, GL_W, GL_H), SAT_OK);
     go = sat_gl_defaults();

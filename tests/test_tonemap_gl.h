@@ -376,6 +376,68 @@ TEST(gl_counts_by_compute_as_by_blending)
     screen_close(&s);
 }
 
+/* ---- dynamic resolution */
+
+/* A picture of 41 x 29 in the corner of one of 70 x 50, by an object that has drawn all of it before. */
+static void smaller(screen *s, const tonemap_options *o, sat_gl_get_proc *get_proc)
+{
+    enum { W = 70, H = 50, W1 = 41, H1 = 29 };
+    static unsigned char first[4 * W * H], second[4 * W * H], nothing[4 * W * H];
+    float *pixels = lit_pixels(W, H, 1);
+    unsigned hdr = screen_texture(s, SAT__GL_RGBA32F, W, H, pixels), ldr;
+    sat_gl_target to;
+    tonemap_gl *gl = NULL;
+    int i, wrong = 0;
+    memset(nothing, 77, sizeof nothing);
+    ldr = screen_texture(s, SAT__GL_RGBA8, W, H, nothing);
+    to = sat_gl_to_texture(ldr);
+    to.width = W1, to.height = H1;
+    EXPECT_EQ(tonemap_gl_create(&gl, get_proc, W, H, o), SAT_OK);
+    EXPECT_EQ(tonemap_gl_apply(gl, NULL, hdr, 0), SAT_OK);
+    EXPECT_EQ(tonemap_gl_apply(gl, &to, hdr, 0), SAT_OK);
+    screen_read(s, first, ldr, W, H);
+    to.width = W + 1;
+    EXPECT_EQ(tonemap_gl_apply(gl, &to, hdr, 0), SAT_ERR_SIZE);
+    to.width = 0;
+    EXPECT_EQ(tonemap_gl_apply(gl, &to, hdr, 0), SAT_ERR_ARGUMENT);
+    to.height = 0;
+    EXPECT_EQ(tonemap_gl_apply(gl, &to, hdr, 0), SAT_OK); /* all of it again */
+    screen_read(s, second, ldr, W, H);
+    EXPECT_EQ(tonemap_gl_apply(gl, NULL, hdr, 0), SAT_OK);
+    screen_read(s, nothing, tonemap_gl_texture(gl), W, H);
+    EXPECT(memcmp(second, nothing, sizeof second) == 0);
+    tonemap_gl_destroy(gl);
+    EXPECT_EQ(tonemap_gl_create(&gl, get_proc, W1, H1, o), SAT_OK);
+    EXPECT_EQ(tonemap_gl_apply(gl, NULL, hdr, 0), SAT_OK);
+    screen_read(s, second, tonemap_gl_texture(gl), W1, H1);
+    for (i = 0; i < W * H; ++i) {
+        static const unsigned char untouched[4] = {77, 77, 77, 77};
+        int inside = i % W < W1 && i / W < H1;
+        wrong += memcmp(first + 4 * i, inside ? second + 4 * (i / W * W1 + i % W) : untouched, 4) != 0;
+    }
+    EXPECT_EQ(wrong, 0);
+    tonemap_gl_destroy(gl);
+    s->gl.DeleteTextures(1, &hdr);
+    s->gl.DeleteTextures(1, &ldr);
+    free(pixels);
+}
+
+TEST(gl_takes_smaller_pictures)
+{
+    screen s;
+    tonemap_options o = local_options();
+    if (!screen_open(&s)) return;
+    screen_proc = s.context.get_proc;
+    smaller(&s, NULL, screen_proc);
+    smaller(&s, NULL, screen_plain);
+    smaller(&s, &o, screen_proc);
+    o.soft = 0, o.selective = 0.1, o.key = 0;
+    smaller(&s, &o, screen_proc);
+    o.operation = TONEMAP_ASHIKHMIN;
+    smaller(&s, &o, screen_proc);
+    screen_close(&s);
+}
+
 /* The rounded luminances and their sums are the CPU's integers. */
 TEST(gl_sums_are_the_cpus_integers)
 {
