@@ -112,8 +112,8 @@ static unsigned gl_input(gl_scene *s, int call)
     return call == GL_TONE ? s->hdr : call == GL_AO ? s->depth : s->points;
 }
 
-/* Objects of the size GL_W x GL_H; the occluder and its light are the CPU's. */
-static void gl_create(gl_scene *s, sat_gl_get_proc *get_proc)
+/* Objects for pictures of this size; the occluder and its light are the CPU's. */
+static void gl_create_sized(gl_scene *s, sat_gl_get_proc *get_proc, int width, int height)
 {
     static float sky[16 * 8 * 3];
     sat_image image = sat_image_f32(sky, 16, 8, 3);
@@ -131,9 +131,9 @@ static void gl_create(gl_scene *s, sat_gl_get_proc *get_proc)
     memset(&s->instance, 0, sizeof s->instance);
     s->instance.occluder = s->occluder;
     s->instance.scale = 1;
-    EXPECT_EQ(tonemap_gl_create(&s->tone, get_proc, GL_W, GL_H, NULL), SAT_OK);
-    EXPECT_EQ(ssao_sat_gl_create(&s->ao, get_proc, GL_W, GL_H, NULL), SAT_OK);
-    EXPECT_EQ(fiv_gl_create(&s->shadows, get_proc, GL_W, GL_H, NULL), SAT_OK);
+    EXPECT_EQ(tonemap_gl_create(&s->tone, get_proc, width, height, NULL), SAT_OK);
+    EXPECT_EQ(ssao_sat_gl_create(&s->ao, get_proc, width, height, NULL), SAT_OK);
+    EXPECT_EQ(fiv_gl_create(&s->shadows, get_proc, width, height, NULL), SAT_OK);
     EXPECT_EQ(fiv_gl_set_scene(s->shadows, s->light, &s->instance, 1), SAT_OK);
     rg.lamps = rg.oscillation = 1;
     ro.rate_mm_h = 300;
@@ -143,8 +143,10 @@ static void gl_create(gl_scene *s, sat_gl_get_proc *get_proc)
     EXPECT_EQ(raindrop_gl_create(&s->rain, get_proc, &rg), SAT_OK);
     EXPECT_EQ(raindrop_gl_set_environment(s->rain, s->mirror), SAT_OK);
     EXPECT_EQ(raindrop_gl_set_rain(s->rain, s->drops), SAT_OK);
-    s->input = ssao_sat_input_linear(NULL, GL_W, GL_H, 1);
+    s->input = ssao_sat_input_linear(NULL, width, height, 1);
 }
+
+static void gl_create(gl_scene *s, sat_gl_get_proc *get_proc) { gl_create_sized(s, get_proc, GL_W, GL_H); }
 
 static void gl_fill(gl_scene *s)
 {
@@ -312,15 +314,7 @@ TEST(inputs_may_lie_anywhere_in_their_textures)
 
 /* ---- dynamic resolution: a frame may be smaller than the object was created for */
 
-enum { GL_SMALL_W = 29, GL_SMALL_H = 13 };
-
-/* A scene whose objects have another size than GL_W x GL_H; the inputs stay. */
-static sat_result gl_small_call(gl_scene *s, int call, sat_gl_target *to, int whole)
-{
-    to->width = whole ? 0 : GL_SMALL_W, to->height = whole ? 0 : GL_SMALL_H;
-    s->input.width = whole ? GL_W : GL_SMALL_W, s->input.height = whole ? GL_H : GL_SMALL_H;
-    return gl_call(s, call, to);
-}
+static const int GL_SMALL_W = 29, GL_SMALL_H = 13;
 
 /* Tables and means of the small picture, by an object that has made a larger one before, and by a new one. */
 static void gl_compare_tables(unsigned source, sat_gl_options go, int tiled)
@@ -370,6 +364,41 @@ TEST(tables_take_smaller_pictures)
         gl_compare_tables(source, go, k < 2);
     }
     gl_f.DeleteTextures(1, &source);
+    gl_close();
+}
+
+/* A small picture, by an object that has drawn a large one before, and by one that was made for it. */
+TEST(objects_take_smaller_pictures)
+{
+    static unsigned char own[16 * GL_N], there[16 * GL_N];
+    static const int calls[] = {GL_TONE};
+    static gl_scene s, small;
+    sat_gl_target to = sat_gl_to(SAT_GL_OWN, 0, 0, 0, 0, 0);
+    sat__gl_state state;
+    size_t k;
+    if (!gl_open()) return;
+    gl_create(&s, gl_screen.get_proc);
+    gl_create_sized(&small, gl_screen.get_proc, GL_SMALL_W, GL_SMALL_H);
+    gl_fill(&s);
+    small.hdr = s.hdr, small.depth = s.depth, small.normals = s.normals, small.points = s.points;
+    for (k = 0; k < sizeof calls / sizeof *calls; k++) {
+        int call = calls[k], bytes = gl_format(call) == SAT__GL_RGBA32F ? 16 : 4;
+        EXPECT_EQ(gl_call(&s, call, NULL), SAT_OK);
+        EXPECT_EQ(gl_call(&small, call, NULL), SAT_OK);
+        to.width = GL_SMALL_W, to.height = GL_SMALL_H;
+        s.input.width = GL_SMALL_W, s.input.height = GL_SMALL_H;
+        EXPECT_EQ(gl_call(&s, call, &to), SAT_OK);
+        sat__gl_begin(&gl_f, &state, 1);
+        EXPECT_EQ(sat__gl_read(&gl_f, own, gl_own(&s, call), gl_format(call), GL_SMALL_W, GL_SMALL_H), SAT_OK);
+        EXPECT_EQ(sat__gl_read(&gl_f, there, gl_own(&small, call), gl_format(call), GL_SMALL_W, GL_SMALL_H), SAT_OK);
+        sat__gl_end(&gl_f, &state);
+        EXPECT(memcmp(own, there, (size_t)(bytes * GL_SMALL_W * GL_SMALL_H)) == 0);
+        to.width = s.input.width = GL_W + 1;
+        EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_SIZE);
+        s.input.width = GL_W, s.input.height = GL_H;
+    }
+    gl_destroy(&s);
+    gl_destroy(&small);
     gl_close();
 }
 
