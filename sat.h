@@ -138,6 +138,7 @@
    >> shaders                 flat tables in GLSL
    >> shaders of tiles        lookups in tiles
    >> shaders that build tiles  gauges, quanta, giants, integers, 64-bit cells, strips
+   >> shaders of work groups  the same by compute shaders; what is drawn from tiles
    >> passes                  the object, programs, builds on the GPU
    >> passes of flat tables   the published algorithms, means, creation
 */
@@ -7040,7 +7041,7 @@ static const char sat__glsl_strips[] =
             if (section == 6) result = texelFetch(facts, ivec2(i % pitch, i / pitch), 0);
         });
 
-/* ---- the same by compute shaders */
+/* ---- >> shaders of work groups: tiles and strips by compute shaders */
 
 /* A work group a tile: means, gauges, quantum, spikes and integers of a plane after the other in shared memory. A lane
    is a fourth of a row, as on the CPU. Only a tile with giants reads more than itself: it counts those before it. */
