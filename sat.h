@@ -578,8 +578,9 @@ typedef struct sat_gl_options {
     double max_value;             /* 1e30; 1e-300..1e300; pixels beyond +-max_value are clamped to it; NaN counts as 0.
                                      Lower it for FIXED32: the quantum is proportional to it */
     double max_box_area;          /* 0; 0..1e300; 0: the whole table; FIXED32: no larger box is ever asked for */
-    int width;                    /* 0; 0..16777216; with height: create makes all textures, and smaller sizes take a part of them:
-                                     lookups in flat tables are then to be clipped to the size, tiles know it */
+    int width;                    /* 0; 0..16777216; with height: create makes all textures; smaller sizes take
+                                     a part of them, and lookups in flat tables are then to be clipped to the size,
+                                     which tiles know themselves */
     int height;                   /* 0; 0..16777216 */
     sat_allocator allocator;      /* malloc; used by create and destroy only */
 } sat_gl_options;
@@ -7547,6 +7548,7 @@ enum {
 
 #define SAT__GL_SUMS "#define FORMAT TABLE_FORMAT\n#define K TABLE_K\n#define INPUT 0\n"
 #define SAT__GL_FIRST "#define FORMAT TABLE_FORMAT\n#define K TABLE_K\n#define INPUT TABLE_INPUT\n"
+#define SAT__GL_OF_MEANS "#define FORMAT 0\n#define K MEAN_K\n"
 #define SAT__GL_FLAT(name, when, defines, body)                                                                        \
     {name, when, "source uncles", defines, NULL, {sat__glsl_values, sat__glsl_output, body}}
 #define SAT__GL_TILES(name, when, units, defines, ...)                                                                 \
@@ -7566,9 +7568,10 @@ static const sat__gl_program sat__gl_programs[SAT__GL_PROGRAMS] = {
      {sat__glsl_values, sat__glsl_expand_groups}},
     {"sat: expansion", SAT__GL_IF_TREE | SAT__GL_IF_GROUPS, "source uncles", SAT__GL_FIRST, NULL,
      {sat__glsl_values, sat__glsl_expand_groups}},
-    SAT__GL_FLAT("sat: mean", SAT__GL_IF_FLOATS, "#define FORMAT 0\n#define K MEAN_K\n#define INPUT 0\n", sat__glsl_mean),
-    SAT__GL_FLAT("sat: mean", SAT__GL_IF_FLOATS, "#define FORMAT 0\n#define K MEAN_K\n#define INPUT 1\n", sat__glsl_mean),
-    SAT__GL_BUILDS("sat: tiles", SAT__GL_IF_GROUPS, NULL, sat__glsl_group, sat__glsl_group_spikes, sat__glsl_group_sums),
+    SAT__GL_FLAT("sat: mean", SAT__GL_IF_FLOATS, SAT__GL_OF_MEANS "#define INPUT 0\n", sat__glsl_mean),
+    SAT__GL_FLAT("sat: mean", SAT__GL_IF_FLOATS, SAT__GL_OF_MEANS "#define INPUT 1\n", sat__glsl_mean),
+    SAT__GL_BUILDS("sat: tiles", SAT__GL_IF_GROUPS, NULL, sat__glsl_group, sat__glsl_group_spikes,
+                   sat__glsl_group_sums),
     SAT__GL_BUILDS("sat: means of tiles", SAT__GL_IF_MOMENTS | SAT__GL_IF_PASSES, NULL, sat__glsl_tile_means),
     SAT__GL_BUILDS("sat: gauge", SAT__GL_IF_PASSES, NULL, sat__glsl_gauge),
     SAT__GL_BUILDS("sat: quanta and spikes", SAT__GL_IF_PASSES, NULL, sat__glsl_settle),

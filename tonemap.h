@@ -329,7 +329,8 @@ typedef struct tonemap_gl tonemap_gl;
 TONEMAP_DEF sat_result tonemap_gl_create(tonemap_gl **out, sat_gl_get_proc *get_proc, int width, int height,
                                          const tonemap_options *options);
 /* Maps the first texels (or those at to->from) of the 2D texture hdr (float RGB or RGBA, at least of the created size
-   or the smaller one that `to` names, over which meter_weights are stretched; level 0) to sRGB codes and alpha 1: in the target `to` (8 bits a channel; the window's framebuffer:
+   or the smaller one that `to` names, over which meter_weights are stretched; level 0) to sRGB codes and alpha 1: in
+   the target `to` (8 bits a channel; the window's framebuffer:
    sat_gl_to_framebuffer(0, 0, 0)), or, when NULL, in tonemap_gl_texture(). */
 TONEMAP_DEF sat_result tonemap_gl_apply(tonemap_gl *gl, const sat_gl_target *to, unsigned hdr, double dt);
 TONEMAP_DEF unsigned tonemap_gl_texture(const tonemap_gl *gl);
@@ -3571,7 +3572,8 @@ static inline void tonemap__gl_blend(tonemap_gl *g)
 {
     static const float nothing[4] = {0, 0, 0, 0};
     sat__gl *gl = &g->gl;
-    SAT__GL_START(gl, g->program[TONEMAP__GL_BLEND], &g->target[TONEMAP__T_BINS], g->target[TONEMAP__T_LUMINANCE].texture, g->mask);
+    SAT__GL_START(gl, g->program[TONEMAP__GL_BLEND], &g->target[TONEMAP__T_BINS],
+                  g->target[TONEMAP__T_LUMINANCE].texture, g->mask);
     gl->ClearBufferfv(SAT__GL_COLOR, 0, nothing);
     gl->Enable(SAT__GL_BLEND);
     gl->BlendEquationSeparate(0x8006u, 0x8006u); /* GL_FUNC_ADD */

@@ -114,7 +114,7 @@ static void dump_sat(void)
         o.compute = d[3];
         o.channel = d[4];
         o.unsigned_input = d[5];
-        if (o.format == SAT_GL_TILED) { /* algorithm and k are not looked at: channel and compute say moments and channels */
+        if (o.format == SAT_GL_TILED) { /* it looks at neither algorithm nor k */
             if (d[2] || d[5]) continue;
             o.k = 4, o.compute = d[1], o.channel = 0;
             o.channels = 1 + d[4];
