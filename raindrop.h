@@ -403,8 +403,9 @@ RAINDROP_DEF const raindrop_drop *raindrop_rain_drops(int *count, const raindrop
 RAINDROP_DEF sat_result raindrop_rain_set_drops(raindrop_rain *rain, const raindrop_drop *drops, int count);
 #ifndef RAINDROP_NO_RAIN
 /* Any dt >= 0, in seconds; 0 pauses. Drops that leave the box below come back on top with the size of another drop
-   (Marshall-Palmer weighted by speed, as rain arrives at a plane); those that leave sideways come back on the other
-   side. Needs no time for drag while all drops have reached their terminal velocity. */
+   (Marshall-Palmer weighted by speed, as rain arrives at a plane); those that leave by another side come back on the
+   opposite one. So it is when the box moves: rain that the camera climbs through keeps its sizes and their number.
+   Needs no time for drag while all drops have reached their terminal velocity. */
 RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt);
 RAINDROP_DEF sat_result raindrop_rain_set_wind(raindrop_rain *rain, const float wind[3]);
 RAINDROP_DEF sat_result raindrop_rain_set_centre(raindrop_rain *rain, const float centre[3]); /* at the next advance */
@@ -752,7 +753,7 @@ static inline int raindrop__vector_is_valid(sat__text *t, const char *name, cons
 {
     int i;
     for (i = 0; i < 3; i++) {
-        if (sat__is_finite(v[i]) && (double)v[i] >= low && (double)v[i] <= high) continue;
+        if (sat__is_finite(v[i]) && v[i] >= (float)low && v[i] <= (float)high) continue;
         sat__text_add(t, name);
         sat__text_range(t, i == 0 ? "[0]" : i == 1 ? "[1]" : "[2]", (double)v[i], low, high, ' ');
         return 0;
@@ -2419,6 +2420,7 @@ struct raindrop_rain {
     int settled;              /* all fall with their terminal velocity */
     uint32_t step;            /* advances with dt > 0 so far: the random stream */
     double time;              /* seconds so far, less whole RAINDROP__PERIODs: phases of the oscillations */
+    float height;             /* of the box's centre in the last advance */
     raindrop_rain_options options;
     raindrop__visible *visible;
     uint64_t *pairs[2];         /* the bits of the depth, inverted, and the place in visible below them */
@@ -2602,20 +2604,22 @@ RAINDROP_DEF sat_result raindrop_fall(raindrop_drop *drop, const float wind[3], 
 
 /* ---- sizes */
 
-/* A diameter in mm. In a volume sizes are Marshall-Palmer's, by the inverse of its integral; at a plane they arrive
-   weighted with their speed: a diameter is taken with the probability v/v_max, else the next one is tried. */
-static inline double raindrop__diameter(const raindrop_rain_options *o, uint32_t stream, uint32_t i, int at_plane)
+/* A diameter in mm. In a volume sizes are Marshall-Palmer's, by the inverse of its integral; at a plane that rises with
+   the speed `rise` through the air they arrive weighted with v + rise: a diameter is taken with that probability over
+   the fastest's, else the next one is tried. */
+static inline double raindrop__diameter(const raindrop_rain_options *o, uint32_t stream, uint32_t i, int at_plane,
+                                        double rise)
 {
     double lambda = raindrop__lambda(o->rate_mm_h), span = o->diameter_max_mm - o->diameter_min_mm,
            all = -expm1(-lambda * span), d;
-    double fastest = raindrop_terminal_velocity(o->diameter_max_mm);
+    double fastest = raindrop_terminal_velocity(o->diameter_max_mm) + rise;
     uint32_t attempt;
     if (o->diameter_mm > 0) return o->diameter_mm;
     for (attempt = 0;; attempt++) {
         uint32_t bits = raindrop__hash(o->seed, stream + 16 + attempt, i);
         d = o->diameter_min_mm - log1p(-(double)raindrop__uniform(bits) * all) / lambda;
         if (!at_plane || o->speed > 0 || attempt == 255) return d;
-        if ((double)raindrop__uniform(raindrop__mix(bits)) * fastest < raindrop_terminal_velocity(d)) return d;
+        if ((double)raindrop__uniform(raindrop__mix(bits)) * fastest < raindrop_terminal_velocity(d) + rise) return d;
     }
 }
 
@@ -2642,13 +2646,14 @@ static void raindrop__create_range(int begin, int end, int worker, void *context
         raindrop_drop *drop = &rain->drops[i];
         for (axis = 0; axis < 3; axis++)
             drop->position[axis] = raindrop__place(o, axis, raindrop__hash(o->seed, (uint32_t)axis, (uint32_t)i));
-        raindrop__give_size(drop, o, raindrop__diameter(o, 0, (uint32_t)i, 0));
+        raindrop__give_size(drop, o, raindrop__diameter(o, 0, (uint32_t)i, 0, 0));
     }
 }
 
 /* ---- one step of all drops */
 
-typedef struct raindrop__advance_job { raindrop_rain *rain; double dt; } raindrop__advance_job;
+/* rise: speed of the box upwards in this step. */
+typedef struct raindrop__advance_job { raindrop_rain *rain; double dt, rise; } raindrop__advance_job;
 
 static inline float raindrop__wrap(double position, double low, double size)
 {
@@ -2659,30 +2664,32 @@ static inline float raindrop__wrap(double position, double low, double size)
 /* Seconds after which even the fastest drop has crossed the box so often. */
 static inline double raindrop__forgets(const raindrop_rain_options *o, double fastest)
 {
-    return RAINDROP__FORGETS * (double)o->box_size[1] / fastest;
+    return fastest > 0 ? RAINDROP__FORGETS * (double)o->box_size[1] / fastest : 1e300;
 }
 
 /* Out below since `left` seconds: another drop comes in on top, one more for each crossing of the box that the time
    allows. After many crossings the box is again what it was in the beginning: any size of a volume at any height. */
-static inline void raindrop__reenter(raindrop_drop *drop, double at[3], const raindrop_rain *rain, double below,
+static inline void raindrop__reenter(raindrop_drop *drop, double at[3], const raindrop__advance_job *job, double below,
                                      uint32_t i)
 {
-    const raindrop_rain_options *o = &rain->options;
-    double size = (double)o->box_size[1], top = (double)o->centre[1] + size / 2, old = -(double)drop->velocity[1];
-    double left = old > 0 ? below / old : 0, speed = old;
-    uint32_t stream = rain->step * 512u;
+    const raindrop_rain_options *o = &job->rain->options;
+    double size = (double)o->box_size[1], top = (double)o->centre[1] + size / 2,
+           old = job->rise - (double)drop->velocity[1], through = job->rise - (double)o->wind[1];
+    double left = old > 0 ? below / old : 0, speed = old,
+           fastest = (o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(o->diameter_max_mm)) + through;
+    uint32_t stream = job->rain->step * 512u;
     int turn;
     if (o->diameter_mm > 0) {
         at[1] = top - fmod(below, size);
         return;
     }
-    if (left > raindrop__forgets(o, o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(o->diameter_max_mm))) {
-        raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 0));
+    if (left > raindrop__forgets(o, fastest)) {
+        raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 0, 0));
         below = (double)raindrop__uniform(raindrop__hash(o->seed, stream + 1, i)) * size;
     } else {
         for (turn = 0;; turn++, stream += RAINDROP__TURN) {
-            raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 1));
-            speed = -(double)drop->velocity[1];
+            raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 1, through));
+            speed = job->rise - (double)drop->velocity[1];
             if (!(left * speed >= size) || turn == 255) break;
             left -= size / speed;
         }
@@ -2712,6 +2719,14 @@ static inline int raindrop__move(double way[3], raindrop_drop *drop, const raind
     return moving;
 }
 
+/* Speed of the box upwards since its centre had this height, which becomes today's. */
+static inline double raindrop__rise_of(float *height, const raindrop_rain_options *o, double dt)
+{
+    double way = (double)o->centre[1] - (double)*height;
+    *height = o->centre[1];
+    return dt > 0 ? way / dt : 0;
+}
+
 static void raindrop__advance_range(int begin, int end, int worker, void *context)
 {
     const raindrop__advance_job *job = (const raindrop__advance_job *)context;
@@ -2727,8 +2742,8 @@ static void raindrop__advance_range(int begin, int end, int worker, void *contex
             raindrop_drop *drop = &rain->drops[i];
             moving |= raindrop__move(way, drop, rain, job->dt);
             for (axis = 0; axis < 3; axis++) at[axis] = (double)drop->position[axis] + way[axis];
-            if (!rain->own && way[1] < 0 && at[1] < low[1])
-                raindrop__reenter(drop, at, rain, low[1] - at[1], (uint32_t)i);
+            if (!rain->own && way[1] < job->rise * job->dt && at[1] < low[1])
+                raindrop__reenter(drop, at, job, low[1] - at[1], (uint32_t)i);
             for (axis = 0; axis < 3; axis++) {
                 double size = (double)o->box_size[axis];
                 int outside = !rain->own && (at[axis] < low[axis] || at[axis] >= low[axis] + size);
@@ -2747,6 +2762,7 @@ RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt)
     chunks = raindrop__chunk_count(rain->count);
     job.rain = rain;
     job.dt = dt;
+    job.rise = raindrop__rise_of(&rain->height, &rain->options, dt);
     if (dt > 0) rain->step++;
     rain->time = fmod(rain->time + fmod(dt, RAINDROP__PERIOD), RAINDROP__PERIOD);
     sat__parallel_for(&rain->options.threads, chunks, raindrop__advance_range, &job);
@@ -2849,6 +2865,7 @@ RAINDROP_DEF sat_result raindrop_rain_create(raindrop_rain **out, const raindrop
     rain = raindrop__rain_layout(&layout, &arena, count, workers);
     layout.options = o;
     layout.options.drops = NULL;
+    layout.height = o.centre[1];
     layout.count = layout.capacity = count;
     layout.own = o.drops != NULL;
     layout.settled = !layout.own;
@@ -5468,6 +5485,7 @@ static const char raindrop__glsl_advance[] =
         uniform vec4 sizes; /* lambda, smallest, largest diameter in mm, the fixed one or 0 */
         uniform vec4 step_and; /* dt, settled, own drops, published speed */
         uniform vec2 fastest; /* terminal velocity of the largest, oblate */
+        uniform float climb; /* speed of the box upwards */
         uniform uint stream;
         out vec4 next_drop, next_motion;
         float diameter(uint stream, uint i, bool at_plane) {
@@ -5475,7 +5493,8 @@ static const char raindrop__glsl_advance[] =
             for (uint attempt = 0u; attempt < 256u; attempt++) {
                 uint bits = hash(stream + 16u + attempt, i);
                 d = sizes.y - log_1p(-uniform_of(bits) * all) / sizes.x;
-                if (!at_plane || step_and.w > 0.0 || uniform_of(mix_bits(bits)) * fastest.x < terminal(d)) break;
+                if (!at_plane || step_and.w > 0.0) break;
+                if (uniform_of(mix_bits(bits)) * (fastest.x + climb - wind.y) < terminal(d) + climb - wind.y) break;
             }
             return d;
         })
@@ -5487,18 +5506,19 @@ static const char raindrop__glsl_advance[] =
             at = drop.xyz + way;
             if (step_and.z < 0.5) {
                 float below = low.y - at.y;
-                bool leaves = way.y < 0.0 && below > 0.0;
+                bool leaves = way.y < climb * step_and.x && below > 0.0;
                 if (leaves && sizes.w <= 0.0) {
                     uint i = uint(gl_VertexID);
                     uint s = stream;
-                    float mm, speed, left = velocity.y < 0.0 ? below / -velocity.y : 0.0;
-                    if (left > FORGETS * box.y / (step_and.w > 0.0 ? step_and.w : fastest.x)) { /* raindrop__forgets */
+                    float mm, speed, left = velocity.y < climb ? below / (climb - velocity.y) : 0.0,
+                        most = (step_and.w > 0.0 ? step_and.w : fastest.x) + climb - wind.y;
+                    if (most > 0.0 && left > FORGETS * box.y / most) { /* raindrop__forgets */
                         mm = diameter(s, i, false);
                         below = uniform_of(hash(s + 1u, i)) * box.y;
                     } else {
                         for (int turn = 0; turn < 256; turn++, s += TURN) {
                             mm = diameter(s, i, true);
-                            speed = (step_and.w > 0.0 ? step_and.w : terminal(mm)) - wind.y;
+                            speed = (step_and.w > 0.0 ? step_and.w : terminal(mm)) + climb - wind.y;
                             if (!(left * speed >= box.y) || turn == 255) break;
                             left -= box.y / speed;
                         }
@@ -5594,6 +5614,7 @@ struct raindrop_gl {
     float n;
     uint32_t step;
     double time;
+    float height;                     /* of the box's centre in the last advance */
     raindrop_rain_options rain;
     sat_allocator allocator;
 };
@@ -5887,6 +5908,7 @@ RAINDROP_DEF sat_result raindrop_gl_set_rain(raindrop_gl *g, const raindrop_rain
         g->flat = !(rain->drops[i].axis_ratio >= 1 && rain->drops[i].axis_ratio <= 1);
     g->step = rain->step;
     g->time = rain->time;
+    g->height = rain->height;
     g->rain = rain->options;
     raindrop__gl_bound(g, rain);
     return result;
@@ -5948,6 +5970,7 @@ static inline void raindrop__gl_set_advance(raindrop_gl *g, double dt)
                        (float)(o->oblate != 0));
     sat__gl_set_uint(gl, program, "seed", o->seed);
     sat__gl_set_uint(gl, program, "stream", g->step * 512u);
+    sat__gl_set_float(gl, program, "climb", (float)raindrop__rise_of(&g->height, o, dt));
 }
 
 RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt)
@@ -5955,7 +5978,7 @@ RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt)
     sat__gl_state state;
     sat__gl *gl;
     if (!g || !g->drops[0] || !sat__is_finite_double(dt) || dt < 0) return SAT_ERR_ARGUMENT;
-    if (!(dt > 0) || !g->count) return SAT_OK;
+    if (!(dt > 0) || !g->count) return SAT_OK; /* places in the box come with the next step */
     gl = &g->gl;
     g->step++;
     g->time = fmod(g->time + fmod(dt, RAINDROP__PERIOD), RAINDROP__PERIOD);

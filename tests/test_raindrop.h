@@ -1326,6 +1326,8 @@ TEST(raindrop_sentences_name_what_is_wrong)
     EXPECT(strcmp(raindrop_explain_rain(text, sizeof text, NULL), "") == 0);
     r.box_size[1] = -1;
     EXPECT(strcmp(raindrop_explain_rain(text, sizeof text, &r), "box_size[1] is -1; 1e-6..1e18") == 0);
+    r.box_size[1] = 1e-6f; /* the end that is named, as a float has it */
+    EXPECT(strcmp(raindrop_explain_rain(text, sizeof text, &r), "") == 0);
     EXPECT(strcmp(raindrop_explain_camera(text, sizeof text, NULL), "") == 0);
     c.up[0] = 1;
     EXPECT(strcmp(raindrop_explain_camera(text, sizeof text, &c), "right, up and back are not orthonormal") == 0);
@@ -1900,6 +1902,47 @@ TEST(raindrop_streaks_do_not_shimmer)
         REPORT(names[look], 100 * worst, "%");
     }
     raindrop_environment_destroy(white);
+}
+
+/* A box that rises, sinks or jumps with the camera, and air that moves up or down: as much water and drops as large. */
+TEST(raindrop_rate_holds_in_a_box_that_moves)
+{
+    static const struct { double rise, dt; float wind; int turns;
+    } cases[8] = {{-10, 1 / 60.0, 0, 60}, {2, 1 / 60.0, 0, 240}, {10, 1 / 60.0, 0, 120}, {300, 1 / 60.0, 0, 30},
+                  {10, 2, 0, 10}, {1e5, 0.5, 0, 6}, {0, 1 / 60.0, -5, 120}, {5, 1 / 60.0, 3, 240}};
+    double worst = 0;
+    int i, k;
+    for (i = 0; i < 8; i++) {
+        raindrop_rain_options o = raindrop_rain_defaults();
+        raindrop_rain *rain = NULL;
+        const raindrop_drop *drops;
+        double sum[2][2] = {{0, 0}, {0, 0}}, volume, size;
+        int n = 0, turn;
+        o.count = 20000;
+        o.diameter_max_mm = 3; /* few large drops would make the sum of volumes a matter of chance */
+        o.wind[1] = cases[i].wind;
+        EXPECT_EQ(raindrop_rain_create(&rain, &o), SAT_OK);
+        for (turn = 0; turn <= cases[i].turns; turn++) {
+            drops = raindrop_rain_drops(&n, rain);
+            for (k = 0; k < n && (turn == 0 || turn == cases[i].turns); k++) {
+                double d = 2e3 * (double)drops[k].radius;
+                sum[turn > 0][0] += d;
+                sum[turn > 0][1] += d * d * d;
+                EXPECT(fabsf(drops[k].position[1] - o.centre[1]) < 4.001f + 1e-7f * fabsf(o.centre[1]));
+            }
+            o.centre[1] += (float)(cases[i].rise * cases[i].dt);
+            if (turn == cases[i].turns) break;
+            EXPECT_EQ(raindrop_rain_set_centre(rain, o.centre), SAT_OK);
+            EXPECT_EQ(raindrop_rain_advance(rain, cases[i].dt), SAT_OK);
+        }
+        size = sum[1][0] / sum[0][0] - 1;
+        volume = sum[1][1] / sum[0][1] - 1;
+        if (!EXPECT(fabs(size) < 0.03 && fabs(volume) < 0.06))
+            printf("rise %g, wind %g, dt %g: %g %g\n", cases[i].rise, (double)cases[i].wind, cases[i].dt, size, volume);
+        if (fabs(size) > worst) worst = fabs(size);
+        raindrop_rain_destroy(rain);
+    }
+    REPORT("mean diameter in a box that moves, largest error", 100 * worst, "%");
 }
 
 /* ---- lamps, and drops that oscillate ---- */

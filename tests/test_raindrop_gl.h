@@ -534,6 +534,19 @@ TEST(raindrop_gl_rain_falls_as_on_the_cpu)
         EXPECT_EQ(raindrop_gl_read_drops(g, back, 100), SAT_OK);
         for (i = 0; i < 100; i++) off += fabs((double)(back[i].position[1] - rain->drops[i].position[1])) > 1e-3;
         EXPECT(off <= 1);
+        for (i = 0; i < 30; i++) { /* and climbs */
+            gust[1] += 0.25f;
+            EXPECT_EQ(raindrop_rain_set_centre(rain, gust), SAT_OK);
+            EXPECT_EQ(raindrop_gl_set_centre(g, gust), SAT_OK);
+            EXPECT_EQ(raindrop_rain_advance(rain, 1 / 60.0), SAT_OK);
+            EXPECT_EQ(raindrop_gl_advance(g, 1 / 60.0), SAT_OK);
+        }
+        EXPECT_EQ(raindrop_gl_read_drops(g, back, 100), SAT_OK);
+        for (i = 0, off = 0; i < 100; i++)
+            off += !(fabs((double)(back[i].position[1] - rain->drops[i].position[1])) < 2e-3 &&
+                     fabsf(back[i].radius - rain->drops[i].radius) < 1e-5f * back[i].radius);
+        EXPECT(off <= 4);
+        REPORT("drops that fell differently through a climbing box", off, "%");
     }
     EXPECT_EQ(raindrop_gl_advance(g, -1), SAT_ERR_ARGUMENT);
     raindrop_gl_destroy(g);
