@@ -667,6 +667,38 @@ TEST(gpu_takes_another_size_a_frame)
     ref_free(&p);
 }
 
+/* Down to one pixel and up again: what the CPU says of each. */
+TEST(gpu_sizes_of_all_kinds)
+{
+    static const int sizes[][2] = {{GL_WIDTH, GL_HEIGHT}, {1, 1}, {GL_WIDTH, 1}, {2, GL_HEIGHT}, {3, 2}, {64, 32},
+                                   {GL_WIDTH, GL_HEIGHT}};
+    static float a[GL_WIDTH * GL_HEIGHT], b[GL_WIDTH * GL_HEIGHT];
+    ssao_sat_options o = ssao_sat_defaults();
+    ssao_sat_gl *gl = NULL;
+    unsigned depth;
+    ref_picture p;
+    int k, x, y;
+    if (!open_gl()) SKIP(test_gl.message);
+    p = small_picture(1, 0);
+    depth = upload(SAT__GL_R32F, GL_WIDTH, GL_HEIGHT, p.z);
+    o.tolerance = 0;
+    EXPECT_EQ(ssao_sat_gl_create(&gl, test_gl.get_proc, GL_WIDTH, GL_HEIGHT, &o), SAT_OK);
+    for (k = 0; k < (int)(sizeof sizes / sizeof sizes[0]); k++) {
+        ssao_sat_input in = ssao_sat_input_linear(p.z, sizes[k][0], sizes[k][1], 1);
+        double off = 0;
+        in.depth_stride = GL_WIDTH * (ptrdiff_t)sizeof(float);
+        EXPECT_EQ(run_c(a, &in, &o), SAT_OK);
+        EXPECT_EQ(ssao_sat_gl_apply(gl, NULL, depth, 0, &in), SAT_OK);
+        download(b, ssao_sat_gl_texture(gl), GL_WIDTH, GL_HEIGHT);
+        for (y = 0; y < in.height; y++)
+            for (x = 0; x < in.width; x++) off += fabs((double)a[y * in.width + x] - (double)b[y * GL_WIDTH + x]);
+        if (!EXPECT_NEAR(off / (in.width * in.height), 0, 2e-3)) printf("    %d x %d\n", in.width, in.height);
+    }
+    ssao_sat_gl_destroy(gl);
+    test_f.DeleteTextures(1, &depth);
+    ref_free(&p);
+}
+
 /* With normals smoother than the mesh: the surface itself, from the depths where the picture lies in its texture. */
 TEST(gpu_geometric_normals_anywhere)
 {
