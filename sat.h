@@ -1277,6 +1277,15 @@ static inline sat__i32x4 sat__i32x4_or(sat__i32x4 a, sat__i32x4 b) { return _mm_
 static inline sat__i32x4 sat__i32x4_greater(sat__i32x4 a, sat__i32x4 b) { return _mm_cmpgt_epi32(a, b); }
 static inline sat__f32x4 sat__i32x4_to_f32(sat__i32x4 v) { return _mm_cvtepi32_ps(v); }
 static inline sat__i32x4 sat__f32x4_truncate(sat__f32x4 v) { return _mm_cvttps_epi32(v); } /* |v| < 2^31 */
+static inline sat__i32x4 sat__f32x4_round(sat__f32x4 v) { return _mm_cvtps_epi32(v); } /* to nearest even; the same */
+static inline sat__i32x4 sat__i32x4_last(sat__i32x4 v) { return _mm_shuffle_epi32(v, 0xff); } /* in all four */
+static inline sat__i32x4 sat__i32x4_prefix(sat__i32x4 v)                                      /* running sums */
+{
+    v = _mm_add_epi32(v, _mm_slli_si128(v, 4));
+    return _mm_add_epi32(v, _mm_slli_si128(v, 8));
+}
+/* past the cache; 16 bytes aligned */
+static inline void sat__i32x4_stream(int32_t *p, sat__i32x4 v) { _mm_stream_si128((__m128i *)(void *)p, v); }
 static inline sat__i32x4 sat__f32x4_bits(sat__f32x4 v) { return _mm_castps_si128(v); }
 static inline sat__f32x4 sat__f32x4_from_bits(sat__i32x4 v) { return _mm_castsi128_ps(v); }
 static inline sat__i32x4 sat__i32x4_shift_right(sat__i32x4 v, int bits)
@@ -1344,6 +1353,14 @@ static inline sat__i32x4 sat__i32x4_greater(sat__i32x4 a, sat__i32x4 b)
 }
 static inline sat__f32x4 sat__i32x4_to_f32(sat__i32x4 v) { return vcvtq_f32_s32(v); }
 static inline sat__i32x4 sat__f32x4_truncate(sat__f32x4 v) { return vcvtq_s32_f32(v); }
+static inline sat__i32x4 sat__f32x4_round(sat__f32x4 v) { return vcvtnq_s32_f32(v); }
+static inline sat__i32x4 sat__i32x4_last(sat__i32x4 v) { return vdupq_laneq_s32(v, 3); }
+static inline sat__i32x4 sat__i32x4_prefix(sat__i32x4 v)
+{
+    v = vaddq_s32(v, vextq_s32(vdupq_n_s32(0), v, 3));
+    return vaddq_s32(v, vextq_s32(vdupq_n_s32(0), v, 2));
+}
+static inline void sat__i32x4_stream(int32_t *p, sat__i32x4 v) { vst1q_s32(p, v); }
 static inline sat__i32x4 sat__f32x4_bits(sat__f32x4 v) { return vreinterpretq_s32_f32(v); }
 static inline sat__f32x4 sat__f32x4_from_bits(sat__i32x4 v) { return vreinterpretq_f32_s32(v); }
 static inline sat__i32x4 sat__i32x4_shift_right(sat__i32x4 v, int bits)
@@ -1410,8 +1427,25 @@ SAT__LANES(sat__f32x4, sat__i32x4_to_f32, (sat__i32x4 a), (float)a.lane[i])
 SAT__LANES(sat__i32x4, sat__f32x4_truncate, (sat__f32x4 a),
            fabsf(a.lane[i]) < 2147483648.0f ? (int32_t)a.lane[i] : INT32_MIN)
 SAT__LANES(sat__i32x4, sat__i32x4_shift_right, (sat__i32x4 a, int bits), (int32_t)((uint32_t)a.lane[i] >> bits))
+static inline int32_t sat__round(float a) /* 1.5 * 2^52 leaves the integer in the low bits of a double */
+{
+    double shifted = (double)a + 6755399441055744.0;
+    uint64_t bits;
+    memcpy(&bits, &shifted, sizeof bits);
+    return (int32_t)(uint32_t)bits;
+}
+SAT__LANES(sat__i32x4, sat__f32x4_round, (sat__f32x4 a), sat__round(a.lane[i]))
+SAT__LANES(sat__i32x4, sat__i32x4_last, (sat__i32x4 a), a.lane[3 + 0 * i])
+static inline sat__i32x4 sat__i32x4_prefix(sat__i32x4 v)
+{
+    v.lane[1] = (int32_t)((uint32_t)v.lane[1] + (uint32_t)v.lane[0]);
+    v.lane[2] = (int32_t)((uint32_t)v.lane[2] + (uint32_t)v.lane[1]);
+    v.lane[3] = (int32_t)((uint32_t)v.lane[3] + (uint32_t)v.lane[2]);
+    return v;
+}
 static inline void sat__f32x4_store(float *p, sat__f32x4 v) { memcpy(p, v.lane, sizeof v); }
 static inline void sat__i32x4_store(int32_t *p, sat__i32x4 v) { memcpy(p, v.lane, sizeof v); }
+static inline void sat__i32x4_stream(int32_t *p, sat__i32x4 v) { sat__i32x4_store(p, v); }
 static inline int sat__i32x4_any(sat__i32x4 v) { return (v.lane[0] | v.lane[1] | v.lane[2] | v.lane[3]) != 0; }
 static inline int sat__i32x4_all(sat__i32x4 v) { return (v.lane[0] & v.lane[1] & v.lane[2] & v.lane[3]) == -1; }
 static inline sat__i32x4 sat__f32x4_bits(sat__f32x4 a)
@@ -3944,11 +3978,9 @@ static void sat__gauge_clear(sat__gauge *g)
 /* n pixels more, a multiple of four. NaN and infinity are sure to show in the sum alone. */
 static inline void sat__gauge_row(sat__gauge *g, const float *p, int n)
 {
-    int i, j;
-#ifdef SAT__VECTOR
     sat__f32x4 sum = sat__f32x4_set1(0), largest = sat__f32x4_load(g->largest),
                smallest = sat__f32x4_load(g->smallest);
-    (void)j;
+    int i;
     for (i = 0; i < n; i += 4) {
         sat__f32x4 v = sat__f32x4_abs(sat__f32x4_load(p + i));
         sum = sat__f32x4_add(sum, v);
@@ -3958,17 +3990,6 @@ static inline void sat__gauge_row(sat__gauge *g, const float *p, int n)
     sat__f32x4_store(g->sum, sat__f32x4_add(sat__f32x4_load(g->sum), sum));
     sat__f32x4_store(g->largest, largest);
     sat__f32x4_store(g->smallest, smallest);
-#else
-    float sum[4] = {0, 0, 0, 0};
-    for (i = 0; i < n; i += 4)
-        for (j = 0; j < 4; j++) {
-            float v = fabsf(p[i + j]);
-            sum[j] += v;
-            if (v > g->largest[j]) g->largest[j] = v;
-            if (v < g->smallest[j]) g->smallest[j] = v;
-        }
-    for (j = 0; j < 4; j++) g->sum[j] += sum[j];
-#endif
 }
 
 static sat__extent sat__gauge_extent(const sat__gauge *g)
@@ -3994,28 +4015,44 @@ static sat__extent sat__extent_of(const float *p, int n, int side)
     return sat__gauge_extent(&g);
 }
 
-/* How many of n pixels, at most `most` + 1, have a magnitude above `threshold`; `at` takes the places of the first. */
-static int sat__find_above(const float *p, int n, float threshold, int *at, int most)
+/* The extent of a tile's pixels up to `threshold`; of those above, `at` takes the places of the first `most`. Returns how
+   many there are, or most + 1 with *rest of no use. */
+static int sat__extent_below(sat__extent *rest, const float *p, int n, int side, float threshold, int *at, int most)
 {
+    const sat__f32x4 limit = sat__f32x4_set1(threshold), zero = sat__f32x4_set1(0), huge = sat__f32x4_set1(3.4028235e38f);
+    sat__gauge g;
+    sat__f32x4 sum = zero, largest = zero, smallest = huge, row = zero;
     int i, j, count = 0;
-    for (i = 0; i < n && count <= most; i += 4) {
-#ifdef SAT__VECTOR
-        if (!sat__i32x4_any(sat__f32x4_less(sat__f32x4_set1(threshold), sat__f32x4_abs(sat__f32x4_load(p + i)))))
-            continue;
-#endif
-        for (j = 0; j < 4; j++)
-            if (fabsf(p[i + j]) > threshold && count++ < most) at[count - 1] = i + j;
+    for (i = 0; i < n; i += 4) {
+        sat__f32x4 v = sat__f32x4_abs(sat__f32x4_load(p + i));
+        sat__i32x4 above = sat__f32x4_less(limit, v);
+        if (sat__i32x4_any(above)) {
+            for (j = 0; j < 4; j++)
+                if (fabsf(p[i + j]) > threshold && count++ < most) at[count - 1] = i + j;
+            if (count > most) return count;
+            smallest = sat__f32x4_min(smallest, sat__f32x4_select(above, huge, v));
+            v = sat__f32x4_select(above, zero, v);
+        } else smallest = sat__f32x4_min(smallest, v);
+        row = sat__f32x4_add(row, v);
+        largest = sat__f32x4_max(largest, v);
+        if (!((i + 4) & (side - 1))) { /* as sat__gauge_row does it */
+            sum = sat__f32x4_add(sum, row);
+            row = zero;
+        }
     }
+    sat__f32x4_store(g.sum, sum);
+    sat__f32x4_store(g.largest, largest);
+    sat__f32x4_store(g.smallest, smallest);
+    *rest = sat__gauge_extent(&g);
     return count;
 }
 
 /* Pixels below `threshold` that are not 0; stops at `most`. */
 static int sat__count_below(const float *p, int n, float threshold, int most)
 {
+    const sat__f32x4 limit = sat__f32x4_set1(threshold);
     int i, j, count = 0;
     for (i = 0; i < n && count < most; i += 4) {
-#ifdef SAT__VECTOR
-        const sat__f32x4 limit = sat__f32x4_set1(threshold);
         for (; i + 16 <= n; i += 16) {
             sat__f32x4 a =
                 sat__f32x4_min(sat__f32x4_abs(sat__f32x4_load(p + i)), sat__f32x4_abs(sat__f32x4_load(p + i + 4)));
@@ -4025,7 +4062,6 @@ static int sat__count_below(const float *p, int n, float threshold, int most)
         }
         if (i >= n) break;
         if (!sat__i32x4_any(sat__f32x4_less(sat__f32x4_abs(sat__f32x4_load(p + i)), limit))) continue;
-#endif
         for (j = 0; j < 4; j++) {
             float v = fabsf(p[i + j]);
             count += v > 0 && v < threshold;
@@ -4054,8 +4090,8 @@ static sat__extent sat__take_spikes(const sat_table *t, size_t index, float *p, 
     while (e.largest > e.sum / 16 && tile->spikes < SAT__SPIKES) {
         int room = SAT__SPIKES - tile->spikes;
         sat__extent rest;
-        found = sat__find_above(p, n, e.sum / 16, at, room);
-        if (found > room) break;
+        found = sat__extent_below(&rest, p, n, side, e.sum / 16, at, room);
+        if (found > room || rest.sum > e.sum / 4) break;
         for (i = 0; i < found; i++) {
             sat__spike *spike = &s[tile->spikes + i];
             spike->x = (uint16_t)(at[i] % side);
@@ -4063,20 +4099,48 @@ static sat__extent sat__take_spikes(const sat_table *t, size_t index, float *p, 
             spike->value = p[at[i]];
             p[at[i]] = 0;
         }
-        rest = sat__extent_of(p, n, side);
-        if (rest.sum > e.sum / 4) {
-            for (i = 0; i < found; i++) p[at[i]] = s[tile->spikes + i].value;
-            break;
-        }
         tile->spikes = (uint16_t)(tile->spikes + found);
         e = rest;
     }
     return e;
 }
 
-/* NaN becomes 0, and what lies beyond max_value is clamped to it; giants leave for their list. */
-static void sat__take_giants(const sat_table *t, float *p, int n, int left, sat__giant *list, sat__tally *tally)
+/* One tile row of one channel: what a worker needs to build it. */
+typedef struct sat__job {
+    const sat_table *table;
+    const sat_image *image;
+    int channel, band, y0, rows, worker; /* y0: of the image */
+    int stream;                          /* stores that bypass the cache */
+    float *pixels;                       /* scratch: a tile */
+    sat__giant *giants;                  /* of this tile row */
+    sat__tally *tally;
+} sat__job;
+
+static sat__job sat__job_of(const sat_table *t, const sat_image *image, int channel, int band, int worker)
 {
+    size_t at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
+    sat__job job;
+    job.table = t;
+    job.image = image;
+    job.channel = channel;
+    job.band = band;
+    job.y0 = t->ring ? 0 : band << t->shift; /* a stream's image is one tile row */
+    job.rows = sat__min_int(t->options.tile, image->height - job.y0);
+    job.worker = worker;
+    job.stream = 0;
+    job.pixels = t->pixels + ((size_t)worker << 2 * t->shift);
+    job.giants = t->giants + at * (size_t)t->giant_room;
+    job.tally = &t->tallies[at];
+    return job;
+}
+
+static int sat__is_direct(const sat_image *image) { return image->format == SAT_F32 && image->channels == 1; }
+
+/* NaN becomes 0, and what lies beyond max_value is clamped to it; giants leave for their list. */
+static void sat__take_giants(const sat__job *job, int n, int left, sat__tally *tally)
+{
+    const sat_table *t = job->table;
+    float *p = job->pixels;
     const float giant = 1e20f, limit = (float)t->limit;
     float largest = 0, full;
     int i, side = t->options.tile, ordinary = 0;
@@ -4100,7 +4164,7 @@ static void sat__take_giants(const sat_table *t, float *p, int n, int left, sat_
     for (i = 0; i < n; i++) {
         if (!(fabsf(p[i]) > giant)) continue;
         if (tally->giants < t->giant_room) {
-            sat__giant *g = &list[tally->giants++];
+            sat__giant *g = &job->giants[tally->giants++];
             g->x = left + i % side;
             g->y = i / side;
             g->value = p[i];
@@ -4113,17 +4177,19 @@ static void sat__take_giants(const sat_table *t, float *p, int n, int left, sat_
 }
 
 /* A tile's pixels in scratch memory, zeros beyond the image's right and lower edge. */
-static int sat__gather(const sat_table *t, const sat_image *image, int channel, int y0, int x0, float *p)
+static int sat__gather(const sat__job *job, sat__place at)
 {
-    int side = t->options.tile, w = sat__min_int(side, t->width - x0), h = sat__min_int(side, image->height - y0), y;
-    for (y = 0; y < h; y++) {
-        float *row = p + (y << t->shift);
-        if (image->format == SAT_F32 && image->channels == 1)
-            memcpy(row, (const float *)sat__image_row(image, y0 + y) + x0, (size_t)w * sizeof(float));
-        else sat__read_row(row, image, y0 + y, x0, x0 + w, channel);
+    const sat_table *t = job->table;
+    const sat_image *image = job->image;
+    int side = t->options.tile, x0 = at.tx << t->shift, w = sat__min_int(side, t->width - x0), y;
+    for (y = 0; y < job->rows; y++) {
+        float *row = job->pixels + (y << t->shift);
+        if (sat__is_direct(image))
+            memcpy(row, (const float *)sat__image_row(image, job->y0 + y) + x0, (size_t)w * sizeof(float));
+        else sat__read_row(row, image, job->y0 + y, x0, x0 + w, at.channel);
         if (w < side) memset(row + w, 0, (size_t)(side - w) * sizeof(float));
     }
-    return h << t->shift;
+    return job->rows << t->shift;
 }
 
 /* out = p / quantum, rounded to nearest even. */
@@ -4147,56 +4213,17 @@ static void sat__tile_integers(uint32_t *out, const float *p, int n, double quan
     }
 }
 
-/* A row of a tile, rounded and summed onto the rows above it; returns the last sum. `integers`: scratch. */
-static inline uint32_t sat__sum_tile_row(uint32_t *out, uint32_t *column, uint32_t *integers, const float *p, int n,
-                                         double quantum, int stream)
-{
-    int32_t signs = 0;
-#ifdef SAT__SSE2
-    if (!(n & 7) && (quantum > 1e-37 || !(quantum > 0))) { /* the same in registers */
-        const __m128 scale = _mm_set1_ps(quantum > 0 ? (float)(1 / quantum) : 0);
-        __m128i carry = _mm_setzero_si128(), a, b, c;
-        int i;
-        for (i = 0; i < n; i += 8) {
-            a = _mm_add_epi32(SAT__LOAD_u32(column + i), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(p + i), scale)));
-            b = _mm_add_epi32(SAT__LOAD_u32(column + i + 4),
-                              _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(p + i + 4), scale)));
-            SAT__STORE_u32(column + i, a);
-            SAT__STORE_u32(column + i + 4, b);
-            a = sat__prefix_u32(a);
-            b = sat__prefix_u32(b);
-            b = _mm_add_epi32(b, SAT__LAST_u32(a));
-            c = SAT__LAST_u32(b);
-            a = _mm_add_epi32(a, carry);
-            b = _mm_add_epi32(b, carry);
-            carry = _mm_add_epi32(carry, c);
-            if (stream) {
-                SAT__STREAM_u32(out + i, a);
-                SAT__STREAM_u32(out + i + 4, b);
-            } else {
-                SAT__STORE_u32(out + i, a);
-                SAT__STORE_u32(out + i + 4, b);
-            }
-        }
-        return (uint32_t)_mm_cvtsi128_si32(carry);
-    }
-#endif
-    sat__tile_integers(integers, p, (n + 3) & ~3, quantum);
-    return sat__sum_row_u32(out, column, integers, n, 0, stream, &signs);
-}
-
 /* A tile's pixels: in the image, or taken apart in scratch memory. */
 typedef struct sat__source {
     const float *p;
     ptrdiff_t step; /* floats between rows */
 } sat__source;
 
-static int sat__is_direct(const sat_image *image) { return image->format == SAT_F32 && image->channels == 1; }
-
 static float sat__giant_limit(const sat_table *t) { return t->limit < 1e20 ? (float)t->limit : 1e20f; }
 
 /* Quantum and wishes, once spikes and giants are out. */
-static void sat__settle_tile(const sat_table *t, sat__tile *tile, const sat__source *from, int rows, sat__extent e)
+static void sat__choose_quantum(const sat_table *t, sat__tile *tile, const sat__source *from, int rows,
+                                sat__extent e)
 {
     float threshold = e.sum / ((float)(1 << 2 * t->shift) * 1024); /* 2^-12 of such a pixel is lost */
     int y, count = 0;
@@ -4209,94 +4236,153 @@ static void sat__settle_tile(const sat_table *t, sat__tile *tile, const sat__sou
     tile->wants = count >= 8;
 }
 
-/* Takes a tile apart: scratch memory then holds what its cells sum. `e`: what is known of a tile without giants. */
-static sat__extent sat__take_apart(const sat_table *t, float *p, int n, size_t index, int left, sat__giant *list,
-                                   sat__tally *tally, sat__extent e, int known)
+/* Takes a tile apart: job->pixels then hold what its cells sum. known: NULL, or the extent of a tile without giants. */
+static sat__extent sat__take_apart(const sat__job *job, sat__place at, const sat__extent *known)
 {
+    const sat_table *t = job->table;
+    size_t index = sat__tile_index(t, at.channel, at.band, at.tx);
     sat__tile *tile = &t->tiles[index];
-    int i, first = tally->giants;
-    if (!known) {
-        if (!sat__is_tame(p, n, sat__giant_limit(t))) sat__take_giants(t, p, n, left, list, tally);
-        e = sat__extent_of(p, n, t->options.tile);
+    sat__tally *tally = job->tally;
+    int i, first = tally->giants, n = sat__gather(job, at);
+    sat__extent e;
+    if (known) e = *known;
+    else {
+        if (!sat__is_tame(job->pixels, n, sat__giant_limit(t)))
+            sat__take_giants(job, n, at.tx << t->shift, tally);
+        e = sat__extent_of(job->pixels, n, t->options.tile);
     }
     tile->spikes = 0;
-    if (e.largest > e.sum / 16) e = sat__take_spikes(t, index, p, n, e);
+    if (e.largest > e.sum / 16) e = sat__take_spikes(t, index, job->pixels, n, e);
     for (i = 0; i < tile->spikes; i++) tally->sum_abs += fabs((double)t->spikes[index * SAT__SPIKES + (size_t)i].value);
-    for (i = first; i < tally->giants; i++) tally->sum_abs += fabs((double)list[i].value);
+    for (i = first; i < tally->giants; i++) tally->sum_abs += fabs((double)job->giants[i].value);
     return e;
 }
 
-/* The cells of a tile, and in `left` what it alone adds. */
-static void sat__sum_tile(const sat_table *t, const sat__source *from, int channel, int band, int tx, int rows,
-                          int worker, int stream)
+/* Sixteen columns of a tile, a cache line of cells: their sums stay in registers, those of the rows go from one sixteen
+   to the next in `carries`, four equal lanes each. Reads and writes whole sixteens. */
+static void sat__sum_lines(uint32_t *cells, size_t stride, int32_t *carries, const float *p, ptrdiff_t step, int rows,
+                           float scale, int stream)
 {
-    uint32_t *integers = t->tile_integers + (size_t)worker * 2 * SAT__MAX_TILE_SIDE,
-             *column = integers + SAT__MAX_TILE_SIDE;
-    size_t index = sat__tile_index(t, channel, band, tx);
-    const sat__tile *tile = &t->tiles[index];
-    int y, side = t->options.tile, x0 = tx << t->shift, w = sat__min_int(side, t->width - x0);
-    uint32_t *cells = sat__cells(t, channel, band, 0) + x0;
-    double *left = sat__left(t, channel, band, 0) + tx, quantum = tile->quantum;
-    memset(column, 0, (size_t)side * sizeof *column);
-    for (y = 0; y < rows; y++) {
-        uint32_t sum = sat__sum_tile_row(cells + (size_t)y * t->stride, column, integers, from->p + y * from->step, w,
-                                         quantum, stream);
-        left[(size_t)y * (size_t)t->tiles_x] =
-            (double)(int32_t)sum * quantum +
-            (tile->spikes ? sat__spike_sum(t, index, sat__box_of(0, 0, side, y + 1)) : 0);
+    const sat__f32x4 scale4 = sat__f32x4_set1(scale);
+    sat__i32x4 c0 = sat__i32x4_set1(0), c1 = c0, c2 = c0, c3 = c0;
+    int y;
+    for (y = 0; y < rows; y++, p += step, cells += stride, carries += 4) {
+        int32_t *out = (int32_t *)(void *)cells;
+        sat__i32x4 s0, s1, s2, s3;
+        c0 = sat__i32x4_add(c0, sat__f32x4_round(sat__f32x4_mul(sat__f32x4_load(p), scale4)));
+        c1 = sat__i32x4_add(c1, sat__f32x4_round(sat__f32x4_mul(sat__f32x4_load(p + 4), scale4)));
+        c2 = sat__i32x4_add(c2, sat__f32x4_round(sat__f32x4_mul(sat__f32x4_load(p + 8), scale4)));
+        c3 = sat__i32x4_add(c3, sat__f32x4_round(sat__f32x4_mul(sat__f32x4_load(p + 12), scale4)));
+        s0 = sat__i32x4_add(sat__i32x4_prefix(c0), sat__i32x4_load(carries));
+        s1 = sat__i32x4_add(sat__i32x4_prefix(c1), sat__i32x4_last(s0));
+        s2 = sat__i32x4_add(sat__i32x4_prefix(c2), sat__i32x4_last(s1));
+        s3 = sat__i32x4_add(sat__i32x4_prefix(c3), sat__i32x4_last(s2));
+        if (stream) {
+            sat__i32x4_stream(out, s0);
+            sat__i32x4_stream(out + 4, s1);
+            sat__i32x4_stream(out + 8, s2);
+            sat__i32x4_stream(out + 12, s3);
+        } else {
+            sat__i32x4_store(out, s0);
+            sat__i32x4_store(out + 4, s1);
+            sat__i32x4_store(out + 8, s2);
+            sat__i32x4_store(out + 12, s3);
+        }
+        sat__i32x4_store(carries, sat__i32x4_last(s3));
     }
 }
 
-/* Tile row `band` (row y0 of the image on), a panel of tiles at a time: their pixels are gauged row by row, as memory
-   likes it, and are still in the cache when each tile is summed. */
-static void sat__settle_band(const sat_table *t, const sat_image *image, int channel, int band, int y0, int worker,
-                             int stream)
+/* The cells of a tile, and in `left` what it alone adds. */
+static void sat__sum_tile(const sat__job *job, sat__place at, const sat__source *from)
 {
-    sat__gauge gauge[SAT__PANEL / 8];
-    float *p = t->pixels + ((size_t)worker << 2 * t->shift);
-    size_t at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
-    sat__tally *tally = &t->tallies[at];
-    int panel, tx, y, side = t->options.tile, rows = sat__min_int(side, image->height - y0),
-                      step = SAT__PANEL >> t->shift;
-    memset(tally, 0, sizeof *tally);
-    for (panel = 0; panel < t->tiles_x; panel += step) {
-        int stop = sat__min_int(panel + step, t->tiles_x),
-            direct = sat__is_direct(image) ? sat__min_int(stop, t->width >> t->shift) : 0;
-        for (tx = panel; tx < direct; tx++) sat__gauge_clear(&gauge[tx - panel]);
-        for (y = 0; y < rows; y++) {
-            const float *row = (const float *)sat__image_row(image, y0 + y),
-                        *ahead = (const float *)sat__image_row(image, y0 + sat__min_int(y + 2, rows - 1));
-            for (tx = panel; tx < direct; tx++) {
-                int x = tx << t->shift, end = x + side;
-                sat__gauge_row(&gauge[tx - panel], row + x, side);
-                for (; x < end; x += SAT__LINE / (int)sizeof(float)) SAT__PREFETCH(ahead + x);
-            }
+    const sat_table *t = job->table;
+    uint32_t *integers = t->tile_integers + (size_t)job->worker * 2 * SAT__MAX_TILE_SIDE,
+             *columns = integers + SAT__MAX_TILE_SIDE;
+    int32_t carries[4 * SAT__MAX_TILE_SIDE];
+    size_t index = sat__tile_index(t, at.channel, at.band, at.tx);
+    const sat__tile *tile = &t->tiles[index];
+    const sat__spike *spikes = t->spikes + index * SAT__SPIKES;
+    int y, i, side = t->options.tile, x0 = at.tx << t->shift, w = sat__min_int(side, t->width - x0);
+    uint32_t *cells = sat__cells(t, at.channel, at.band, 0) + x0;
+    double *left = sat__left(t, at.channel, at.band, 0) + at.tx, quantum = tile->quantum;
+    int32_t signs = 0;
+    int lines = side >= 16 && t->stride % 16 == 0 && (quantum > 1e-37 || !(quantum > 0)); /* scale is a float */
+    if (!lines) memset(columns, 0, (size_t)side * sizeof *columns);
+    memset(carries, 0, 4 * (size_t)job->rows * sizeof *carries);
+    if (lines)
+        for (i = 0; i < w; i += 16)
+            sat__sum_lines(cells + i, t->stride, carries, from->p + i, from->step, job->rows,
+                           quantum > 0 ? (float)(1 / quantum) : 0, job->stream);
+    for (y = 0; y < job->rows; y++) {
+        double spiky = 0;
+        uint32_t sum = (uint32_t)carries[4 * y];
+        if (!lines) {
+            sat__tile_integers(integers, from->p + y * from->step, (w + 3) & ~3, quantum);
+            sum = sat__sum_row_u32(cells + (size_t)y * t->stride, columns, integers, w, 0, job->stream, &signs);
         }
-        for (tx = panel; tx < stop; tx++) {
-            size_t index = sat__tile_index(t, channel, band, tx);
-            sat__extent e;
-            sat__source from;
-            int known;
-            e.sum = e.largest = e.smallest = 0;
-            if (tx < direct) e = sat__gauge_extent(&gauge[tx - panel]);
-            known = tx < direct && e.sum <= 3.4028235e38f && e.largest <= sat__giant_limit(t);
-            if (known && e.largest <= e.sum / 16) {
-                from.p = (const float *)sat__image_row(image, y0) + ((size_t)tx << t->shift);
-                from.step = sat__image_stride(image) / (ptrdiff_t)sizeof(float);
-                t->tiles[index].spikes = 0;
-            } else {
-                int n = sat__gather(t, image, channel, y0, tx << t->shift, p);
-                e = sat__take_apart(t, p, n, index, tx << t->shift, t->giants + at * (size_t)t->giant_room, tally, e,
-                                    known);
-                from.p = p;
-                from.step = side;
-            }
-            sat__settle_tile(t, &t->tiles[index], &from, rows, e);
-            tally->sum_abs += (double)e.sum;
-            sat__sum_tile(t, &from, channel, band, tx, rows, worker, stream);
+        for (i = 0; i < tile->spikes; i++)
+            if (spikes[i].y <= y) spiky += (double)spikes[i].value;
+        left[(size_t)y * (size_t)t->tiles_x] = (double)(int32_t)sum * quantum + spiky;
+    }
+}
+
+/* Row by row, as memory likes it: the gauges of whole tiles [first, last) whose pixels lie in the image as they are. */
+static void sat__gauge_panel(sat__gauge *gauge, const sat__job *job, int first, int last)
+{
+    const sat_table *t = job->table;
+    int tx, y, side = t->options.tile;
+    for (tx = first; tx < last; tx++) sat__gauge_clear(&gauge[tx - first]);
+    for (y = 0; y < job->rows && first < last; y++) {
+        const float *row = (const float *)sat__image_row(job->image, job->y0 + y),
+                    *ahead = (const float *)sat__image_row(job->image, job->y0 + sat__min_int(y + 2, job->rows - 1));
+        for (tx = first; tx < last; tx++) {
+            int x = tx << t->shift, end = x + side;
+            sat__gauge_row(&gauge[tx - first], row + x, side);
+            for (; x < end; x += SAT__LINE / (int)sizeof(float)) SAT__PREFETCH(ahead + x);
         }
     }
-    tally->negative = 1;
+}
+
+/* One tile: what it holds apart, its quantum, its cells. gauge: NULL where its pixels have to be gathered first. */
+static void sat__settle_tile(const sat__job *job, sat__place at, const sat__gauge *gauge)
+{
+    const sat_table *t = job->table;
+    sat__tile *tile = &t->tiles[sat__tile_index(t, at.channel, at.band, at.tx)];
+    sat__extent e;
+    sat__source from;
+    int known;
+    e.sum = e.largest = e.smallest = 0;
+    if (gauge) e = sat__gauge_extent(gauge);
+    known = gauge && e.sum <= 3.4028235e38f && e.largest <= sat__giant_limit(t);
+    if (known && e.largest <= e.sum / 16) {
+        from.p = (const float *)sat__image_row(job->image, job->y0) + ((size_t)at.tx << t->shift);
+        from.step = sat__image_stride(job->image) / (ptrdiff_t)sizeof(float);
+        tile->spikes = 0;
+    } else {
+        from.p = job->pixels;
+        from.step = t->options.tile;
+        e = sat__take_apart(job, at, known ? &e : NULL);
+    }
+    sat__choose_quantum(t, tile, &from, job->rows, e);
+    job->tally->sum_abs += (double)e.sum;
+    sat__sum_tile(job, at, &from);
+}
+
+/* A panel of tiles at a time: their pixels are gauged and are still in the cache when each tile is summed. */
+static void sat__settle_band(const sat__job *job)
+{
+    sat__gauge gauge[SAT__PANEL / 8];
+    const sat_table *t = job->table;
+    int panel, tx, step = SAT__PANEL >> t->shift;
+    memset(job->tally, 0, sizeof *job->tally);
+    for (panel = 0; panel < t->tiles_x; panel += step) {
+        int stop = sat__min_int(panel + step, t->tiles_x),
+            direct = sat__is_direct(job->image) ? sat__min_int(stop, t->width >> t->shift) : 0;
+        sat__gauge_panel(gauge, job, panel, direct);
+        for (tx = panel; tx < stop; tx++)
+            sat__settle_tile(job, sat__place_of(job->channel, job->band, tx), tx < direct ? &gauge[tx - panel] : NULL);
+    }
+    job->tally->negative = 1;
 }
 
 /* Pool slots go to the tiles that want one, in the order of the tile rows: *used counts within a super tile row. */
@@ -4310,59 +4396,54 @@ static void sat__assign_wide(const sat_table *t, int channel, int band, int tx, 
 }
 
 /* 64-bit cells of one tile, from pixels that are taken apart once more. */
-static void sat__wide_tile(const sat_table *t, const sat_image *image, int channel, int band, int tx, int y0,
-                           int worker)
+static void sat__wide_tile(const sat__job *job, sat__place at)
 {
-    float *p = t->pixels + ((size_t)worker << 2 * t->shift);
-    size_t index = sat__tile_index(t, channel, band, tx),
-           at = (size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band);
-    sat__tile *tile = &t->tiles[index];
+    const sat_table *t = job->table;
+    float *p = job->pixels;
+    size_t index = sat__tile_index(t, at.channel, at.band, at.tx);
+    const sat__tile *tile = &t->tiles[index];
+    const sat__spike *spikes = t->spikes + index * SAT__SPIKES;
     uint64_t *cells = sat__wide_cells(t, tile->slot);
     double inverse = 1 / sat__wide_quantum(tile);
-    int side = t->options.tile, n = sat__gather(t, image, channel, y0, tx << t->shift, p), x, y, i;
+    int w = sat__min_int(t->options.tile, t->width - (at.tx << t->shift)), n = sat__gather(job, at), x, y, i;
     if (!sat__is_tame(p, n, sat__giant_limit(t))) { /* the giants of this tile stand in the list; others were clamped */
-        sat__tally again = t->tallies[at];
-        const sat__giant *list = t->giants + at * (size_t)t->giant_room;
+        sat__tally again = *job->tally;
         int first = 0;
-        while (first < again.giants && list[first].x >> t->shift != tx) first++;
+        while (first < again.giants && job->giants[first].x >> t->shift != at.tx) first++;
         again.giants = first;
-        sat__take_giants(t, p, n, tx << t->shift, t->giants + at * (size_t)t->giant_room, &again);
+        sat__take_giants(job, n, at.tx << t->shift, &again);
     }
-    for (i = 0; i < tile->spikes; i++)
-        p[(t->spikes[index * SAT__SPIKES + (size_t)i].y << t->shift) + t->spikes[index * SAT__SPIKES + (size_t)i].x] =
-            0;
-    for (y = 0; y < n >> t->shift; y++) {
+    for (i = 0; i < tile->spikes; i++) p[(spikes[i].y << t->shift) + spikes[i].x] = 0;
+    for (y = 0; y < job->rows; y++) {
         uint64_t run = 0, *out = cells + (size_t)y * t->wide_stride;
         for (x = 0; x < (int)t->wide_stride; x++) {
             run += (uint64_t)llrint((double)p[(y << t->shift) + x] * inverse);
             out[x] = y ? out[x - (int)t->wide_stride] + run : run;
         }
-        sat__left(t, channel, band, y)[tx] =
-            sat__tile_part(t, sat__place_of(channel, band, tx),
-                           sat__box_of(0, 0, sat__min_int(side, t->width - (tx << t->shift)), y + 1));
+        sat__left(t, at.channel, at.band, y)[at.tx] = sat__tile_part(t, at, sat__box_of(0, 0, w, y + 1));
     }
 }
 
 /* Wide cells where there are to be any; then `left` becomes sums along the tile row. */
-static void sat__finish_band(const sat_table *t, const sat_image *image, int channel, int band, int y0, int worker)
+static void sat__finish_band(const sat__job *job)
 {
-    sat__tally *tally = &t->tallies[(size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band)];
-    int tx, y, rows = sat__min_int(t->options.tile, image->height - y0), super = SAT__SUPER >> t->shift;
-    double *quanta = t->quanta + sat__tile_index(t, channel, band, 0);
-    const sat__giant *giants =
-        t->giants + ((size_t)channel * (size_t)t->tiles_y + (size_t)sat__band_slot(t, band)) * (size_t)t->giant_room;
+    const sat_table *t = job->table;
+    sat__tally *tally = job->tally;
+    int tx, y, super = SAT__SUPER >> t->shift;
+    size_t index = sat__tile_index(t, job->channel, job->band, 0);
+    const sat__tile *tile = t->tiles + index;
+    double *quanta = t->quanta + index;
     tally->tile_largest = tally->tile_squares = 0;
     for (tx = 0; tx < t->tiles_x; tx++) {
-        const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
-        double quantum = tile->slot ? sat__wide_quantum(tile) : tile->quantum;
-        if (tile->slot) sat__wide_tile(t, image, channel, band, tx, y0, worker);
+        double quantum = tile[tx].slot ? sat__wide_quantum(&tile[tx]) : tile[tx].quantum;
+        if (tile[tx].slot) sat__wide_tile(job, sat__place_of(job->channel, job->band, tx));
         if (quantum > tally->tile_largest) tally->tile_largest = quantum;
         tally->tile_squares += quantum * quantum;
-        quanta[tx] = tile->slot || tile->spikes ? -1 : quantum;
+        quanta[tx] = tile[tx].slot || tile[tx].spikes ? -1 : quantum;
     }
-    for (y = 0; y < tally->giants; y++) quanta[giants[y].x >> t->shift] = -1;
-    for (y = 0; y < rows; y++) {
-        double *left = sat__left(t, channel, band, y), run = 0;
+    for (y = 0; y < tally->giants; y++) quanta[job->giants[y].x >> t->shift] = -1;
+    for (y = 0; y < job->rows; y++) {
+        double *left = sat__left(t, job->channel, job->band, y), run = 0;
         for (tx = 0; tx < t->tiles_x; tx++) {
             run = tx & (super - 1) ? run + left[tx] : left[tx];
             left[tx] = run;
@@ -4442,20 +4523,21 @@ static void sat__build_above(const sat_table *t, int channel, int band, int rows
 static void sat__settle_bands(int begin, int end, int worker, void *context)
 {
     const sat__build *b = (const sat__build *)context;
-    int job;
-    for (job = begin; job < end; job++) {
-        int band = b->first_band + job % b->bands;
-        sat__settle_band(b->table, b->image, job / b->bands, band, band << b->table->shift, worker, b->stream);
+    int i;
+    for (i = begin; i < end; i++) {
+        sat__job job = sat__job_of(b->table, b->image, i / b->bands, b->first_band + i % b->bands, worker);
+        job.stream = b->stream;
+        sat__settle_band(&job);
     }
 }
 
 static void sat__finish_bands(int begin, int end, int worker, void *context)
 {
     const sat__build *b = (const sat__build *)context;
-    int job;
-    for (job = begin; job < end; job++) {
-        int band = b->first_band + job % b->bands;
-        sat__finish_band(b->table, b->image, job / b->bands, band, band << b->table->shift, worker);
+    int i;
+    for (i = begin; i < end; i++) {
+        sat__job job = sat__job_of(b->table, b->image, i / b->bands, b->first_band + i % b->bands, worker);
+        sat__finish_band(&job);
     }
 }
 
@@ -5999,13 +6081,13 @@ static void sat__stream_build(sat_stream *s)
     sat_image image = sat_image_f32(t->ring_pixels, t->width, (int)(s->taken - s->built), t->channels);
     int channel, tx, band = (int)((s->built >> t->shift) % (uint64_t)sat__ring_period(t));
     for (channel = 0; channel < t->channels; channel++) {
-        const sat__tally *tally = &t->tallies[channel * t->tiles_y + sat__band_slot(t, band)];
-        sat__settle_band(t, &image, channel, band, 0, 0, 0);
+        sat__job job = sat__job_of(t, &image, channel, band, 0);
+        sat__settle_band(&job);
         if ((band & ((SAT__SUPER >> t->shift) - 1)) == 0) s->used[channel] = 0;
         for (tx = 0; tx < t->tiles_x; tx++) sat__assign_wide(t, channel, band, tx, &s->used[channel]);
-        sat__finish_band(t, &image, channel, band, 0, 0);
+        sat__finish_band(&job);
         sat__build_above(t, channel, band, image.height);
-        t->has_giants |= tally->giants > 0;
+        t->has_giants |= job.tally->giants > 0;
     }
     s->built = s->taken;
 }
