@@ -24,7 +24,7 @@
      of the tile's own, and a box of up to 65 pixels a side reads only the tiles that it touches: bright pixels,
      infinities and skies elsewhere change nothing. tile = 64 filters faster and errs more (2e-6, 6e-6 where it is
      smooth; 2e-4, 1 where it is not: bench_sat's "Side of a tile").
-   - Exact tables in integers modulo 2^32 or 2^64: the same bits on CPU and GPU, for any order of additions.
+   - 8- and 16-bit pictures without any error. Flat tables in integers modulo 2^32, too: no order of additions matters.
    - Means over boxes with real corners, beyond the border (clip, zero, clamp, mirror, wrap), with a radius for each
      pixel; box filters of whole images, also of images that arrive a row at a time; dirty rectangles.
    - Variance and covariance over any box, from moments about the mean of each tile: 1e4 +- 1 comes out right to 1e-3
@@ -78,7 +78,7 @@
                that 8- and 16-bit input is exact
      FLOAT     4 (height + width / 8) u x (sum of the image)
      DOUBLE    4 (height + width / 8) v x (sum of the image)
-     FIXED     quantum / 2 for each pixel of the box; 0 for 8- and 16-bit input in FIXED64
+     FIXED32   quantum / 2 for each pixel of the box
 
    - Input: any float. NaN counts as 0 and infinity as the largest value the kind can sum; both are counted, and in
      TILED and FIXED tables a bad pixel changes no box without it. TILED keeps at most 64 pixels a tile row beyond 1e20;
@@ -93,14 +93,14 @@
    COST
 
    A build writes each sum once and reads each pixel once (TILED: twice, the second time from the cache). Per pixel and
-   channel: 4.8 bytes (TILED; 21 in a column one pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE, FIXED64). A lookup reads
+   channel: 4.8 bytes (TILED; 21 in a column one pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE). A lookup reads
    4 sums (TILED: up to 4 a touched tile, at most 9 tiles; beyond, 16 for each super tile of 1024 pixels). Measured
    ratios, one core of a busy machine, SSE2 (bench_sat, QUICK=1):
 
      build, time over a memcpy of the same traffic     512^2        2048^2
        TILED                                           5.1 to 7.9   2.4 to 3.4 (tile = 64: 2.0 to 2.9)
        FLOAT, DOUBLE                                   2.9 to 3.6   1.0 to 1.4
-       FIXED32, FIXED64                                4.6 to 5.6   2.1 to 2.8
+       FIXED32                                         4.6 to 5.6   2.1 to 2.8
      cv::integral over FLOAT, over DOUBLE              2.1, 1.5     1.6, 1.3
      box filter over cv::blur at radius 1, 5, 20, 100, 1024^2
        TILED                                           1.1 1.1 1.1 1.0, with the build 1.9 2.8 2.4 1.7 (tile = 64: two
@@ -302,8 +302,7 @@ typedef enum sat_kind {
     SAT_KIND_TILED,   /* 4.8; integers that restart in every tile, with a quantum each: for HDR */
     SAT_KIND_FLOAT,   /* 4; only for large boxes, small images or thesis parity */
     SAT_KIND_DOUBLE,  /* 8 */
-    SAT_KIND_FIXED32, /* 4; integers modulo 2^32: exact sums of pixels rounded to `quantum` */
-    SAT_KIND_FIXED64  /* 8; integers modulo 2^64: the same, for 8- and 16-bit input without any error */
+    SAT_KIND_FIXED32  /* 4; integers modulo 2^32: exact sums of pixels rounded to `quantum` */
 } sat_kind;
 
 typedef enum sat_non_finite {
@@ -317,11 +316,11 @@ typedef struct sat_options {
                                   much and filters in 0.6 of the time */
     int subtract_mean;         /* 0; 0..1; 1 (FLOAT, DOUBLE): Hensley 2005. Good at low contrast; makes dark boxes of
                                   HDR images about 100 times worse */
-    double quantum;            /* 0; 0..1e300; 0: the finest power of two that max_value and max_box_area allow; FIXED
+    double quantum;            /* 0; 0..1e300; 0: the finest power of two that max_value and max_box_area allow; FIXED32
                                   kinds only */
-    double max_value;          /* 0; 0..1e300; 0: as large as the kind can sum (FIXED kinds: the largest |pixel| of the
+    double max_value;          /* 0; 0..1e300; 0: as large as the kind can sum (FIXED32: the largest |pixel| of the
                                   first build). > 0: pixels beyond +-max_value are clamped to it and counted */
-    double max_box_area;       /* 0; 0..1e300; 0: the whole table; FIXED kinds: no larger box is ever asked for */
+    double max_box_area;       /* 0; 0..1e300; 0: the whole table; FIXED32: no larger box is ever asked for */
     sat_non_finite non_finite; /* SAT_NON_FINITE_CLAMP */
     sat_allocator allocator;   /* malloc; used by create and destroy only */
     sat_threads threads;       /* serial; build, update and box filters use it; same bits for any worker count */
@@ -333,10 +332,10 @@ SAT_DEF const char *sat_explain(char *text, size_t size, int width, int height, 
 
 typedef struct sat_table sat_table;
 
-/* What the last build or update met. FIXED kinds keep the quantum that the first build settled. */
+/* What the last build or update met. FIXED32 keeps the quantum that the first build settled. */
 typedef struct sat_stats {
     size_t nan, infinite, clamped; /* channel values replaced: NaN, infinite, too large */
-    double quantum;                /* FIXED kinds: the step that pixels are rounded to; else 0 */
+    double quantum;                /* FIXED32: the step that pixels are rounded to; else 0 */
     size_t bytes;                  /* memory the table holds */
 } sat_stats;
 SAT_DEF sat_stats sat_get_stats(const sat_table *table);
@@ -422,7 +421,7 @@ SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_widt
    lies elsewhere does not. Visits every tile of the box. */
 SAT_DEF double sat_error_bound_box(const sat_table *table, int channel, int x0, int y0, int x1, int y1);
 /* The root-mean-square error to expect over boxes of that size: within a factor of 4 on non-negative images whose
-   pixels are not round numbers and, for FIXED kinds, not mostly below the quantum; an upper estimate on others. */
+   pixels are not round numbers and, for FIXED32, not mostly below the quantum; an upper estimate on others. */
 SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width, int box_height);
 
 /* The cheapest kind whose worst error on box means of that size stays below max_relative_error times the mean
@@ -430,7 +429,7 @@ SAT_DEF double sat_error_rms(const sat_table *table, int channel, int box_width,
    one that fits. Reads the image once. */
 SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_width, int box_height,
                             double max_relative_error, size_t max_bytes, const sat_options *options);
-/* The same as whole options, to be used as they are: FIXED kinds may then count on boxes of that size, which sat_plan
+/* The same as whole options, to be used as they are: FIXED32 may then count on boxes of that size, which sat_plan
    alone, where options leave max_box_area 0, may not. */
 SAT_DEF sat_result sat_plan_options(sat_options *out, const sat_image *image, int box_width, int box_height,
                                     double max_relative_error, size_t max_bytes, const sat_options *options);
@@ -3011,19 +3010,20 @@ struct sat_table {
     unsigned char *columns;             /* running column sums, a set for each channel */
     size_t columns_stride;
     float *pixels;                      /* one row piece a worker */
-    uint64_t *integers;                 /* the same, quantised */
+    uint32_t *integers;                 /* the same, quantised */
     sat__tally *tallies, total[4];
     sat_view view[4];
     double quantum, limit;              /* pixels are clamped to +-limit */
+    int exact;                          /* tiled: pixels are 8- or 16-bit integers, of which quanta are parts */
     float mean[4];
     int refused;                        /* the last build met NaN or infinity and was not to */
 };
 
-static int sat__is_fixed(sat_kind kind) { return kind == SAT_KIND_FIXED32 || kind == SAT_KIND_FIXED64; }
+static int sat__is_fixed(sat_kind kind) { return kind == SAT_KIND_FIXED32; }
 
 static void sat__make_views(sat_table *t);
 
-static size_t sat__kind_size(sat_kind kind) { return kind == SAT_KIND_DOUBLE || kind == SAT_KIND_FIXED64 ? 8 : 4; }
+static size_t sat__kind_size(sat_kind kind) { return kind == SAT_KIND_DOUBLE ? 8 : 4; }
 
 /* Corner (0, y) of a channel, where y counts stored rows. */
 static unsigned char *sat__row(const sat_table *t, int channel, int y)
@@ -3032,7 +3032,7 @@ static unsigned char *sat__row(const sat_table *t, int channel, int y)
 }
 
 static const sat__field sat__table_fields[] = {
-    SAT__FIELD(sat_options, 'i', kind, 0, 0, SAT_KIND_FIXED64, ' '),
+    SAT__FIELD(sat_options, 'i', kind, 0, 0, SAT_KIND_FIXED32, ' '),
     SAT__FIELD(sat_options, 'i', tile, 32, 8, 128, '2'),
     SAT__FIELD(sat_options, 'i', subtract_mean, 0, 0, 1, ' '),
     SAT__FIELD(sat_options, 'd', quantum, 0, 0, 1e300, ' '),
@@ -3209,7 +3209,7 @@ static size_t sat__lay_out(sat_table *t, unsigned char *base)
     t->columns = (unsigned char *)sat__carve(&arena, channels, t->columns_stride);
     t->pixels = (float *)sat__carve(&arena, workers * SAT__MAX_STRIP, sizeof(float));
     t->integers = sat__is_fixed(t->options.kind)
-                      ? (uint64_t *)sat__carve(&arena, workers * SAT__MAX_STRIP, sizeof(uint64_t))
+                      ? (uint32_t *)sat__carve(&arena, workers * SAT__MAX_STRIP, sizeof(uint32_t))
                       : NULL;
     t->tallies = (sat__tally *)sat__carve(&arena, (size_t)t->bands * channels, sizeof(sat__tally));
     return arena.overflow ? 0 : arena.used;
@@ -3282,7 +3282,6 @@ SAT_DEF void sat_destroy(sat_table *table)
 #define SAT__SIGN_f32(v) (int32_t)sat__float_bits(v)
 #define SAT__SIGN_f64(v) (int32_t)sat__float_bits(v)
 #define SAT__SIGN_u32(v) 0
-#define SAT__SIGN_u64(v) 0
 
 #define SAT__DEFINE_SUM_ROW(suffix, type, pixel)                                                                       \
     static type sat__sum_row_plain_##suffix(type *out, type *column, const pixel *in, int n, type carry, int32_t *signs) \
@@ -3314,38 +3313,30 @@ SAT_DEF void sat_destroy(sat_table *table)
 SAT__DEFINE_SUM_ROW(f32, float, float)
 SAT__DEFINE_SUM_ROW(f64, double, float)
 SAT__DEFINE_SUM_ROW(u32, uint32_t, uint32_t)
-SAT__DEFINE_SUM_ROW(u64, uint64_t, uint64_t)
 
 #if defined(SAT__SSE2)
 typedef __m128 sat__vec_f32;
 typedef __m128d sat__vec_f64;
 typedef __m128i sat__vec_u32;
-typedef __m128i sat__vec_u64;
 #define SAT__LOAD_f32(p) _mm_loadu_ps(p)
 #define SAT__LOAD_f64(p) _mm_loadu_pd(p)
 #define SAT__LOAD_u32(p) _mm_loadu_si128((const __m128i *)(const void *)(p))
-#define SAT__LOAD_u64(p) _mm_loadu_si128((const __m128i *)(const void *)(p))
 #define SAT__PIXELS_f64(p) _mm_cvtps_pd(_mm_castsi128_ps(_mm_loadl_epi64((const __m128i *)(const void *)(p))))
 #define SAT__STORE_f32(p, v) _mm_storeu_ps(p, v)
 #define SAT__STORE_f64(p, v) _mm_storeu_pd(p, v)
 #define SAT__STORE_u32(p, v) _mm_storeu_si128((__m128i *)(void *)(p), v)
-#define SAT__STORE_u64(p, v) _mm_storeu_si128((__m128i *)(void *)(p), v)
 #define SAT__STREAM_f32(p, v) _mm_stream_ps(p, v)
 #define SAT__STREAM_f64(p, v) _mm_stream_pd(p, v)
 #define SAT__STREAM_u32(p, v) _mm_stream_si128((__m128i *)(void *)(p), v)
-#define SAT__STREAM_u64(p, v) _mm_stream_si128((__m128i *)(void *)(p), v)
 #define SAT__ADD_f32(a, b) _mm_add_ps(a, b)
 #define SAT__ADD_f64(a, b) _mm_add_pd(a, b)
 #define SAT__ADD_u32(a, b) _mm_add_epi32(a, b)
-#define SAT__ADD_u64(a, b) _mm_add_epi64(a, b)
 #define SAT__SET_f32(s) _mm_set1_ps(s)
 #define SAT__SET_f64(s) _mm_set1_pd(s)
 #define SAT__SET_u32(s) _mm_set1_epi32((int32_t)(s))
-#define SAT__SET_u64(s) _mm_set1_epi64x((int64_t)(s))
 #define SAT__LAST_f32(v) _mm_shuffle_ps(v, v, 255)
 #define SAT__LAST_f64(v) _mm_unpackhi_pd(v, v)
 #define SAT__LAST_u32(v) _mm_shuffle_epi32(v, 255)
-#define SAT__LAST_u64(v) _mm_unpackhi_epi64(v, v)
 /* within a vector: pairs, then the first pair's sum onto the second pair */
 static inline sat__vec_f32 sat__prefix_f32(sat__vec_f32 v)
 {
@@ -3358,37 +3349,29 @@ static inline sat__vec_u32 sat__prefix_u32(sat__vec_u32 v)
     return _mm_add_epi32(v, _mm_slli_si128(_mm_shuffle_epi32(v, 0x55), 8));
 }
 #define SAT__PREFIX_f64(v) _mm_add_pd(v, _mm_unpacklo_pd(_mm_setzero_pd(), v))
-#define SAT__PREFIX_u64(v) _mm_add_epi64(v, _mm_slli_si128(v, 8))
 #elif defined(SAT__NEON)
 typedef float32x4_t sat__vec_f32;
 typedef float64x2_t sat__vec_f64;
 typedef uint32x4_t sat__vec_u32;
-typedef uint64x2_t sat__vec_u64;
 #define SAT__LOAD_f32(p) vld1q_f32(p)
 #define SAT__LOAD_f64(p) vld1q_f64(p)
 #define SAT__LOAD_u32(p) vld1q_u32(p)
-#define SAT__LOAD_u64(p) vld1q_u64(p)
 #define SAT__PIXELS_f64(p) vcvt_f64_f32(vld1_f32(p))
 #define SAT__STORE_f32(p, v) vst1q_f32(p, v)
 #define SAT__STORE_f64(p, v) vst1q_f64(p, v)
 #define SAT__STORE_u32(p, v) vst1q_u32(p, v)
-#define SAT__STORE_u64(p, v) vst1q_u64(p, v)
 #define SAT__STREAM_f32(p, v) vst1q_f32(p, v)
 #define SAT__STREAM_f64(p, v) vst1q_f64(p, v)
 #define SAT__STREAM_u32(p, v) vst1q_u32(p, v)
-#define SAT__STREAM_u64(p, v) vst1q_u64(p, v)
 #define SAT__ADD_f32(a, b) vaddq_f32(a, b)
 #define SAT__ADD_f64(a, b) vaddq_f64(a, b)
 #define SAT__ADD_u32(a, b) vaddq_u32(a, b)
-#define SAT__ADD_u64(a, b) vaddq_u64(a, b)
 #define SAT__SET_f32(s) vdupq_n_f32(s)
 #define SAT__SET_f64(s) vdupq_n_f64(s)
 #define SAT__SET_u32(s) vdupq_n_u32(s)
-#define SAT__SET_u64(s) vdupq_n_u64(s)
 #define SAT__LAST_f32(v) vdupq_laneq_f32(v, 3)
 #define SAT__LAST_f64(v) vdupq_laneq_f64(v, 1)
 #define SAT__LAST_u32(v) vdupq_laneq_u32(v, 3)
-#define SAT__LAST_u64(v) vdupq_laneq_u64(v, 1)
 static inline sat__vec_u32 sat__prefix_u32(sat__vec_u32 v)
 {
     v = vaddq_u32(v, vreinterpretq_u32_u64(vshlq_n_u64(vreinterpretq_u64_u32(v), 32)));
@@ -3400,19 +3383,16 @@ static inline sat__vec_f32 sat__prefix_f32(sat__vec_f32 v)
     return vaddq_f32(v, vcombine_f32(vdup_n_f32(0), vdup_laneq_f32(v, 1)));
 }
 #define SAT__PREFIX_f64(v) vaddq_f64(v, vcombine_f64(vdup_n_f64(0), vdup_laneq_f64(v, 0)))
-#define SAT__PREFIX_u64(v) vaddq_u64(v, vcombine_u64(vdup_n_u64(0), vdup_laneq_u64(v, 0)))
 #endif
 
 #ifdef SAT__VECTOR
 #define SAT__PIXELS_f32(p) SAT__LOAD_f32(p)
 #define SAT__PIXELS_u32(p) SAT__LOAD_u32(p)
-#define SAT__PIXELS_u64(p) SAT__LOAD_u64(p)
 #define SAT__PREFIX_f32(v) sat__prefix_f32(v)
 #define SAT__PREFIX_u32(v) sat__prefix_u32(v)
 #define SAT__SIGNS_f32(p) all = sat__i32x4_or(all, sat__i32x4_or(sat__f32x4_bits(sat__f32x4_load(p)), sat__f32x4_bits(sat__f32x4_load((p) + 4))))
 #define SAT__SIGNS_f64(p) SAT__SIGNS_f32(p)
 #define SAT__SIGNS_u32(p)
-#define SAT__SIGNS_u64(p)
 
 /* Eight pixels are two vectors of four lanes ... */
 #define SAT__DEFINE_SUM_ROW_4(suffix, type, pixel)                                                                     \
@@ -3526,12 +3506,10 @@ SAT__DEFINE_SUM_ROW_4(f32, float, float)
 #endif
 SAT__DEFINE_SUM_ROW_4(u32, uint32_t, uint32_t)
 SAT__DEFINE_SUM_ROW_2(f64, double, float)
-SAT__DEFINE_SUM_ROW_2(u64, uint64_t, uint64_t)
 #else
 #define sat__sum_row_f32(out, column, in, n, carry, stream, signs) ((void)(stream), sat__sum_row_plain_f32(out, column, in, n, carry, signs))
 #define sat__sum_row_f64(out, column, in, n, carry, stream, signs) ((void)(stream), sat__sum_row_plain_f64(out, column, in, n, carry, signs))
 #define sat__sum_row_u32(out, column, in, n, carry, stream, signs) ((void)(stream), sat__sum_row_plain_u32(out, column, in, n, carry, signs))
-#define sat__sum_row_u64(out, column, in, n, carry, stream, signs) ((void)(stream), sat__sum_row_plain_u64(out, column, in, n, carry, signs))
 #endif
 
 /* ---- >> reading pixels */
@@ -3609,41 +3587,33 @@ static void sat__measure(const float *p, int n, sat__tally *tally)
 
 /* Rounds pixels / quantum to integers, modulo 2^32 or 2^64, ties to even: adding 1.5 * 2^52 leaves the integer in the
    low bits of a double. A quantum that is a power of two makes this exact but for that one rounding. */
-static void sat__quantise(const sat_table *t, uint64_t *out, const float *in, int n)
+static void sat__quantise(const sat_table *t, uint32_t *out, const float *in, int n)
 {
     const double magic = 6755399441055744.0, inverse = t->quantum > 0 ? 1 / t->quantum : 1;
-    uint64_t magic_bits, bits;
-    uint32_t *out32 = (uint32_t *)(void *)out;
-    int wide = t->options.kind == SAT_KIND_FIXED64, i = 0, exponent;
+    uint64_t bits;
+    int i = 0, exponent;
     double shifted;
     (void)exponent;
-    memcpy(&magic_bits, &magic, sizeof magic);
 #ifdef SAT__SSE2
-    if (!wide && frexp(inverse, &exponent) <= 0.5 && exponent > -100 &&
+    if (frexp(inverse, &exponent) <= 0.5 && exponent > -100 &&
         exponent < 100) { /* the product is exact in float, too */
         __m128 scale = _mm_set1_ps((float)inverse);
         for (; i + 4 <= n; i += 4)
-            _mm_storeu_si128((__m128i *)(void *)(out32 + i), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(in + i), scale)));
+            _mm_storeu_si128((__m128i *)(void *)(out + i), _mm_cvtps_epi32(_mm_mul_ps(_mm_loadu_ps(in + i), scale)));
     }
     for (; i + 4 <= n; i += 4) {
-        __m128 v = _mm_loadu_ps(in + i);
+        __m128 v = _mm_loadu_ps(in + i), low;
         __m128d scale = _mm_set1_pd(inverse), shift = _mm_set1_pd(magic);
-        __m128i a = _mm_castpd_si128(_mm_add_pd(_mm_mul_pd(_mm_cvtps_pd(v), scale), shift));
-        __m128i b = _mm_castpd_si128(_mm_add_pd(_mm_mul_pd(_mm_cvtps_pd(_mm_movehl_ps(v, v)), scale), shift));
-        if (wide) {
-            _mm_storeu_si128((__m128i *)(void *)(out + i), _mm_sub_epi64(a, _mm_castpd_si128(shift)));
-            _mm_storeu_si128((__m128i *)(void *)(out + i + 2), _mm_sub_epi64(b, _mm_castpd_si128(shift)));
-        } else {
-            __m128 low = _mm_shuffle_ps(_mm_castsi128_ps(a), _mm_castsi128_ps(b), _MM_SHUFFLE(2, 0, 2, 0));
-            _mm_storeu_si128((__m128i *)(void *)(out32 + i), _mm_castps_si128(low));
-        }
+        __m128d a = _mm_add_pd(_mm_mul_pd(_mm_cvtps_pd(v), scale), shift),
+                b = _mm_add_pd(_mm_mul_pd(_mm_cvtps_pd(_mm_movehl_ps(v, v)), scale), shift);
+        low = _mm_shuffle_ps(_mm_castpd_ps(a), _mm_castpd_ps(b), _MM_SHUFFLE(2, 0, 2, 0));
+        _mm_storeu_si128((__m128i *)(void *)(out + i), _mm_castps_si128(low));
     }
 #endif
     for (; i < n; i++) {
         shifted = (double)in[i] * inverse + magic;
         memcpy(&bits, &shifted, sizeof bits);
-        if (wide) out[i] = bits - magic_bits;
-        else out32[i] = (uint32_t)bits;
+        out[i] = (uint32_t)bits;
     }
 }
 
@@ -4015,11 +3985,12 @@ static sat__extent sat__extent_of(const float *p, int n, int side)
     return sat__gauge_extent(&g);
 }
 
-/* The extent of a tile's pixels up to `threshold`; of those above, `at` takes the places of the first `most`. Returns how
-   many there are, or most + 1 with *rest of no use. */
+/* The extent of a tile's pixels up to `threshold`; of those above, `at` takes the places of the first `most`. Returns
+   how many there are, or most + 1 with *rest of no use. */
 static int sat__extent_below(sat__extent *rest, const float *p, int n, int side, float threshold, int *at, int most)
 {
-    const sat__f32x4 limit = sat__f32x4_set1(threshold), zero = sat__f32x4_set1(0), huge = sat__f32x4_set1(3.4028235e38f);
+    const sat__f32x4 limit = sat__f32x4_set1(threshold), zero = sat__f32x4_set1(0),
+                     huge = sat__f32x4_set1(3.4028235e38f);
     sat__gauge g;
     sat__f32x4 sum = zero, largest = zero, smallest = huge, row = zero;
     int i, j, count = 0;
@@ -4604,7 +4575,6 @@ typedef union sat__carry {
     float f32;
     double f64;
     uint32_t u32;
-    uint64_t u64;
 } sat__carry;
 
 /* Row sums of pixels [x0, x0 + n) into a row of a flat table. */
@@ -4612,7 +4582,7 @@ static void sat__flat_piece(const sat_table *t, const sat_image *image, int chan
                             unsigned char *row, sat__carry *carry, int worker, int care, sat__tally *tally, int stream)
 {
     const float *in = sat__prepare(t, image, y, x0, n, channel, worker, care, tally);
-    uint64_t *integers = t->integers ? t->integers + (size_t)worker * SAT__MAX_STRIP : NULL;
+    uint32_t *integers = t->integers ? t->integers + (size_t)worker * SAT__MAX_STRIP : NULL;
     void *out = row + ((size_t)x0 + 1) * t->element,
          *column = t->columns + (size_t)channel * t->columns_stride + (size_t)x0 * t->element;
     int32_t signs = 0;
@@ -4623,11 +4593,8 @@ static void sat__flat_piece(const sat_table *t, const sat_image *image, int chan
         tally->overflow |= !sat__is_finite_double(carry->f64);
         break;
     case SAT_KIND_FIXED32:
-        carry->u32 = sat__sum_row_u32((uint32_t *)out, (uint32_t *)column, (uint32_t *)(void *)integers, n, carry->u32,
+        carry->u32 = sat__sum_row_u32((uint32_t *)out, (uint32_t *)column, integers, n, carry->u32,
                                       stream, &signs);
-        break;
-    case SAT_KIND_FIXED64:
-        carry->u64 = sat__sum_row_u64((uint64_t *)out, (uint64_t *)column, integers, n, carry->u64, stream, &signs);
         break;
     case SAT_KIND_TILED: break;
     case SAT_KIND_FLOAT:
@@ -4744,11 +4711,13 @@ static double sat__quantum_of_largest(double power, double least, double largest
 /* What a fixed-point box sum may reach, in quanta, divided by the pixels of a box. */
 static double sat__fixed_range(const sat_table *t)
 {
-    double most = t->options.kind == SAT_KIND_FIXED32 ? 2147483647.0 : 9223372036854774784.0;
+    double most = 2147483647.0;
     double table = (double)t->width * (double)t->height, area = t->options.max_box_area;
     if (!(area > 0) || (area > table && most / area < 1.5)) area = table; /* no box is larger than the table */
     return most / area - 0.5;
 }
+
+static int sat__is_whole(const sat_image *image) { return image->format == SAT_U8 || image->format == SAT_U16; }
 
 /* Settles the largest value a pixel may have and the quantum. Limits keep every float sum finite. */
 static sat_result sat__resolve(sat_table *t, const sat_image *image)
@@ -4758,6 +4727,7 @@ static sat_result sat__resolve(sat_table *t, const sat_image *image)
     t->limit = t->options.kind == SAT_KIND_FLOAT ? float_max / 2147483648.0 : float_max;
     if (t->options.subtract_mean) t->limit /= 2;
     if (t->options.max_value > 0 && t->options.max_value < t->limit) t->limit = t->options.max_value;
+    t->exact = sat__is_whole(image) && floor(t->limit) == t->limit;
     if (!sat__is_fixed(t->options.kind)) return SAT_OK;
     range = sat__fixed_range(t);
     if (range > 1125899906842624.0) range = 1125899906842624.0; /* 2^50: what sat__quantise can round */
@@ -4916,6 +4886,7 @@ SAT_DEF sat_result sat_update(sat_table *table, const sat_image *image, int x0, 
     if (x0 < 0 || y0 < 0 || x1 > table->width || y1 > table->height || x0 > x1 || y0 > y1) return SAT_ERR_ARGUMENT;
     if (x0 == x1 || y0 == y1) return SAT_OK;
     if (table->options.kind != SAT_KIND_TILED || table->refused) return sat_build(table, image);
+    table->exact = table->exact && sat__is_whole(image);
     return sat__rebuild(table, image, y0 >> table->shift, ((y1 - 1) >> table->shift) + 1);
 }
 
@@ -4971,10 +4942,6 @@ static inline double sat__rows_sum(const sat_table *t, sat_kind kind, const sat_
     case SAT_KIND_FIXED32: {
         const uint32_t *low = (const uint32_t *)r->low, *high = (const uint32_t *)r->high;
         return (double)(int32_t)(high[x1] - high[x0] - low[x1] + low[x0]) * t->quantum;
-    }
-    case SAT_KIND_FIXED64: {
-        const uint64_t *low = (const uint64_t *)r->low, *high = (const uint64_t *)r->high;
-        return (double)(int64_t)(high[x1] - high[x0] - low[x1] + low[x0]) * t->quantum;
     }
     }
     if (t->options.subtract_mean) sum += (double)t->mean[channel] * ((double)(x1 - x0) * (double)height);
@@ -5050,7 +5017,6 @@ SAT_DEF void sat_sums(double *out, const sat_table *table, int channel, const in
     case SAT_KIND_FLOAT: sat__sums(out, table, SAT_KIND_FLOAT, channel, boxes, count); break;
     case SAT_KIND_DOUBLE: sat__sums(out, table, SAT_KIND_DOUBLE, channel, boxes, count); break;
     case SAT_KIND_FIXED32: sat__sums(out, table, SAT_KIND_FIXED32, channel, boxes, count); break;
-    case SAT_KIND_FIXED64: sat__sums(out, table, SAT_KIND_FIXED64, channel, boxes, count); break;
     }
 }
 
@@ -5411,7 +5377,6 @@ static void sat__filter_row(float *out, const sat_table *t, const sat__rows *row
     case SAT_KIND_FLOAT: sat__filter_kind(out, t, SAT_KIND_FLOAT, rows, channel, radius, height); break;
     case SAT_KIND_DOUBLE: sat__filter_kind(out, t, SAT_KIND_DOUBLE, rows, channel, radius, height); break;
     case SAT_KIND_FIXED32: sat__filter_kind(out, t, SAT_KIND_FIXED32, rows, channel, radius, height); break;
-    case SAT_KIND_FIXED64: sat__filter_kind(out, t, SAT_KIND_FIXED64, rows, channel, radius, height); break;
     }
 }
 
@@ -5505,11 +5470,10 @@ static double sat__sum_bound(const sat_table *t, const sat__tally *total, double
     switch (t->options.kind) {
     case SAT_KIND_FLOAT: return 4 * u * 1.01 * sat__roundings(height, width) * all + lowered + doubles;
     case SAT_KIND_DOUBLE: return 4 * v * sat__roundings(height, width) * all + lowered + doubles;
-    case SAT_KIND_FIXED32:
-    case SAT_KIND_FIXED64: return area * (0.5 * t->quantum + 4 * v * t->limit);
+    case SAT_KIND_FIXED32: return area * (0.5 * t->quantum + 4 * v * t->limit);
     case SAT_KIND_TILED: break;
     }
-    return area * 0.5 * total->tile_largest + doubles;
+    return (t->exact ? 0 : area * 0.5 * total->tile_largest) + doubles;
 }
 
 SAT_DEF double sat_error_bound(const sat_table *table, int channel, int box_width, int box_height)
@@ -5561,7 +5525,7 @@ SAT_DEF double sat_error_bound_box(const sat_table *table, int channel, int x0, 
             int h = sat__min_int(y1, (ty + 1) << t->shift) - sat__max_int(y0, ty << t->shift);
             sum += 0.5 * (tile->slot ? sat__wide_quantum(tile) : tile->quantum) * ((double)w * h);
         }
-    return (sum + sat__box_doubles(t, channel, x0, y0, x1, y1)) / area;
+    return ((t->exact ? 0 : sum) + sat__box_doubles(t, channel, x0, y0, x1, y1)) / area;
 }
 
 /* The last rounding of each corner is independent of the others, and so are those that the corners of a box do not
@@ -5611,8 +5575,7 @@ static void sat__survey(sat_table *t, const sat_image *image, double *tile_sums,
 static sat_result sat__plan(sat_kind *kind, int whole, const sat_image *image, int box_width, int box_height,
                             double max_relative_error, size_t max_bytes, const sat_options *options)
 {
-    static const sat_kind cheapest_first[] = {SAT_KIND_FLOAT, SAT_KIND_FIXED32, SAT_KIND_TILED, SAT_KIND_DOUBLE,
-                                              SAT_KIND_FIXED64};
+    static const sat_kind cheapest_first[] = {SAT_KIND_FLOAT, SAT_KIND_FIXED32, SAT_KIND_TILED, SAT_KIND_DOUBLE};
     sat_options resolved = options ? *options : sat_defaults();
     sat_table *survey, t;
     double allowed, area, best = -1, *tile_sums, largest_tile = 0;
@@ -5634,7 +5597,7 @@ static sat_result sat__plan(sat_kind *kind, int whole, const sat_image *image, i
     area = (double)box_width * box_height;
     allowed = max_relative_error * survey->total[0].sum_abs / ((double)image->width * image->height * image->channels);
     result = SAT_ERR_LIMIT;
-    for (i = 0; i < 5 && result; i++) {
+    for (i = 0; i < (int)SAT__COUNT(cheapest_first) && result; i++) {
         double error;
         t = *survey;
         t.options.kind = cheapest_first[i];

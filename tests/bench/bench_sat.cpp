@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #endif
 
-static const char *const kind_names[] = {"tiled", "float", "double", "fixed32", "fixed64"};
+static const char *const kind_names[] = {"tiled", "float", "double", "fixed32"};
 
 /* ---- pictures: constant, uniform, 14 decades in patches of 128 pixels, uniform with one pixel of 1e8 */
 
@@ -100,7 +100,7 @@ static void bench_build(void)
         make_picture(p, n, UNIFORM);
         memset(to, 1, pixels * 8);
         memset(from, 1, pixels * 8);
-        for (int k = 0; k < 5; k++) {
+        for (int k = 0; k < 4; k++) {
             sat_options o = sat_defaults();
             build_work w;
             copy_work c;
@@ -114,7 +114,7 @@ static void bench_build(void)
             c.from = from;
             /* a copy of b bytes moves 2 b: read 4 bytes a pixel, write 4 (4.5, 8) */
             c.bytes = (size_t)((double)pixels *
-                               (4 + (k == SAT_KIND_DOUBLE || k == SAT_KIND_FIXED64 ? 8
+                               (4 + (k == SAT_KIND_DOUBLE ? 8
                                      : k == SAT_KIND_TILED                         ? 4.5
                                                                                    : 4)) /
                                2);
@@ -122,7 +122,7 @@ static void bench_build(void)
 #ifdef HAVE_OPENCV
             cv::setNumThreads(1);
             peer = 1 / bench_ratio(build, &w,
-                                   k == SAT_KIND_DOUBLE || k == SAT_KIND_FIXED64 ? integrate_f64 : integrate_f32, &w,
+                                   k == SAT_KIND_DOUBLE ? integrate_f64 : integrate_f32, &w,
                                    bench_rounds(n > 5000 ? 7 : 21))
                            .ratio;
 #endif
@@ -151,7 +151,7 @@ static const representation representations[] = {
     {"tiled 8", SAT_KIND_TILED, 8, 0},     {"tiled 16", SAT_KIND_TILED, 16, 0},
     {"tiled 32", SAT_KIND_TILED, 32, 0},   {"tiled 64", SAT_KIND_TILED, 64, 0},
     {"tiled 128", SAT_KIND_TILED, 128, 0}, {"double", SAT_KIND_DOUBLE, 32, 0},
-    {"fixed32", SAT_KIND_FIXED32, 32, 0},  {"fixed64", SAT_KIND_FIXED64, 32, 0},
+    {"fixed32", SAT_KIND_FIXED32, 32, 0},
 };
 
 enum { BOXES = 5, MOST = 20000 };
@@ -369,10 +369,10 @@ static void bench_lookups(void)
     int n = bench_smoke() ? 256 : bench_quick() ? 2048 : 4096;
     float *p = (float *)malloc((size_t)n * (size_t)n * 4);
     int *x = (int *)malloc(LOOKUPS * sizeof(int)), *y = (int *)malloc(LOOKUPS * sizeof(int));
-    sat_table *tables[5];
+    sat_table *tables[4];
     make_picture(p, n, UNIFORM);
     sat_image image = sat_image_f32(p, n, n, 1);
-    for (int k = 0; k < 5; k++) {
+    for (int k = 0; k < 4; k++) {
         sat_options o = sat_defaults();
         o.kind = (sat_kind)k;
         if (sat_create(&tables[k], n, n, 1, &o) == SAT_OK) sat_build(tables[k], &image);
@@ -396,7 +396,7 @@ static void bench_lookups(void)
                         by_hand = {tables[SAT_KIND_DOUBLE], x, y, radii[r], 0, NULL, NULL};
             double hand =
                 bench_ratio(look_up_by_hand<double>, &by_hand, look_up_by_hand<float>, &peer, bench_rounds(11)).ratio;
-            for (int k = 0; k < 5; k++) {
+            for (int k = 0; k < 4; k++) {
                 lookup_work work = {tables[k], x, y, radii[r], 0, boxes, sums};
                 double ratio[3];
                 bench_fn *ways[3] = {look_up, look_up_many, look_up_view};
@@ -406,7 +406,7 @@ static void bench_lookups(void)
                           ratio[0], ratio[1], ratio[2], hand, k == 0);
             }
         }
-    for (int k = 0; k < 5; k++) sat_destroy(tables[k]);
+    for (int k = 0; k < 4; k++) sat_destroy(tables[k]);
     free(p);
     free(x);
     free(y);
@@ -454,7 +454,7 @@ static void bench_blur(void)
     cv::setNumThreads(1);
     bench_table("Box filter of a whole image: time against cv::blur",
                 "kind\tradius\tside\ttime_blur_ratio\ttime_with_build_blur_ratio\tdefault");
-    for (int k = 0; k < 5; k++) {
+    for (int k = 0; k < 4; k++) {
         sat_options o = sat_defaults();
         sat_table *t;
         o.kind = (sat_kind)k;
@@ -606,7 +606,7 @@ static void bench_whole_images(void)
     bench_table("Whole images: time against a build of the same table",
                 "kind\twork\tside\ttime_build_ratio\tspeedup\tdefault");
     bench_note("update: 64 x 64 pixels changed in the middle (and in the last corner); box: sat_box_filter with this radius");
-    for (int k = 0; k < 5; k++) {
+    for (int k = 0; k < 4; k++) {
         sat_options o = sat_defaults();
         build_work w;
         o.kind = (sat_kind)k;
@@ -711,7 +711,7 @@ static void bench_bounds(void)
     bench_note("0: the measured error is 0");
     for (int which = 0; which < PICTURES; which++) {
         make_picture(p, n, which);
-        for (int k = 0; k < 5; k++) {
+        for (int k = 0; k < 4; k++) {
             sat_options o = sat_defaults();
             sat_table *t;
             o.kind = (sat_kind)k;
