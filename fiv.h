@@ -48,7 +48,7 @@
    WHAT IT DOES NOT
    Receivers are diffuse; light comes from infinitely far away; light reflected between objects is not there; nothing
    within a mesh is transparent. Meshes are not loaded. Occluders that deform need new masks (lazy: only those in use)
-   and have no views: they leak at contact, but for own masks.
+   and, unless contact_map asks for them, have no views: they leak at contact, but for own masks.
    OpenGL has FIV_SCALED with views, depth maps of suns and self-shadows; not FIV_MASK, own masks, rays where a sharp
    sun's map is not sure, cutoff and statistics. Vectors, masks and maps are made on the CPU.
 
@@ -254,8 +254,9 @@ typedef struct fiv_occluder_options {
     int sun_map;             /* 512; 64..4096; side of the square in which all split-off lights have their depth maps:
                                 one light the whole of it, two to four a quarter each, five to nine a ninth ... */
     int contact_map;         /* -1; -1..256; side of each of the 384 depth maps along fixed directions that answer near
-                                contact and on the mesh itself: 0, and lazy: none; 8..256; -1: 64 texels, with 64
-                                azimuths or more 128, which is where the error of resting meshes ends (1.6, 6.3 MB) */
+                                contact and on the mesh itself: 0: none; 8..256; -1: 64 texels (1.6 MB), with 64
+                                azimuths or more 128, where the error of resting meshes ends; none when lazy, since
+                                each deformation draws them anew (30 to 160 ms) */
     fiv_progress_fn *progress;     /* NULL */
     void *progress_user;
     sat_allocator allocator; /* malloc; not used after create */
@@ -385,7 +386,8 @@ FIV_DEF sat_result fiv_self_irradiance(float *rgb, const float *points, const fl
    Deforming occluders (options.lazy)
    ------------------------------------------------------------------------------------------------ */
 
-/* New vertex positions (as many as at creation, NULL: the same): all samples become stale. No allocation. */
+/* New vertex positions (as many as at creation, NULL: the same): all samples become stale; views are drawn anew where
+   contact_map was asked for. No allocation. */
 FIV_DEF sat_result fiv_occluder_invalidate(fiv_occluder *occluder, const float *positions);
 /* Computes the stale samples that these receivers touch through the instances of this occluder. *computed (may be NULL)
    says how many. Needs a preceding fiv_occluder_light. No allocation. */
@@ -2284,8 +2286,7 @@ static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
     o->keep_masks = options->keep_masks != 0;
     o->lazy = options->lazy != 0;
     o->map_side = options->sun_map;
-    o->contact_side = options->contact_map >= 0 ? options->contact_map : options->theta < 64 ? 64 : 128;
-    if (o->lazy) o->contact_side = 0;
+    o->contact_side = options->contact_map >= 0 ? options->contact_map : o->lazy ? 0 : options->theta < 64 ? 64 : 128;
     for (k = 0; k < FIV__VIEWS; k++) {
         float t = o->view_tangent[k] = fiv__texel_coordinate(k, FIV__VIEWS);
         o->view_scale[k] = 0.5f * (float)(o->contact_side - 2) / sqrtf(1 + t * t);
@@ -3014,7 +3015,10 @@ FIV_DEF sat_result fiv_occluder_invalidate(fiv_occluder *o, const float *positio
         const float *p = positions + 3 * (size_t)o->mesh.source[i];
         if (!sat__is_finite(p[0]) || !sat__is_finite(p[1]) || !sat__is_finite(p[2])) return SAT_ERR_ARGUMENT;
     }
-    if (positions && o->mesh.vertex_count) result = fiv__take_positions(o, positions);
+    if (positions && o->mesh.vertex_count) {
+        result = fiv__take_positions(o, positions);
+        fiv__draw_contact(o);
+    }
 #ifndef FIV_NO_DELTA
     sat__parallel_for(&o->threads, o->light_count, fiv__draw_maps, o);
 #endif
