@@ -127,7 +127,9 @@
    >> samples        shells, grids, cells
    >> occluders      creation, support function, depth maps, views, all masks
    >> lighting       depth maps of the lights, light around the views, vectors
-   >> lookups        one occluder above one receiver: vectors, views, own masks, lights
+   >> lookups        vectors between samples; where they are not enough
+   >> views          the light around a receiver, by depth maps, or by rays to few triangles
+   >> shadows        what one occluder takes from one receiver: own masks, lights, the horizon
    >> receivers      several occluders, tiles, self-shadows, lazy samples
    >> saves          saving and loading
    >> shaders        GLSL
@@ -447,7 +449,8 @@ typedef struct fiv_gl_view {
 } fiv_gl_view;
 
 /* Irradiance of every pixel, in the target `to`, or, when NULL, in fiv_gl_texture() (RGBA32F). `points` and `normals`
-   are float textures of world coordinates, at least of the created size (from to->from on); a normal of 0 gives 0. With
+   are float textures of world coordinates, at least of the created size (from to->from on), or of the size that `to`
+   names, which may be smaller each frame; a normal of 0 gives 0. With
    a view, `points` is a depth texture without comparison instead. With options.self an alpha says what a receiver lies
    on, that of `points`, with a view that of `normals`: 2 + i the surface of instance i, which shadows itself as in
    fiv_self_irradiance; any other value, such as the 1 of RGB textures, nothing that casts shadows. */
@@ -645,6 +648,12 @@ static inline void fiv__normalise(float out[3], const float v[3])
     out[0] = x[0] / length;
     out[1] = x[1] / length;
     out[2] = x[2] / length;
+}
+
+static inline void fiv__cross(float out[3], const float a[3], const float b[3])
+{
+    int k;
+    for (k = 0; k < 3; k++) out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
 }
 
 /* out = m v, and out = transpose(m) v */
@@ -2225,7 +2234,8 @@ enum {
     FIV__SUPPORT = 33,  /* side of the octahedral table of the support function */
     FIV__BATCH = 256,   /* masks between two calls of the progress function */
     FIV__VIEWS = 8,     /* fixed directions along an edge of the cube */
-    FIV__ALL_VIEWS = 6 * FIV__VIEWS * FIV__VIEWS
+    FIV__ALL_VIEWS = 6 * FIV__VIEWS * FIV__VIEWS,
+    FIV__FEW = 32       /* triangles that rays along all views take less time to meet than depth maps to say so */
 };
 enum { FIV__VALID, FIV__INSIDE, FIV__STALE, FIV__WANTED };
 
@@ -2250,6 +2260,7 @@ struct fiv_occluder {
     int map_side, cell_side, cells;              /* of the depth maps; of the cell of one; cells along the side */
     uint16_t *map;                               /* map_side^2 */
     float light_axes[FIV_MAX_LIGHTS][3][3];      /* right, up, towards the light, in the occluder's frame */
+    int few;               /* triangles: rays along the views in place of depth maps */
     int contact_side;      /* of the depth map of a view; 0: none */
     uint8_t *contact;      /* of all views: FIV__VIEWS beside each other, 6 FIV__VIEWS below each other */
     float view_tangent[FIV__VIEWS], view_scale[FIV__VIEWS]; /* of a column or row of views; texels a radius */
@@ -2295,7 +2306,7 @@ static void fiv__set_grid(fiv_occluder *o, const fiv_occluder_options *options)
 
 static size_t fiv__contact_bytes(const fiv_occluder *o)
 {
-    return (size_t)FIV__ALL_VIEWS * (size_t)o->contact_side * (size_t)o->contact_side;
+    return o->few ? 0 : (size_t)FIV__ALL_VIEWS * (size_t)o->contact_side * (size_t)o->contact_side;
 }
 
 /* Arrays of its own; those of a share's masks are set by the caller. */
@@ -2555,9 +2566,33 @@ static void fiv__draw_views(int begin, int end, int worker, void *context)
     }
 }
 
+/* Of an occluder of few triangles their corners, in the frame of the views; returns how many triangles. */
+static int fiv__few_corners(float corners[FIV__FEW][3][3], const fiv_occluder *o)
+{
+    const fiv__mesh *m = &o->mesh;
+    size_t i;
+    int t, j, k, count = 0;
+    for (i = 0; i < m->cluster_count; i++)
+        for (t = 0; t < m->clusters[i].triangles; t++, count++)
+            for (j = 0; j < 3; j++) {
+                const fiv__cluster *c = &m->clusters[i];
+                size_t v = c->vertex + m->corner[3 * (c->triangle + (size_t)t) + (size_t)j];
+                float p[3];
+                for (k = 0; k < 3; k++) p[k] = m->x[k][v];
+                fiv__turn(corners[count][j], fiv__view_frame, p);
+            }
+    return count;
+}
+
 static void fiv__draw_contact(fiv_occluder *o)
 {
+    float corners[FIV__FEW][3][3];
     if (!o->contact_side) return;
+    if (o->few) {
+        size_t n = (size_t)fiv__few_corners(corners, o);
+        o->view_signature = fiv__hash(FIV__HASH, corners, n * sizeof corners[0]);
+        return;
+    }
     sat__parallel_for(&o->threads, FIV__ALL_VIEWS, fiv__draw_views, o);
     o->view_signature = fiv__hash(FIV__HASH, o->contact, fiv__contact_bytes(o));
 }
@@ -2733,6 +2768,7 @@ FIV_DEF sat_result fiv_occluder_create(fiv_occluder **out, const float *position
     if (!sat__resolve_allocator(&from.allocator, &o.allocator)) return SAT_ERR_ARGUMENT;
     from.threads = o.threads;
     fiv__set_grid(&from, &o);
+    from.few = triangle_count <= FIV__FEW;
     result = fiv__allocate_occluder(&made, &from);
     if (result) return result;
     made->mesh.source_count = vertex_count;
@@ -3146,6 +3182,8 @@ static void fiv__take_nearest(fiv__cell *cell)
    not. Such a receiver gets a mask of its own. */
 
 #define FIV__CONTACT 2.0f /* sr */
+#define FIV__BELOW 1e-4f  /* radii; from so far below a receiver masks and rays see what lies in its plane, such as the
+                             lowest triangles of what stands there, above it */
 
 static int fiv__is_contact(const fiv_occluder *o, const fiv__cell *cell, const float offset[3])
 {
@@ -3166,6 +3204,8 @@ static float fiv__contact_part(const fiv_occluder *o, const fiv__cell *cell, flo
     return part > 0 ? (part < 1 ? part : 1) : 0;
 }
 
+/* >> views */
+
 /* A column, or a row, of the texels around a point, and its part of the way to the next one. The outermost texels are
    empty. */
 static inline float fiv__view_texel(int *texel, float at, int side)
@@ -3173,6 +3213,39 @@ static inline float fiv__view_texel(int *texel, float at, int side)
     at = at > 0 ? (at < (float)(side - 1) ? at : (float)(side - 1)) : 0;
     *texel = sat__min_int((int)at, side - 2);
     return at - (float)*texel;
+}
+
+/* From how far above the surface a receiver on it looks: two texels. */
+static float fiv__view_lift(const fiv_occluder *o) { return o->few ? 1e-3f : 2 / (float)(o->contact_side - 2); }
+
+/* Of few triangles: which rays along the views meet one, a bit each. All rays through a triangle lie on one side of the
+   three planes through the receiver and its edges; of a closed mesh the triangles that are seen from behind do. */
+static void fiv__trace_views(uint64_t hit[6], const fiv_occluder *o, const float offset[3], const float normal[3])
+{
+    float corners[FIV__FEW][3][3], side[3][3], turn, volume;
+    int count = fiv__few_corners(corners, o), face, t, j, k, x, y;
+    memset(hit, 0, 6 * sizeof *hit);
+    for (t = 0; t < count; t++) {
+        for (j = 0; j < 3; j++)
+            for (k = 0; k < 3; k++) corners[t][j][k] += offset[k] + FIV__BELOW * normal[k];
+        for (j = 0; j < 3; j++) fiv__cross(side[j], corners[t][j], corners[t][(j + 1) % 3]);
+        volume = fiv__dot(corners[t][2], side[0]);
+        turn = volume > 0 ? 1.0f : -1.0f;
+        if (volume == 0 || (o->mesh.closed && turn != o->mesh.turn)) continue;
+        for (face = 0; face < 6; face++) {
+            fiv__axes ax = fiv__face_axes(face);
+            for (y = 0; y < FIV__VIEWS; y++) {
+                float along[3], v = fiv__texel_coordinate(y, FIV__VIEWS);
+                for (j = 0; j < 3; j++) along[j] = turn * (side[j][ax.w] * ax.sign + side[j][ax.v] * v);
+                for (x = 0; x < FIV__VIEWS; x++) {
+                    float u = turn * o->view_tangent[x];
+                    int meets = along[0] + side[0][ax.u] * u >= 0 && along[1] + side[1][ax.u] * u >= 0 &&
+                                along[2] + side[2][ax.u] * u >= 0;
+                    hit[face] |= (uint64_t)meets << (FIV__VIEWS * y + x);
+                }
+            }
+        }
+    }
 }
 
 /* Sums over all views, a lane a column. */
@@ -3185,6 +3258,7 @@ typedef struct fiv__facing {
     int side, column[FIV__VIEWS], beyond; /* texels; bytes above it stand between the receiver and the light */
     float part[FIV__VIEWS], up[FIV__VIEWS];
     const float *normal;
+    const uint64_t *hit;   /* in place of depth maps */
 } fiv__facing;
 
 /* 0..1: bilinear between the comparisons at four texels. */
@@ -3213,16 +3287,17 @@ static inline void fiv__add_channel(float all[FIV__VIEWS], float taken[FIV__VIEW
 }
 
 /* A row of views. `row`: the texels around the receiver's height; light: the first view's. */
-static void fiv__add_views(fiv__around *sum, const fiv__facing *f, const uint8_t *row, float down, float height,
+static void fiv__add_views(fiv__around *sum, const fiv__facing *f, int y, const uint8_t *row, float down, float height,
                            const float *light)
 {
     float covered[FIV__VIEWS], over[FIV__VIEWS];
     int x, c;
     for (x = 0; x < FIV__VIEWS; x++) {
         over[x] = height + f->up[x] > 0 ? 1.0f : 0.0f;
-        covered[x] = over[x] > 0 ? fiv__view_covered(row + x * f->side + f->column[x], FIV__VIEWS * f->side, f->beyond,
-                                                     f->part[x], down)
-                                 : 0;
+        if (!(over[x] > 0)) covered[x] = 0;
+        else if (f->hit) covered[x] = (float)(*f->hit >> (FIV__VIEWS * y + x) & 1);
+        else covered[x] = fiv__view_covered(row + x * f->side + f->column[x], FIV__VIEWS * f->side, f->beyond,
+                                            f->part[x], down);
     }
     for (c = 0; c < 3; c++)
         fiv__add_channel(sum->all[c], sum->taken[c], light + 3 * c * FIV__ALL_VIEWS, f->normal, over, covered);
@@ -3235,6 +3310,7 @@ static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o
                              const float upwards[3], const float diffuse[3])
 {
     float offset[3], normal[3];
+    uint64_t hit[6];
     int side = o->contact_side, face, x, y, c;
     float shift = 0.5f * (float)(side - 1), least = 0.5f / (float)(side - 2), all[3] = {0, 0, 0};
     const float *tangent = o->view_tangent, *scale = o->view_scale;
@@ -3243,6 +3319,7 @@ static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o
     memset(&sum, 0, sizeof sum);
     fiv__turn(offset, fiv__view_frame, from);
     fiv__turn(normal, fiv__view_frame, upwards);
+    if (o->few) fiv__trace_views(hit, o, offset, normal);
     f.side = side;
     f.normal = normal;
     for (face = 0; face < 6; face++) {
@@ -3250,6 +3327,7 @@ static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o
         float depth = -offset[ax.w] * ax.sign, ahead = normal[ax.w] * ax.sign, reach = 1 + (depth + least + 1) * 127;
         float wide = fabsf(normal[ax.u]);
         if (ahead + wide + fabsf(normal[ax.v]) <= 0) continue;
+        f.hit = o->few ? &hit[face] : NULL;
         f.beyond = reach > 0 ? (reach < 255 ? (int)reach : 255) : 0;
         for (x = 0; x < FIV__VIEWS; x++) {
             f.part[x] = fiv__view_texel(&f.column[x], (-offset[ax.u] - depth * tangent[x]) * scale[x] + shift, side);
@@ -3260,8 +3338,8 @@ static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o
             float height = ahead + normal[ax.v] * tangent[y];
             float down = fiv__view_texel(&line, (-offset[ax.v] - depth * tangent[y]) * scale[y] + shift, side);
             if (height + wide <= 0) continue;
-            fiv__add_views(&sum, &f, o->contact + (size_t)(row * side + line) * (size_t)(FIV__VIEWS * side), down,
-                           height, o->contact_light + row * FIV__VIEWS);
+            fiv__add_views(&sum, &f, y, o->contact + (o->few ? 0 : (size_t)((row * side + line) * FIV__VIEWS * side)),
+                           down, height, o->contact_light + row * FIV__VIEWS);
         }
     }
     *angle = 0;
@@ -3275,6 +3353,8 @@ static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o
         taken[c] = all[c] > 0 ? diffuse[c] * (taken[c] / all[c]) : 0;
     }
 }
+
+/* >> shadows */
 
 /* The integral over the texels of a mask above the horizon. */
 static void fiv__integrate_mask(double sum[FIV__TERMS], const uint64_t *rows, const double *sums, const float normal[3],
@@ -3454,6 +3534,7 @@ static const fiv__own *fiv__own_mask(fiv__receiver *r, const fiv_instance *insta
     fiv__normalise(normal, r->normals + 3 * i);
     fiv__turn_back(normal, o->rotation, normal);
     fiv__place(offset, world, &distance, instance, r->points + 3 * i);
+    for (k = 0; k < 3; k++) offset[k] += FIV__BELOW * normal[k];
     fiv__raster_mesh(rows, &o->mesh, offset, o->face, normal);
     fiv__integrate_mask(sum, rows, o->sums, normal, o->face);
     for (k = 0; k < FIV__TERMS; k++) own->v[k] = (float)sum[k];
@@ -4155,7 +4236,7 @@ static void fiv__self_samples(float rgb[3], const fiv__receiver *r, const fiv_oc
 static void fiv__self_views(float rgb[3], const fiv__receiver *r, const fiv_occluder *o, const float offset[3],
                             const float normal[3])
 {
-    float lifted[3], angle, lift = 2 / (float)(o->contact_side - 2);
+    float lifted[3], angle, lift = fiv__view_lift(o);
     int k;
     for (k = 0; k < 3; k++) lifted[k] = offset[k] - normal[k] * lift;
     fiv__look_around(rgb, &angle, o, lifted, normal, r->diffuse);
@@ -4385,6 +4466,7 @@ static int fiv__read_header(fiv_occluder *from, fiv__save *s, const unsigned cha
     fiv__set_grid(from, &o);
     samples = fiv__grid_samples(&from->grid);
     if (s->triangles > 0x7fffffff / 3 || s->clusters < 0) return 0;
+    from->few = s->triangles + s->skipped <= FIV__FEW;
     if (s->vertices > 3 * s->triangles + 4 * (uint64_t)s->clusters) return 0;
     if ((uint64_t)s->clusters != (s->triangles + FIV__CLUSTER - 1) / FIV__CLUSTER) return 0;
     if ((s->turn != 1 && s->turn != -1) || (s->closed != 0 && s->closed != 1)) return 0;
@@ -4529,7 +4611,8 @@ extern "C" {
    once more at the end. fiv_support: the support function, a field an occluder. fiv_maps: depth maps of the lights,
    four occluders side by side. fiv_scene: a row an instance, see fiv__gl_row and fiv__gl_light; two texels a light in
    the row behind them. fiv_diffuse: I_tot at the corners of the cube. fiv_views: the depth maps of the views, a layer
-   an occluder; fiv_view_light: the light around each, three rows an occluder, the solid angle in the first's alpha. */
+   an occluder; fiv_view_light: the light around each, three rows an occluder, the solid angle in the first's alpha, and
+   a fourth with the corners of few triangles. */
 static const char fiv__glsl_cube[] =
     "#ifndef FIV_GLSL\n"
     "#define FIV_GLSL\n"
@@ -4633,13 +4716,37 @@ static const char fiv__glsl_views[] =
             return mix(low.x, low.y, f.x);
         })
     SAT__GLSL(
+        void fiv_trace(int instance, vec3 p, inout uint hit[12]) {
+            int row = 4 * int(fiv_row(instance, 3).w) + 3, count = int(fiv_row(instance, 9).w);
+            float closed = fiv_row(instance, 10).w;
+            for (int i = 0; i < count; i++) {
+                vec3 a = texelFetch(fiv_view_light, ivec2(3 * i, row), 0).xyz - p;
+                vec3 b = texelFetch(fiv_view_light, ivec2(3 * i + 1, row), 0).xyz - p;
+                vec3 c = texelFetch(fiv_view_light, ivec2(3 * i + 2, row), 0).xyz - p;
+                float turn = sign(dot(cross(a, b), c));
+                if (turn == 0.0 || closed * turn < 0.0) continue;
+                mat3 sides = turn * mat3(cross(a, b), cross(b, c), cross(c, a));
+                for (int j = 0; j < 384; j++) {
+                    int face = j >> 6;
+                    vec3 d = vec3((2.0 * vec2(j & 7, j >> 3 & 7) + 1.0) / 8.0 - 1.0, 1.0);
+                    if ((face & 1) != 0) d = vec3(d.yx, -1.0);
+                    d = face < 2 ? d.zxy : face < 4 ? d.yzx : d;
+                    if (all(greaterThanEqual(d * sides, vec3(0.0)))) hit[j >> 5] |= 1u << (j & 31);
+                }
+            }
+        })
+    SAT__GLSL(
         vec4 fiv_around(int instance, vec3 p, vec3 n, vec3 open) {
             int slot = int(fiv_row(instance, 3).w);
+            bool few = fiv_row(instance, 9).w >= 0.0;
+            uint hit[12];
+            for (int k = 0; k < 12; k++) hit[k] = 0u;
             float side = fiv_row(instance, 8).w, angle = 0.0;
             vec3 all = vec3(0.0), taken = vec3(0.0);
             mat3 turn = mat3(fiv_row(instance, 9).xyz, fiv_row(instance, 10).xyz, fiv_row(instance, 11).xyz);
             p = turn * p;
             n = turn * n;
+            if (few) fiv_trace(instance, p - 1e-4 * n, hit);
             for (int face = 0; face < 6; face++) {
                 bool back = (face & 1) != 0;
                 vec3 q = face < 2 ? p.yzx : face < 4 ? p.zxy : p, m = face < 2 ? n.yzx : face < 4 ? n.zxy : n;
@@ -4649,9 +4756,10 @@ static const char fiv__glsl_views[] =
                 for (int y = 0; y < 8; y++) for (int x = 0; x < 8; x++) {
                     vec2 t = (2.0 * vec2(x, y) + 1.0) / 8.0 - 1.0;
                     if (!(m.z + dot(m.xy, t) > 0.0)) continue;
-                    ivec2 view = ivec2(x, face * 8 + y), light = ivec2(view.y * 8 + x, 3 * slot);
+                    ivec2 view = ivec2(x, face * 8 + y), light = ivec2(view.y * 8 + x, 4 * slot);
                     vec2 at = (q.xy - q.z * t) * (0.5 * (side - 2.0)) / sqrt(1.0 + t * t) + 0.5 * (side - 1.0);
-                    float covered = fiv_view(at, side, ivec3(view * int(side), slot), beyond);
+                    float covered = few ? float(hit[light.x >> 5] >> (light.x & 31) & 1u)
+                        : fiv_view(at, side, ivec3(view * int(side), slot), beyond);
                     vec4 red = texelFetch(fiv_view_light, light, 0);
                     vec3 green = texelFetch(fiv_view_light, light + ivec2(0, 1), 0).rgb;
                     vec3 blue = texelFetch(fiv_view_light, light + ivec2(0, 2), 0).rgb;
@@ -4704,7 +4812,7 @@ static const char fiv__glsl_occluder[] =
         vec3 fiv_self(int self, vec3 d, vec3 n, vec3 all) {
             fiv_cell c;
             float out_by = 0.0, side = fiv_row(self, 8).w;
-            if (side > 0.0) return max(all - fiv_around(self, 2.0 / (side - 2.0) * n - d, n, all).rgb, 0.0);
+            if (side > 0.0) return max(all - fiv_around(self, fiv_row(self, 11).w * n - d, n, all).rgb, 0.0);
             for (int k = 0; k < 6; k++) {
                 c = fiv_locate(self, d - out_by * n);
                 if (mix(fiv_shell(c, 2.0, 0.0).z, fiv_shell(c, 2.0, 1.0).z, c.part) > 0.25) break;
@@ -5010,7 +5118,7 @@ static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
     if (!r) r = sat__gl_texture(gl, &g->scene, SAT__GL_RGBA32F, FIV__SCENE_WIDTH, g->max_instances + 1, NULL);
     if (!r) r = sat__gl_texture(gl, &g->support, SAT__GL_R16F, FIV__SUPPORT, FIV__SUPPORT * g->max_instances, NULL);
     if (!r) fiv__gl_filter(gl, SAT__GL_TEXTURE_2D);
-    if (!r) r = sat__gl_texture(gl, &g->view_light, SAT__GL_RGBA32F, FIV__ALL_VIEWS, 3 * g->max_instances, NULL);
+    if (!r) r = sat__gl_texture(gl, &g->view_light, SAT__GL_RGBA32F, FIV__ALL_VIEWS, 4 * g->max_instances, NULL);
     sat__gl_end(gl, &state);
     return r;
 }
@@ -5092,15 +5200,28 @@ static void fiv__gl_send_shells(fiv_gl *g, const fiv_occluder *o, int layer)
         }
 }
 
-/* The depth maps of the views, once; the light around them. */
+static void fiv__gl_send_corners(fiv_gl *g, const fiv_occluder *o, int kind)
+{
+    float corners[FIV__FEW][3][3];
+    int n = 3 * fiv__few_corners(corners, o), i;
+    for (i = 0; i < n; i++) memcpy(g->staged[i], corners[i / 3][i % 3], sizeof corners[0][0]);
+    g->gl.BindTexture(SAT__GL_TEXTURE_2D, g->view_light);
+    if (n)
+        g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, 0, 4 * kind + 3, n, 1, SAT__GL_RGBA, SAT__GL_FLOAT, g->staged);
+}
+
+/* The depth maps of the views, or the triangles in place of them, once; the light around the views. */
 static void fiv__gl_send_views(fiv_gl *g, const fiv_occluder *o, int kind)
 {
     int width = FIV__VIEWS * o->contact_side, c, view;
     if (!o->contact_side) return;
     if (g->view_signature[kind] != o->view_signature) {
-        g->gl.BindTexture(SAT__GL_TEXTURE_2D_ARRAY, g->views);
-        g->gl.TexSubImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, 0, 0, kind, width, 6 * width, 1, SAT__GL_RED_INTEGER,
-                            SAT__GL_UNSIGNED_BYTE, o->contact);
+        if (o->few) fiv__gl_send_corners(g, o, kind);
+        else {
+            g->gl.BindTexture(SAT__GL_TEXTURE_2D_ARRAY, g->views);
+            g->gl.TexSubImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, 0, 0, kind, width, 6 * width, 1, SAT__GL_RED_INTEGER,
+                                SAT__GL_UNSIGNED_BYTE, o->contact);
+        }
         g->view_uploads++;
     }
     g->view_signature[kind] = o->view_signature;
@@ -5113,7 +5234,7 @@ static void fiv__gl_send_views(fiv_gl *g, const fiv_occluder *o, int kind)
             g->staged[view][2] = v[(3 * c + 2) * FIV__ALL_VIEWS];
             g->staged[view][3] = v[9 * FIV__ALL_VIEWS];
         }
-        g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, 0, 3 * kind + c, FIV__ALL_VIEWS, 1, SAT__GL_RGBA, SAT__GL_FLOAT,
+        g->gl.TexSubImage2D(SAT__GL_TEXTURE_2D, 0, 0, 4 * kind + c, FIV__ALL_VIEWS, 1, SAT__GL_RGBA, SAT__GL_FLOAT,
                             g->staged);
     }
 }
@@ -5161,6 +5282,9 @@ static void fiv__gl_row(float row[FIV__SCENE_WIDTH][4], const fiv_instance *inst
     row[0][3] = o->radius > 0 && instance->scale > 0 ? 1 / (o->radius * instance->scale) : 0;
     for (k = 0; k < 9; k++) row[1 + k / 3][k % 3] = o->rotation[k];
     for (k = 0; k < 9; k++) row[9 + k % 3][k / 3] = fiv__view_frame[k];
+    row[9][3] = o->few ? (float)o->mesh.triangle_count : -1;
+    row[10][3] = o->mesh.closed ? o->mesh.turn : 0;
+    row[11][3] = fiv__view_lift(o);
     row[1][3] = (float)layer;
     row[2][3] = (float)o->grid.octahedral;
     row[3][3] = (float)kind;
@@ -5303,7 +5427,7 @@ static int fiv__gl_kinds(const fiv_occluder *occluders[FIV__GL_INSTANCES], int k
         room->rows = sat__max_int(room->rows, 3 * o->grid.phi);
         room->layers = layer[j] + o->grid.rho;
         if (o->light_count) room->map_side = sat__max_int(room->map_side, o->map_side);
-        room->view_side = sat__max_int(room->view_side, o->contact_side);
+        if (!o->few) room->view_side = sat__max_int(room->view_side, o->contact_side);
         room->kinds = kinds;
     }
     return kinds;
@@ -5389,13 +5513,13 @@ FIV_DEF sat_result fiv_gl_bind(fiv_gl *g, unsigned program, int first_unit)
     return SAT_OK;
 }
 
-static void fiv__gl_set_view(fiv_gl *g, const fiv_gl_view *view)
+static void fiv__gl_set_view(fiv_gl *g, const fiv_gl_view *view, int width, int height)
 {
     sat__gl *gl = &g->gl;
     float depth[3] = {0, 0, 0};
     if (view) {
-        depth[0] = 2 / (float)g->width;
-        depth[1] = 2 / (float)g->height;
+        depth[0] = 2 / (float)width;
+        depth[1] = 2 / (float)height;
         depth[2] = view->clip_zero_to_one ? 2.0f : 1.0f;
         gl->Uniform4fv(gl->GetUniformLocation(g->program, "fiv_world"), 4, view->world_from_clip);
         gl->Uniform3fv(gl->GetUniformLocation(g->program, "fiv_turn"), 3, view->world_from_normal);
@@ -5408,13 +5532,17 @@ FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *g, const sat_gl_target *to, unsigne
 {
     sat__gl_state state;
     sat_result result;
+    int width, height;
     if (!g || !g->shells || !points || !normals || !sat__gl_target_is_valid(to)) return SAT_ERR_ARGUMENT;
     if (sat__gl_target_is(to, points) || sat__gl_target_is(to, normals)) return SAT_ERR_ARGUMENT;
+    width = g->width;
+    height = g->height;
+    if (!sat__gl_take_size(to, &width, &height)) return SAT_ERR_SIZE;
     sat__gl_begin(&g->gl, &state, FIV__GL_UNITS);
-    result = sat__gl_pass_to(&g->gl, g->program, to, g->target, g->width, g->height);
+    result = sat__gl_pass_to(&g->gl, g->program, to, g->target, width, height);
     if (result == SAT_OK) {
         fiv__gl_uniforms(g, g->program, 0);
-        fiv__gl_set_view(g, view);
+        fiv__gl_set_view(g, view, width, height);
         sat__gl_set_from(&g->gl, g->program, to);
         sat__gl_set_texture(&g->gl, g->program, "fiv_points", 7, points);
         sat__gl_set_texture(&g->gl, g->program, "fiv_normals", 8, normals);

@@ -464,6 +464,128 @@ TEST(no_light_leaks_at_contact)
     test_close();
 }
 
+/* Few triangles: rays along the views instead of depth maps, the same as on the CPU; a box that stands on a floor leaks
+   nothing, wherever the receivers lie, and neither does one beside it, nor the box on itself. */
+TEST(few_triangles_equal_the_cpu)
+{
+    static float points[3 * COUNT], normals[3 * COUNT], truth[3 * COUNT], gpu[4 * COUNT], rgb[3 * COUNT];
+    reference_mesh box = reference_box(0.5f, 0.3f, 0.4f);
+    fiv_occluder_options o = fiv_occluder_defaults();
+    fiv_occluder *made = NULL;
+    reference_scene rays;
+    sat__gl_state state;
+    uint64_t seed = 4;
+    double worst, rms;
+    float *directions, *powers;
+    size_t lights;
+    int i, k, round;
+    for (round = 0; round < 2 + TEST_SELF; round++) { /* closed; an open one; on the box itself */
+        if (!test_open(FIV_STORAGE_FLOAT, round == 2)) SKIP(scene.context.message);
+        test_sky(0);
+        test_light();
+        EXPECT_EQ(fiv_occluder_create(&made, box.positions, box.vertices, box.indices, round == 1 ? 10 : 12, &o, NULL),
+                  SAT_OK);
+        EXPECT(made->few && made->mesh.closed == (round != 1));
+        EXPECT_EQ(fiv_occluder_light(made, scene.environment, NULL), SAT_OK);
+        scene.instances[0].occluder = scene.instances[1].occluder = made;
+        for (k = 0; k < 3; k++) {
+            scene.instances[0].position[k] = -made->centre[k];
+            scene.instances[1].position[k] = -made->centre[k] + (k == 0 ? 1.2f : 0);
+        }
+        scene.instances[0].scale = scene.instances[1].scale = 1;
+        for (i = 0; i < COUNT; i++) {
+            float *p = scene.points + 4 * i, *n = scene.normals + 4 * i;
+            for (k = 0; k < 3; k++) {
+                p[k] = (float)(3 * support_uniform(&seed) - 1.5);
+                n[k] = k == 1;
+            }
+            p[1] = -0.3f;
+            p[3] = 1;
+            if (round == 2 && i & 1) { /* a side of the box */
+                p[0] = -0.5f, p[1] = 0.25f * p[2] - 0.1f, p[2] = 0.3f * p[2], p[3] = 2;
+                n[0] = -1, n[1] = 0;
+            }
+            memcpy(points + 3 * i, p, sizeof points[0] * 3);
+            memcpy(normals + 3 * i, n, sizeof points[0] * 3);
+        }
+        sat__gl_begin(&scene.gl->gl, &state, 1);
+        sat__gl_upload(&scene.gl->gl, scene.point_texture, SAT__GL_RGBA32F, WIDTH, HEIGHT, scene.points);
+        sat__gl_upload(&scene.gl->gl, scene.normal_texture, SAT__GL_RGBA32F, WIDTH, HEIGHT, scene.normals);
+        sat__gl_end(&scene.gl->gl, &state);
+        EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 2), SAT_OK);
+        EXPECT_EQ(scene.gl->room.view_side, 1); /* no depth maps */
+        EXPECT_EQ(scene.gl->view_uploads, 1);
+        test_difference(&worst, &rms, 2);
+        REPORT("GPU against CPU, boxes: worst", worst, "of the largest");
+        EXPECT(worst < 2e-3 && rms < 1e-4);
+        EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 1), SAT_OK);
+        test_difference(&worst, &rms, 1);
+        memset(&rays, 0, sizeof rays);
+        reference_add(&rays, box.positions, box.indices, round == 1 ? 10 : 12, NULL, scene.instances[0].position, 1);
+        reference_build(&rays);
+        lights = fiv_environment_lights(NULL, NULL, 0, scene.environment);
+        directions = (float *)malloc(6 * lights * sizeof *directions);
+        powers = directions + 3 * lights;
+        fiv_environment_lights(directions, powers, lights, scene.environment);
+        for (i = 0; i < COUNT; i++) {
+            double sum[3];
+            points[3 * i + (round == 2 && i & 1 ? 0 : 1)] -= 1e-4f;
+            reference_irradiance(sum, &rays, directions, powers, lights, points + 3 * i, normals + 3 * i);
+            for (k = 0; k < 3; k++) truth[3 * i + k] = (float)sum[k];
+        }
+        sat__gl_begin(&scene.gl->gl, &state, 1);
+        EXPECT_EQ(sat__gl_read(&scene.gl->gl, gpu, fiv_gl_texture(scene.gl), SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
+        sat__gl_end(&scene.gl->gl, &state);
+        for (i = 0; i < 3 * COUNT; i++) rgb[i] = gpu[4 * (i / 3) + i % 3];
+        REPORT("GPU, a box that rests: NRMSE", reference_nrmse(truth, rgb, COUNT), "");
+        EXPECT(reference_nrmse(truth, rgb, COUNT) <= 0.012);
+        free(directions);
+        reference_free(&rays);
+        fiv_occluder_destroy(made);
+        test_close();
+    }
+    reference_mesh_free(&box);
+}
+
+/* Another size a frame: what an object of that size gives, from points and from a depth buffer. */
+TEST(another_size_a_frame)
+{
+    static const float identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    enum { W = WIDTH / 2 + 1, H = HEIGHT - 3 };
+    static float a[4 * WIDTH * HEIGHT], b[4 * WIDTH * HEIGHT];
+    fiv_gl_view view;
+    sat_gl_target to;
+    fiv_gl *smaller = NULL;
+    fiv_gl_options options = fiv_gl_defaults();
+    sat__gl_state state;
+    int y, depth;
+    if (!test_open(FIV_STORAGE_FLOAT, 0)) SKIP(scene.context.message);
+    options.allocator = scene.gl->allocator;
+    memset(&view, 0, sizeof view);
+    memset(&to, 0, sizeof to);
+    for (y = 0; y < 4; y++) view.world_from_clip[5 * y] = y < 3 ? 3.0f : 1.0f;
+    memcpy(view.world_from_normal, identity, sizeof identity);
+    EXPECT_EQ(fiv_gl_set_scene(scene.gl, scene.environment, scene.instances, 2), SAT_OK);
+    EXPECT_EQ(fiv_gl_create(&smaller, scene.context.get_proc, W, H, &options), SAT_OK);
+    EXPECT_EQ(fiv_gl_set_scene(smaller, scene.environment, scene.instances, 2), SAT_OK);
+    for (depth = 0; depth < 2; depth++) {
+        const fiv_gl_view *used = depth ? &view : NULL;
+        EXPECT_EQ(fiv_gl_irradiance(scene.gl, NULL, scene.point_texture, scene.normal_texture, used), SAT_OK);
+        to.width = W, to.height = H;
+        EXPECT_EQ(fiv_gl_irradiance(scene.gl, &to, scene.point_texture, scene.normal_texture, used), SAT_OK);
+        EXPECT_EQ(fiv_gl_irradiance(smaller, NULL, scene.point_texture, scene.normal_texture, used), SAT_OK);
+        sat__gl_begin(&scene.gl->gl, &state, 1);
+        EXPECT_EQ(sat__gl_read(&scene.gl->gl, a, fiv_gl_texture(scene.gl), SAT__GL_RGBA32F, WIDTH, HEIGHT), SAT_OK);
+        EXPECT_EQ(sat__gl_read(&scene.gl->gl, b, fiv_gl_texture(smaller), SAT__GL_RGBA32F, W, H), SAT_OK);
+        sat__gl_end(&scene.gl->gl, &state);
+        for (y = 0; y < H; y++) EXPECT(memcmp(a + 4 * WIDTH * y, b + 4 * W * y, 4 * W * sizeof *a) == 0);
+        to.width = WIDTH + 1;
+        EXPECT_EQ(fiv_gl_irradiance(scene.gl, &to, scene.point_texture, scene.normal_texture, used), SAT_ERR_SIZE);
+    }
+    fiv_gl_destroy(smaller);
+    test_close();
+}
+
 /* Pairs of options of both sides: the corners of storage, sizes of samples and of maps, suns, penumbra. */
 TEST(corners_in_pairs_equal_the_cpu)
 {
