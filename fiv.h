@@ -37,7 +37,8 @@
      of a sharp sun is not sure.
    - Near contact no interpolation is right, nor on the mesh itself: there 384 depth maps of the mesh along fixed
      directions ("views") say how much of the light around each is covered. Neither light nor rotation enters them;
-     they are made once. Parallel to the faces of a cube, they are looked up by a column, a row and a depth.
+     they are made once. Parallel to the faces of a cube, they are looked up by a column, a row and a depth. Of up to 32
+     triangles (a box, a wall) rays along the views say it: depth maps blur the edge of what is flat.
    - Occluders of few triangles (own_triangles) draw a mask for such a receiver instead, which is right to its texels;
      receivers in a row, such as pixels, share them.
    - Overlapping occluders: the union of their masks (FIV_MASK), or discs of their true solid angle; never below 0.
@@ -81,7 +82,8 @@
      a split-off light 4e-5 (beside the poles of the image up to 2 % of it stays in the cube). Masks equal rays through
      the texel centres but for rays that graze an edge (2e-6 of the texels set).
    - OpenGL: half floats, filtered by the hardware: within 2e-3 of the largest irradiance of fiv_irradiance and
-     fiv_self_irradiance with cutoff, own_masks and rays 0, 1e-4 rms (measured 5e-5 and 8e-6, in software).
+     fiv_self_irradiance with cutoff, own_masks and rays 0, 1e-4 rms (measured 3e-4 and 8e-6, in software). Filters with
+     weights of 8 bits add 3e-4, 3e-5 rms. Six fetches, two a field: a 3D texture would take three of twice the work.
    - Of neighbours that share a mask each is within own_tolerance of its own, as far as the masks of both ends say.
    - I_tot: within 6e-4 of its largest value of the sum over all texels. Turned vectors: 1.7 % rms of the same vectors
      computed from a turned mesh.
@@ -449,11 +451,11 @@ typedef struct fiv_gl_view {
 } fiv_gl_view;
 
 /* Irradiance of every pixel, in the target `to`, or, when NULL, in fiv_gl_texture() (RGBA32F). `points` and `normals`
-   are float textures of world coordinates, at least of the created size (from to->from on), or of the size that `to`
-   names, which may be smaller each frame; a normal of 0 gives 0. With
-   a view, `points` is a depth texture without comparison instead. With options.self an alpha says what a receiver lies
-   on, that of `points`, with a view that of `normals`: 2 + i the surface of instance i, which shadows itself as in
-   fiv_self_irradiance; any other value, such as the 1 of RGB textures, nothing that casts shadows. */
+   are float textures of world coordinates, at least of the created size (from to->from on) or of that which `to`
+   names, smaller in any frame; a normal of 0 gives 0. With a view, `points` is a depth texture without comparison
+   instead. With options.self an alpha says what a receiver lies on, that of `points`, with a view that of `normals`:
+   2 + i the surface of instance i, which shadows itself as in fiv_self_irradiance; any other value, such as the 1 of
+   RGB textures, nothing that casts shadows. */
 FIV_DEF sat_result fiv_gl_irradiance(fiv_gl *gl, const sat_gl_target *to, unsigned points, unsigned normals,
                                      const fiv_gl_view *view);
 
@@ -5088,32 +5090,26 @@ static void fiv__gl_filter(sat__gl *gl, unsigned kind)
     gl->TexParameteri(kind, SAT__GL_TEXTURE_MAX_LEVEL, 0);
 }
 
-static sat_result fiv__gl_program(fiv_gl *g)
-{
-    sat__gl *gl = &g->gl;
-    sat__gl_shaders shaders;
-    const char *body[3];
-    body[0] = SAT__GL_FROM SAT__GL_PIXEL;
-    body[1] = fiv__glsl_main;
-    body[2] = NULL;
-    memset(&shaders, 0, sizeof shaders);
-    shaders.name = "fiv: receivers";
-    shaders.library = fiv__glsl;
-    shaders.fragment = body;
-    sat__gl_define(gl, "FIV_INSTANCES", g->max_instances);
-    sat__gl_define(gl, "FIV_SELF", g->self);
-    return sat__gl_build(gl, &g->program, &shaders);
-}
+/* The units are those of fiv__gl_uniforms. */
+static const sat__gl_program fiv__gl_receivers = {
+    "fiv: receivers",
+    0,
+    "fiv_support fiv_scene fiv_diffuse fiv_maps fiv_shells fiv_view_light fiv_views fiv_points fiv_normals",
+    NULL,
+    NULL,
+    {SAT__GL_FROM SAT__GL_PIXEL, fiv__glsl_main, NULL, NULL, NULL, NULL, NULL, NULL}};
 
 static sat_result fiv__gl_start(fiv_gl *g, sat_gl_get_proc *get_proc)
 {
     sat__gl *gl = &g->gl;
     sat__gl_state state;
     sat_result r = sat__gl_open(gl, get_proc);
-    if (!r) r = fiv__gl_program(g);
     if (r) return r;
     sat__gl_begin(gl, &state, 1);
-    r = sat__gl_texture(gl, &g->out, SAT__GL_RGBA32F, g->width, g->height, NULL);
+    sat__gl_define(gl, "FIV_INSTANCES", g->max_instances);
+    sat__gl_define(gl, "FIV_SELF", g->self);
+    r = sat__gl_build_table(gl, &g->program, &fiv__gl_receivers, 1, 0, fiv__glsl);
+    if (!r) r = sat__gl_texture(gl, &g->out, SAT__GL_RGBA32F, g->width, g->height, NULL);
     if (!r) r = sat__gl_framebuffer(gl, &g->target, &g->out, 1, 0);
     if (!r) r = sat__gl_texture(gl, &g->scene, SAT__GL_RGBA32F, FIV__SCENE_WIDTH, g->max_instances + 1, NULL);
     if (!r) r = sat__gl_texture(gl, &g->support, SAT__GL_R16F, FIV__SUPPORT, FIV__SUPPORT * g->max_instances, NULL);
