@@ -547,6 +547,17 @@ TEST(raindrop_gl_rain_falls_as_on_the_cpu)
                      fabsf(back[i].radius - rain->drops[i].radius) < 1e-5f * back[i].radius);
         EXPECT(off <= 4);
         REPORT("drops that fell differently through a climbing box", off, "%");
+        gust[0] += 3; /* a jump in a pause */
+        gust[1] -= 21;
+        EXPECT_EQ(raindrop_rain_set_centre(rain, gust), SAT_OK);
+        EXPECT_EQ(raindrop_gl_set_centre(g, gust), SAT_OK);
+        EXPECT_EQ(raindrop_rain_advance(rain, 0), SAT_OK);
+        EXPECT_EQ(raindrop_gl_advance(g, 0), SAT_OK);
+        EXPECT_EQ(raindrop_gl_read_drops(g, back, 100), SAT_OK);
+        for (i = 0, off = 0; i < 100; i++)
+            off += !(fabsf(back[i].position[0] - gust[0]) < 4.001f && fabsf(back[i].position[1] - gust[1]) < 4.001f &&
+                     fabsf(back[i].position[1] - rain->drops[i].position[1]) < 2e-3f);
+        EXPECT(off <= 4);
     }
     EXPECT_EQ(raindrop_gl_advance(g, -1), SAT_ERR_ARGUMENT);
     raindrop_gl_destroy(g);
