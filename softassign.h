@@ -463,7 +463,14 @@ extern "C" {
 #define SOFTASSIGN__INFINITY (sat__float_from_bits(0x7f800000u))
 #define SOFTASSIGN__LARGEST_COST 1e30f /* sums of a million of them are floats */
 #define SOFTASSIGN__LARGEST_FEATURE 1e16f
-#define SOFTASSIGN__DENSE_CELLS 100000 /* below, lists do not pay */
+#define SOFTASSIGN__DENSE_CELLS 100000 /* a solver of frames has a matrix up to this */
+#define SOFTASSIGN__MADE_CELLS 600000  /* from features or a function, one is made up to this */
+#define SOFTASSIGN__WIDE 4             /* columns a row, columns and rows from which lists are faster than a matrix */
+#define SOFTASSIGN__WIDE_COLUMNS 3000  /* where rows compete (the bench prints both times) */
+#define SOFTASSIGN__WIDE_ROWS 128
+#ifndef SOFTASSIGN__MATRIX_ALWAYS      /* the bench times what AUTO does not choose */
+#define SOFTASSIGN__MATRIX_ALWAYS 0
+#endif
 #define SOFTASSIGN__MATRIX_CELLS 67108864 /* a given matrix up to this is tried without lists */
 #define SOFTASSIGN__SPARSE 8           /* a sparse matrix with fewer of its cells than one in this goes to lists */
 #define SOFTASSIGN__SHORT_LIST 16      /* the first ones where rows hardly compete */
@@ -743,7 +750,8 @@ struct softassign {
     int most_columns;      /* the same with that one in any case, in a solver made by softassign_create */
     int dense;             /* costs stand in `matrix`, or */
     int in_place;          /* in problem.cost or cost_double, as they are */
-    int wide;              /* costs are doubles or integers */
+    int wide;              /* costs are doubles or integers, */
+    int integers;          /* or integers */
     size_t paths_from;     /* stats.work when the paths on the matrix began */
     int dense_paths;       /* and paths are searched on it, without lists */
     int unit_capacities;   /* every slot holds one row */
@@ -1845,6 +1853,7 @@ static inline double softassign__scan_value(const softassign__scan *q, int j)
     return softassign__row_cost(q->cost, j) - q->price[j];
 }
 
+/* Sixteen values as floats. */
 static inline void softassign__load_reduced(const softassign__scan *q, int j, sat__f32x4 *v)
 {
     const float *c = q->cost.f + j, *p = q->price_f + j;
@@ -1859,43 +1868,74 @@ static inline sat__f32x4 softassign__least_of_four(const sat__f32x4 *v)
     return sat__f32x4_min(sat__f32x4_min(v[0], v[1]), sat__f32x4_min(v[2], v[3]));
 }
 
+/* The next sixteen from j on of which one may be within the limit, or where less than sixteen are left. */
+static inline int softassign__next_within(const softassign__scan *q, int j, int n)
+{
+    sat__f32x4 v[4], most = sat__f32x4_set1(q->most);
+    if (q->patience <= 0) {
+        while (j + 16 <= n && !softassign__eight_below(q->cost, j, q->price, q->limit) &&
+               !softassign__eight_below(q->cost, j + 8, q->price, q->limit))
+            j += 16;
+        return j;
+    }
+    for (; j + 16 <= n; j += 16) {
+        softassign__load_reduced(q, j, v);
+        if (sat__i32x4_any(sat__f32x4_less_equal(softassign__least_of_four(v), most))) break;
+    }
+    return j;
+}
+
 /* Those of sixteen that may be within the limit, one bit each. */
 static inline int softassign__sixteen_within(const softassign__scan *q, int j)
 {
-    sat__f32x4 v[4], most;
-    if (q->patience <= 0)
-        return (softassign__eight_below(q->cost, j, q->price, q->limit) ? 0xff : 0) |
-               (softassign__eight_below(q->cost, j + 8, q->price, q->limit) ? 0xff00 : 0);
-    most = sat__f32x4_set1(q->most);
+    sat__f32x4 v[4], most = sat__f32x4_set1(q->most);
+    if (q->patience <= 0) return 0xffff;
     softassign__load_reduced(q, j, v);
-    if (!sat__i32x4_any(sat__f32x4_less_equal(softassign__least_of_four(v), most))) return 0;
     return softassign__lanes(sat__f32x4_less_equal(v[0], most)) |
            softassign__lanes(sat__f32x4_less_equal(v[1], most)) << 4 |
            softassign__lanes(sat__f32x4_less_equal(v[2], most)) << 8 |
            softassign__lanes(sat__f32x4_less_equal(v[3], most)) << 12;
 }
 
+/* Two smallest ones of what four lanes hold, which stay apart. */
+typedef struct softassign__lane_minima {
+    sat__f32x4 least, second;
+} softassign__lane_minima;
+
+static inline void softassign__take_lanes(softassign__lane_minima *m, sat__f32x4 v)
+{
+    m->second = sat__f32x4_min(sat__f32x4_max(m->least, v), m->second);
+    m->least = sat__f32x4_min(v, m->least);
+}
+
+static float softassign__second_of_lanes(const softassign__lane_minima *m)
+{
+    float v[8], least = SOFTASSIGN__INFINITY, second = least;
+    int k;
+    sat__f32x4_store(v, m->least);
+    sat__f32x4_store(v + 4, m->second);
+    for (k = 0; k < 8; k++) {
+        second = v[k] < least ? least : v[k] < second ? v[k] : second;
+        least = v[k] < least ? v[k] : least;
+    }
+    return second;
+}
+
 /* At or above the second smallest value of a row: the second smallest of minima of different columns, and what floats
    round. */
 static double softassign__second_at_most(const softassign *s, const softassign__scan *q, int n)
 {
-    float a[4], b[4], least = SOFTASSIGN__INFINITY, second = least;
-    sat__f32x4 v[4], m1 = sat__f32x4_set1(SOFTASSIGN__INFINITY), m2 = m1;
-    int j, k;
+    double second;
+    softassign__lane_minima m;
+    sat__f32x4 v[4];
+    int j;
+    m.least = m.second = sat__f32x4_set1(SOFTASSIGN__INFINITY);
     for (j = 0; j + 16 <= n; j += 16) {
         softassign__load_reduced(q, j, v);
-        v[0] = softassign__least_of_four(v);
-        m2 = sat__f32x4_min(sat__f32x4_max(m1, v[0]), m2);
-        m1 = sat__f32x4_min(v[0], m1);
+        softassign__take_lanes(&m, softassign__least_of_four(v));
     }
-    sat__f32x4_store(a, m1);
-    sat__f32x4_store(b, m2);
-    for (k = 0; k < 8; k++) {
-        float x = k < 4 ? a[k] : b[k - 4];
-        second = x < least ? least : x < second ? x : second;
-        least = x < least ? x : least;
-    }
-    return (double)second + (fabs((double)second) + s->dearest) * 3e-7;
+    second = (double)softassign__second_of_lanes(&m);
+    return second + (fabs(second) + s->dearest) * 3e-7;
 }
 
 static inline void softassign__take_value(softassign__pair_of_least *two, int j, double value)
@@ -1911,30 +1951,36 @@ static inline void softassign__take_value(softassign__pair_of_least *two, int j,
     }
 }
 
+/* The two smallest values of a row, the second of which is known to be at most q->limit. */
+static softassign__pair_of_least softassign__look_within(softassign__scan *q, int n)
+{
+    softassign__pair_of_least two;
+    int j = 0, k, within;
+    two.at = two.second_at = -1;
+    two.least = two.second = (double)SOFTASSIGN__INFINITY;
+    for (; (j = softassign__next_within(q, j, n)) + 16 <= n; j += 16) {
+        double before = two.second;
+        for (k = j, within = softassign__sixteen_within(q, j); within; k++, within >>= 1) {
+            for (; !(within & 15); within >>= 4) k += 4;
+            if (within & 1) softassign__take_value(&two, k, softassign__scan_value(q, k));
+        }
+        q->patience -= !(two.second < before);
+        if (!(two.second < q->limit)) continue;
+        q->limit = two.second;
+        q->most = softassign__round_up(q->limit);
+    }
+    for (; j < n; j++) softassign__take_value(&two, j, softassign__scan_value(q, j));
+    return two;
+}
+
 static softassign__pair_of_least softassign__look_at_row(const softassign *s, int row)
 {
     softassign__scan q = softassign__scan_row(s, row, (double)SOFTASSIGN__INFINITY);
-    softassign__pair_of_least two;
-    int j = 0, k, n = s->columns;
-    two.at = two.second_at = -1;
-    two.least = two.second = (double)SOFTASSIGN__INFINITY;
-    if (q.patience && n >= 32) {
-        q.limit = softassign__second_at_most(s, &q, n);
+    if (q.patience && s->columns >= 32) {
+        q.limit = softassign__second_at_most(s, &q, s->columns);
         q.most = softassign__round_up(q.limit);
     }
-    for (; j + 16 <= n; j += 16) {
-        double before = two.second;
-        int within = softassign__sixteen_within(&q, j);
-        if (!within) continue;
-        for (k = j; within; k++, within >>= 1)
-            if (within & 1) softassign__take_value(&two, k, softassign__scan_value(&q, k));
-        q.patience -= !(two.second < before);
-        if (!(two.second < q.limit)) continue;
-        q.limit = two.second;
-        q.most = softassign__round_up(q.limit);
-    }
-    for (; j < n; j++) softassign__take_value(&two, j, softassign__scan_value(&q, j));
-    return two;
+    return softassign__look_within(&q, s->columns);
 }
 
 /* What was seen when costs were checked holds as long as these two slots keep their price: prices only fall. */
@@ -1951,16 +1997,15 @@ static softassign__pair_of_least softassign__two_smallest(const softassign *s, i
 static double softassign__smallest(const softassign *s, int row, double known)
 {
     softassign__scan q = softassign__scan_row(s, row, known);
-    int j = 0, k, n = s->columns;
-    for (; j + 16 <= n; j += 16) {
-        int within = softassign__sixteen_within(&q, j);
-        q.patience -= within != 0;
-        for (k = j; within; k++, within >>= 1)
-            if (within & 1 && softassign__scan_value(&q, k) < known) known = softassign__scan_value(&q, k);
+    int j = 0, k, n = s->columns, within;
+    for (; (j = softassign__next_within(&q, j, n)) + 16 <= n; j += 16) {
+        q.patience--;
+        for (k = j, within = softassign__sixteen_within(&q, j); within; k++, within >>= 1)
+            if (within & 1 && softassign__scan_value(&q, k) < q.limit) q.limit = softassign__scan_value(&q, k);
     }
     for (; j < n; j++)
-        if (softassign__scan_value(&q, j) < known) known = softassign__scan_value(&q, j);
-    return known;
+        if (softassign__scan_value(&q, j) < q.limit) q.limit = softassign__scan_value(&q, j);
+    return q.limit;
 }
 
 /* A list that ended below the row's own value is made anew first when the solver is done: the bound is then tight. */
@@ -2773,7 +2818,7 @@ static double softassign__row_excess(const softassign *s, int row)
    always. */
 static int softassign__prove(softassign *s)
 {
-    double *least = s->row_distance, used = 0, quick = 0;
+    double *least = s->row_distance, used = 0, quick = 0, most;
     int i;
     s->proving = 1;
     softassign__certify(s);
@@ -2784,12 +2829,14 @@ static int softassign__prove(softassign *s)
         least[i] = (over > 0 ? over : 0) + 4.5e-16 * (fabs(own) + fabs(least[i]));
         quick += least[i];
     }
+    most = 1e-13 * used;
+    if (s->integers && most > 0.5) most = 0.5; /* a whole unit is never rounding */
     s->excess = quick;
-    if (quick <= 1e-13 * used) return 1;
+    if (quick <= most) return 1;
     s->excess = 0;
     for (i = 0; i < s->rows; i++)
         if (least[i] > 0) s->excess += softassign__row_excess(s, i);
-    return s->excess <= 1e-13 * used;
+    return s->excess <= most;
 }
 
 /* ------------------------------------------------------------------------------------------------
@@ -2913,6 +2960,13 @@ static void softassign__leave_dense(softassign *s)
     s->phase = SOFTASSIGN__LISTS;
 }
 
+/* Paths on the matrix go through all columns, those on lists through few. */
+static int softassign__is_wide(int rows, int columns)
+{
+    return !SOFTASSIGN__MATRIX_ALWAYS && columns >= SOFTASSIGN__WIDE_COLUMNS && rows >= SOFTASSIGN__WIDE_ROWS &&
+           columns / SOFTASSIGN__WIDE >= rows;
+}
+
 /* The first choices of a wide problem: 1 when half of the rows have a best slot of their own, or one of several. A row
    whose slot is still free takes it and pays down to its second best; prices only fall, so that one may be nearer than
    it was, but never farther. The others are left in s->kept. */
@@ -2940,7 +2994,7 @@ static int softassign__first_choices(softassign *s, int *count)
    lists; square ones are faster here, also where they compete (tests/bench/bench_softassign.c). */
 static sat_result softassign__dense_phase(softassign *s)
 {
-    int i, large = (int64_t)s->rows * s->columns > SOFTASSIGN__DENSE_CELLS && s->columns / 2 > s->rows;
+    int i, large = softassign__is_wide(s->rows, s->columns);
     size_t spent;
     if (s->next == 0) {
         int count = 0;
@@ -3073,7 +3127,8 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
     s->slot_of_row = (int *)sat__carve(a, rows, sizeof(int));
     s->next_row = (int *)sat__carve(a, rows, sizeof(int));
     s->list_slot = (int *)sat__carve(a, list, sizeof(int));
-    s->row_result = s->list_length = (int *)sat__carve(a, rows, sizeof(int));
+    s->list_length = (int *)sat__carve(a, rows, sizeof(int));
+    s->row_result = s->list_length;
     s->list_wanted = (int *)sat__carve(a, rows, sizeof(int));
     s->parent = (int *)sat__carve(a, seats, sizeof(int));
     s->stamp = (int *)sat__carve(a, seats, sizeof(int));
@@ -3954,14 +4009,25 @@ static sat_result softassign__check_cost(double cost)
     return fabs(cost) > (double)SOFTASSIGN__LARGEST_COST ? SAT_ERR_ARGUMENT : SAT_OK;
 }
 
-/* 1 when all costs are between -1e30 and 1e30. */
-static int softassign__all_tame(const float *cost, int n)
+/* 1 when all costs are between -1e30 and 1e30. *second: at or above the second smallest. */
+static int softassign__all_tame(const float *cost, int n, float *second)
 {
     int j = 0, tame = 1;
-    sat__f32x4 most = sat__f32x4_set1(SOFTASSIGN__LARGEST_COST);
-    sat__i32x4 all = sat__i32x4_set1(-1);
-    for (; j + 4 <= n; j += 4)
-        all = sat__i32x4_and(all, sat__f32x4_less_equal(sat__f32x4_abs(sat__f32x4_load(cost + j)), most));
+    sat__f32x4 most = sat__f32x4_set1(SOFTASSIGN__LARGEST_COST), v[4];
+    sat__i32x4 all = sat__i32x4_set1(-1), a, b;
+    softassign__lane_minima m;
+    m.least = m.second = sat__f32x4_set1(SOFTASSIGN__INFINITY);
+    for (; j + 16 <= n; j += 16) {
+        v[0] = sat__f32x4_load(cost + j), v[1] = sat__f32x4_load(cost + j + 4);
+        v[2] = sat__f32x4_load(cost + j + 8), v[3] = sat__f32x4_load(cost + j + 12);
+        a = sat__i32x4_and(sat__f32x4_less_equal(sat__f32x4_abs(v[0]), most),
+                           sat__f32x4_less_equal(sat__f32x4_abs(v[1]), most));
+        b = sat__i32x4_and(sat__f32x4_less_equal(sat__f32x4_abs(v[2]), most),
+                           sat__f32x4_less_equal(sat__f32x4_abs(v[3]), most));
+        all = sat__i32x4_and(all, sat__i32x4_and(a, b));
+        softassign__take_lanes(&m, softassign__least_of_four(v));
+    }
+    *second = softassign__second_of_lanes(&m);
     if (!sat__i32x4_all(all)) return 0;
     for (; j < n; j++) tame &= fabsf(cost[j]) <= SOFTASSIGN__LARGEST_COST;
     return tame;
@@ -3990,9 +4056,15 @@ static sat_result softassign__check_row(softassign *s, int row)
     sat_result result = SAT_OK;
     int j, k, plain = p->cost && !p->row_start && !p->maximise;
     const float *floats = plain ? p->cost + softassign__element(p, row, 0) : NULL;
-    if (plain && softassign__all_tame(floats, p->columns)) {
+    float second = SOFTASSIGN__INFINITY;
+    if (plain && softassign__all_tame(floats, p->columns, &second)) {
         if (s->dense && !s->in_place)
             memcpy(s->matrix + (size_t)row * (size_t)s->columns, floats, (size_t)p->columns * sizeof(float));
+        if (s->has_seen && s->in_place) { /* while it is in the cache */
+            softassign__scan q = softassign__scan_row(s, row, (double)second);
+            s->seen[row] = softassign__look_within(&q, s->columns);
+            return result;
+        }
     } else if (p->row_start) {
         for (j = 0; s->dense && j < p->columns; j++) softassign__store(s, row, j, (double)SOFTASSIGN__INFINITY);
         for (k = p->row_start[row]; k < p->row_start[row + 1]; k++) {
@@ -4008,6 +4080,7 @@ static sat_result softassign__check_row(softassign *s, int row)
         }
     }
     if (s->columns > p->columns) softassign__store(s, row, p->columns, softassign__pair(p, row, p->columns));
+    if (s->has_seen) s->seen[row].at = -1;
     return result;
 }
 
@@ -4027,7 +4100,7 @@ static void softassign__check_range(int begin, int end, int worker, void *contex
             if (s->wide) s->wide_matrix[at] -= (double)s->bonus;
             else s->matrix[at] -= s->bonus;
         }
-        if (s->has_seen) s->seen[i] = softassign__look_at_row(s, i); /* while it is in the cache */
+        if (s->has_seen && s->seen[i].at < 0) s->seen[i] = softassign__look_at_row(s, i);
     }
 }
 
@@ -4088,8 +4161,10 @@ static int softassign__is_dense(const softassign_problem *p, const softassign_op
     int64_t cells = (int64_t)p->rows * p->columns;
     if (o->method == SOFTASSIGN_ENTROPIC || o->method == SOFTASSIGN_PUBLISHED) return 1;
     if (o->method != SOFTASSIGN_AUTO) return 0;
-    if (cells <= SOFTASSIGN__DENSE_CELLS) return 1;
-    if (!softassign__is_matrix(p) || cells > SOFTASSIGN__MATRIX_CELLS) return 0;
+    if (cells <= SOFTASSIGN__DENSE_CELLS || SOFTASSIGN__MATRIX_ALWAYS) return 1;
+    if (!softassign__is_matrix(p))
+        return cells <= SOFTASSIGN__MADE_CELLS && !softassign__is_wide(p->rows, p->columns);
+    if (cells > SOFTASSIGN__MATRIX_CELLS) return 0;
     return !p->row_start || p->row_start[p->rows] > cells / SOFTASSIGN__SPARSE;
 }
 
@@ -4187,6 +4262,7 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     s->problem = *problem;
     s->columns = problem->columns + optional;
     s->wide = !problem->cost && softassign__is_matrix(problem);
+    s->integers = s->wide && !problem->cost_double;
     s->projected = softassign__is_features(problem) && !problem->maximise && !s->dense;
     s->phase = SOFTASSIGN__START;
     memset(&s->stats, 0, sizeof s->stats);

@@ -1575,7 +1575,7 @@ static int stop_at_once(const softassign_stats *report, const int *x, void *user
 
 TEST(softassign_a_stopped_method_is_not_complete)
 {
-    problem q = make_features(80, 1500, 12, 61);
+    problem q = make_features(80, 8000, 12, 61); /* more than AUTO makes a matrix of, and is done with at once */
     int m, x[80];
     for (m = 0; m < 9; m++) {
         softassign_options o = quick_options(all_methods[m]);
@@ -2067,6 +2067,40 @@ TEST(softassign_a_tracker_leaves_far_detections_alone)
     distance[0][1] = SOFTASSIGN__INFINITY; /* 10 + 30 or 12 + 30 */
     EXPECT_EQ(softassign_solve(detection_of_track, &p, NULL, NULL), SAT_OK);
     EXPECT(detection_of_track[0] == 0 && detection_of_track[1] == -1 && detection_of_track[2] == -1);
+}
+
+/* Integers near 2^31 in so many rows that a unit is less than the share of the sum that doubles may round. */
+TEST(softassign_integers_are_exact_in_large_sums)
+{
+    enum { PAIRS = 4000, ROWS = 2 * PAIRS };
+    int *start = (int *)malloc((ROWS + 1) * sizeof *start), *index = (int *)malloc(2 * ROWS * sizeof *index),
+        *cost = (int *)malloc(2 * ROWS * sizeof *cost), *x = (int *)malloc(ROWS * sizeof *x), i, way;
+    long long best = 0;
+    uint64_t seed = 5;
+    softassign_problem p;
+    softassign_stats r;
+    for (i = 0; i < ROWS; i++) {
+        start[i] = 2 * i;
+        index[2 * i] = i / 2 * 2;
+        index[2 * i + 1] = index[2 * i] + 1;
+        cost[2 * i] = 2147483646 - (int)support_below(&seed, 4);
+        cost[2 * i + 1] = 2147483646 - (int)support_below(&seed, 4);
+    }
+    start[ROWS] = 2 * ROWS;
+    for (i = 0; i < PAIRS; i++) {
+        const int *c = cost + 4 * i;
+        long long a = (long long)c[0] + c[3], b = (long long)c[1] + c[2];
+        best += a < b ? a : b;
+    }
+    memset(&p, 0, sizeof p);
+    p.rows = p.columns = ROWS;
+    p.cost_int = cost, p.row_start = start, p.column_index = index;
+    for (way = 0; way < 2; way++) {
+        softassign_options o = softassign_method_defaults(way ? SOFTASSIGN_EXACT : SOFTASSIGN_AUTO);
+        EXPECT_EQ(softassign_solve(x, &p, &o, &r), SAT_OK);
+        EXPECT(r.cost == (double)best && r.complete && r.cost - r.lower_bound < 0.5);
+    }
+    free(start), free(index), free(cost), free(x);
 }
 
 /* Many rows, features and lists: as a matrix with a column of its own for every row. */

@@ -6,6 +6,8 @@
 #define SAT_IMPLEMENTATION
 #define SOFTASSIGN_IMPLEMENTATION
 #include <unistd.h>
+static int matrix_always; /* what AUTO does not choose is timed too */
+#define SOFTASSIGN__MATRIX_ALWAYS matrix_always
 #include "softassign.h"
 #include "bench.h"
 #include "image.h"
@@ -290,10 +292,11 @@ static void fill_matrix(float *cost, int rows, int columns, int kind)
     free(order);
 }
 
+static const char *const kind_names[KINDS] = {"uniform",  "integers to n", "zeros and ones", "points in a plane",
+                                              "low rank", "i * j",         "5 % cheap pairs"};
+
 static void table_matrices(void)
 {
-    static const char *const names[KINDS] = {"uniform",  "integers to n", "zeros and ones", "points in a plane",
-                                             "low rank", "i * j",         "5 % cheap pairs"};
     static const int sizes[][2] = {{64, 64},     {64, 256},   {128, 128},   {256, 256},   {256, 1024}, {512, 512},
                                    {1024, 1024}, {512, 2048}, {1024, 4096}, {2048, 2048}, {4096, 4096}};
     size_t k, count = sizeof sizes / sizeof *sizes;
@@ -319,9 +322,73 @@ static void table_matrices(void)
             run_dense(&q);
             scipy = have_scipy && !bench_quick() ? scipy_seconds(&q, sizes[k][0] > 1000 ? 1 : 9) : -1;
             best = scipy > 0 && scipy < t.work / t.ratio ? t.work / scipy : t.ratio;
-            bench_row("%s\t%d\t%d\t%.4g\t%.3g\t%s\t%.3g\t%.3g\t%d\t%d", names[kind], q.p.rows, q.p.columns,
+            bench_row("%s\t%d\t%d\t%.4g\t%.3g\t%s\t%.3g\t%.3g\t%d\t%d", kind_names[kind], q.p.rows, q.p.columns,
                       t.work * 1e3, t.ratio, bench_cell(t.work / scipy, 3, scipy > 0), best, q.report.gap,
                       q.report.method == SOFTASSIGN_EXACT, kind == UNIFORM);
+            close_instance(&q);
+        }
+}
+
+/* ---- what AUTO chooses from ---- */
+
+/* Seconds of one way, best of some rounds: 0 AUTO, 1 on the matrix to the end, 2 on lists. */
+static double time_way(instance *q, int way, int rounds)
+{
+    double best = HUGE_VAL, start;
+    set_method(q, way == 2 ? SOFTASSIGN_EXACT : SOFTASSIGN_AUTO);
+    matrix_always = way == 1;
+    for (; rounds > 0; rounds--) {
+        start = bench_clock();
+        if (q->p.cost) run_dense(q);
+        else run_solver(q);
+        start = bench_clock() - start;
+        best = start < best ? start : best;
+    }
+    matrix_always = 0;
+    return best;
+}
+
+static void row_of_ways(instance *q, const char *name)
+{
+    double once = time_way(q, 0, 1), ways[3];
+    int way, rounds = bench_rounds(once > 0.3 ? 1 : once > 0.03 ? 3 : once > 0.003 ? 9 : 25), lists = 0;
+    for (way = 0; way < 3; way++) {
+        ways[way] = time_way(q, way, rounds);
+        if (way == 0) lists = q->report.method == SOFTASSIGN_EXACT;
+    }
+    bench_row("%s\t%d\t%d\t%s%.4g%s\t%s%.4g%s\t%.4g\t%.3g\t%d", name, q->p.rows, q->p.columns, lists ? "" : "(",
+              ways[1] * 1e3, lists ? "" : ")", lists ? "(" : "", ways[2] * 1e3, lists ? ")" : "", ways[0] * 1e3,
+              ways[0] / (ways[1] < ways[2] ? ways[1] : ways[2]), strcmp(name, "uniform") == 0);
+}
+
+static void table_ways(void)
+{
+    static const int sizes[][2] = {{64, 64},   {64, 128},  {64, 512},   {64, 4096},  {256, 256},  {256, 320}, {256, 512},
+                                   {256, 768}, {256, 1024}, {256, 4096}, {512, 1024}, {512, 2048}, {1024, 1280}};
+    static const int cells[][3] = {{10, 10, 100},  {10, 10, 500},  {10, 10, 1000}, {10, 10, 2000},
+                                   {20, 20, 1500}, {20, 20, 4096}, {30, 30, 2000}, {30, 30, 8192}};
+    static const char *const photos[] = {"fig_bowl", "dogs", "stream"};
+    size_t k, f;
+    int kind;
+    bench_table("What AUTO chooses from: milliseconds on the matrix to the end, and on lists; its choice in brackets",
+                "kind\trows\tcolumns\tmatrix_ms\tlists_ms\tauto_ms\tauto_over_better\tdefault");
+    bench_note("best of some rounds, one thread; features: on the matrix with the time it takes to make it");
+    for (kind = 0; kind < KINDS; kind++)
+        for (k = 0; k < sizeof sizes / sizeof *sizes; k++) {
+            instance q;
+            if (bench_quick() && (sizes[k][1] > (bench_smoke() ? 64 : 512) || kind > 1)) continue;
+            open_instance(&q, "fig_bowl", sizes[k][0], 1, sizes[k][1], 1);
+            fill_matrix(q.cost, q.p.rows, q.p.columns, kind);
+            q.p.cost = q.cost;
+            row_of_ways(&q, kind_names[kind]);
+            close_instance(&q);
+        }
+    for (f = 0; f < 3; f++)
+        for (k = 0; k < sizeof cells / sizeof *cells; k++) {
+            instance q;
+            if (bench_quick() && (f || k > (bench_smoke() ? 0u : 3u))) continue;
+            open_instance(&q, photos[f], cells[k][0], cells[k][1], cells[k][2], 0);
+            row_of_ways(&q, photos[f]);
             close_instance(&q);
         }
 }
@@ -683,17 +750,17 @@ static void table_published(void)
 
 int main(int argc, char **argv)
 {
-    static void (*const tables[])(void) = {table_peers, table_dense,        table_matrices, table_error_time,
-                                           table_3_1,   table_3_2,          table_lists,    table_large,
+    static void (*const tables[])(void) = {table_peers, table_dense, table_matrices, table_ways, 
+                                           table_error_time, table_3_1, table_3_2,   table_lists,        table_large,
                                            table_video, table_temperatures, table_published};
-    static const char *const names[] = {"peers", "dense", "matrices", "error",        "3_1",      "3_2",
-                                        "lists", "large", "video",    "temperatures", "published"};
+    static const char *const names[] = {"peers", "dense", "matrices", "ways",         "error", "3_1",
+                                        "3_2",   "lists", "large",    "video", "temperatures", "published"};
     size_t k;
     bench_start("softassign.h");
     load_tiles();
     printf("# input: %s\n",
            real_data ? "photographs and tiles" : "made here, for want of ../shared/data or libstb-dev");
-    for (k = 0; k < 11; k++)
+    for (k = 0; k < sizeof tables / sizeof *tables; k++)
         if (argc < 2 || strcmp(argv[1], names[k]) == 0) tables[k]();
     free(all_tiles);
     return 0;
