@@ -472,7 +472,7 @@ extern "C" {
 #define SOFTASSIGN__MATRIX_ALWAYS 0
 #endif
 #define SOFTASSIGN__MATRIX_CELLS 67108864 /* a given matrix up to this is tried without lists */
-#define SOFTASSIGN__SPARSE 8           /* a sparse matrix with fewer of its cells than one in this goes to lists */
+#define SOFTASSIGN__SPARSE 32          /* a larger sparse one with fewer of its cells than one in this goes to lists */
 #define SOFTASSIGN__SHORT_LIST 16      /* the first ones where rows hardly compete */
 #define SOFTASSIGN__DIMS 16            /* coordinates of the cheap bound; the last is the norm of what the others
                                           leave */
@@ -754,7 +754,10 @@ struct softassign {
     int integers;          /* or integers */
     size_t paths_from;     /* stats.work when the paths on the matrix began */
     int dense_paths;       /* and paths are searched on it, without lists */
-    int unit_capacities;   /* every slot holds one row */
+    int unit_capacities;   /* every slot holds one row, but for the one that stands for none */
+    int none;              /* that slot, or -1. Paths on the matrix end there: it is always free, and its first_row
+                              stays -1 */
+    int square;            /* as many rows as columns, and every row gets one: all columns are used */
     int all_open;          /* no slot has a capacity of 0 */
     int projected;         /* costs are distances of features, which projections bound from below */
 
@@ -2144,19 +2147,24 @@ typedef struct softassign__dense_step {
     int row, plain;                   /* rows to come in which floats would leave out too little: reach stands still */
 } softassign__dense_step;
 
+static inline void softassign__sit(softassign *s, int row, int slot)
+{
+    s->slot_of_row[row] = slot;
+    if (slot != s->none) s->first_row[slot] = row;
+}
+
 static void softassign__dense_swap(softassign *s, int row, int slot)
 {
     int out = s->first_row[slot];
     if (s->slot_of_row[row] >= 0) s->first_row[s->slot_of_row[row]] = -1;
-    s->first_row[slot] = row;
-    s->slot_of_row[row] = slot;
+    softassign__sit(s, row, slot);
     if (out >= 0) s->slot_of_row[out] = -1;
 }
 
 /* The row's best slot falls to what the second best is worth. */
 static void softassign__pay_second(softassign *s, const softassign__pair_of_least *two)
 {
-    if (two->second < (double)SOFTASSIGN__INFINITY && two->second > two->least)
+    if (two->second < (double)SOFTASSIGN__INFINITY && two->second > two->least && two->at != s->none)
         softassign__set_price(s, two->at, s->price[two->at] - (two->second - two->least));
 }
 
@@ -2530,23 +2538,26 @@ static int softassign__augment_dense(softassign *s, int root)
         int old;
         row = q.pred[j];
         old = s->slot_of_row[row];
-        s->slot_of_row[row] = j;
-        s->first_row[j] = row;
+        softassign__sit(s, row, j);
         if (row == root) return 1;
         j = old;
     }
 }
 
-/* What the rest of the library reads of an assignment. */
-static void softassign__dense_publish(softassign *s)
+/* What the rest of the library reads of an assignment. done: there are no more paths on the matrix. */
+static void softassign__dense_publish(softassign *s, int done)
 {
     int i, j;
-    for (j = 0; j < s->slot_count; j++) {
-        s->used[j] = s->first_row[j] >= 0;
-    }
+    for (j = 0; j < s->slot_count; j++) s->used[j] = s->first_row[j] >= 0;
     for (i = 0; i < s->rows; i++) {
         s->next_row[i] = -1;
-        if (s->slot_of_row[i] >= 0) s->cost_of_row[i] = softassign__cost(s, i, s->slot_of_row[i]);
+        if ((j = s->slot_of_row[i]) < 0) continue;
+        s->cost_of_row[i] = softassign__cost(s, i, j);
+        if (j != s->none) continue;
+        s->used[j]++;
+        if (!done) continue;
+        s->next_row[i] = s->first_row[j];
+        s->first_row[j] = i;
     }
 }
 
@@ -2979,7 +2990,7 @@ static int softassign__first_choices(softassign *s, int *count)
         if (s->slot_of_row[i] >= 0) continue;
         two = softassign__two_smallest(s, i);
         j = two.at;
-        different += two.second <= two.least || j < 0 || !s->holders[j]++;
+        different += two.second <= two.least || j < 0 || j == s->none || !s->holders[j]++;
         if (j < 0 || s->first_row[j] >= 0) s->kept[left++] = i;
         else {
             softassign__dense_swap(s, i, j);
@@ -2998,7 +3009,8 @@ static sat_result softassign__dense_phase(softassign *s)
     size_t spent;
     if (s->next == 0) {
         int count = 0;
-        if (s->rows == s->columns) {
+        if (s->none >= 0) softassign__set_price(s, s->none, 0); /* of another frame */
+        if (s->square) {
             if (!s->prices_known) softassign__reduce_columns(s);
             for (i = 0; i < s->rows; i++)
                 if (s->slot_of_row[i] < 0) s->kept[count++] = i;
@@ -3025,7 +3037,7 @@ static sat_result softassign__dense_phase(softassign *s)
         s->next++;
     }
     if (s->next < s->left) return SAT_OK;
-    softassign__dense_publish(s);
+    softassign__dense_publish(s, 1);
     s->phase = SOFTASSIGN__FINISH;
     s->next = 0;
     return SAT_OK;
@@ -3087,62 +3099,97 @@ static sat_result softassign__advance(softassign *s, size_t budget)
    Memory
    ------------------------------------------------------------------------------------------------ */
 
-static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
+/* The matrix, and what paths on it need. */
+static void softassign__carve_matrix(softassign *s, sat__arena *a)
 {
-    size_t rows = (size_t)s->rows, cells = 0, seats = (size_t)s->max_slots, padded = (size_t)s->padded,
-           list = rows * (size_t)s->list;
-    size_t shared = seats * (sizeof(softassign__fixed) / sizeof(float));
-    int workers = sat__worker_count(&s->options.threads), w;
+    size_t cells = 0, rows = (size_t)s->rows, seats = (size_t)s->max_slots;
     if (s->dense && !s->in_place && !sat__multiply_size(&cells, rows, (size_t)s->columns)) a->overflow = 1;
     s->wide_matrix = (double *)sat__carve(a, cells, s->wide ? sizeof(double) : sizeof(float));
     s->matrix = (float *)(void *)s->wide_matrix;
-    s->price = (double *)sat__carve(a, seats, sizeof(double));
-    s->top = (double *)sat__carve(a, seats, sizeof(double));
-    s->distance = (double *)sat__carve(a, seats > 2 * (size_t)workers ? seats : 2 * (size_t)workers, sizeof(double));
-    s->row_largest = s->row_distance = (double *)sat__carve(a, rows, sizeof(double));
-    s->bid = (double *)sat__carve(a, rows, sizeof(double));
     s->dense_price = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
     s->closed_distance = (double *)sat__carve(a, s->dense ? seats : 0, sizeof(double));
     s->block_distance = (double *)sat__carve(a, s->dense ? seats / SOFTASSIGN__STEP + 1 : 0, sizeof(double));
     s->reach = (float *)sat__carve(a, s->dense ? seats : 0, sizeof(float));
     s->seen = (softassign__pair_of_least *)sat__carve(a, s->dense ? rows : 0, sizeof *s->seen);
+}
+
+/* Lists, and in their memory the repair, which needs none. */
+static void softassign__carve_lists(softassign *s, sat__arena *a)
+{
+    size_t rows = (size_t)s->rows, list = rows * (size_t)s->list,
+           shared = (size_t)s->max_slots * (sizeof(softassign__fixed) / sizeof(float));
     s->list_limit = (double *)sat__carve(a, rows, sizeof(double));
-    s->basis = (double *)sat__carve(a, (size_t)(2 * SOFTASSIGN__DIMS + 1) * (size_t)features, sizeof(double));
-    s->price_f = (float *)sat__carve(a, padded, sizeof(float));
-    s->coarse = (float *)sat__carve(a, padded * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
-    s->row_coarse = (float *)sat__carve(a, rows * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
-    s->cost_of_row = (double *)sat__carve(a, rows, sizeof(double));
     s->exact_price = (softassign__fixed *)sat__carve(a, list > shared ? list : shared,
                                                      sizeof(float)); /* the repair needs no lists */
     s->exact_distance = (softassign__fixed *)sat__carve(a, list > shared ? list : shared, sizeof(float));
     s->list_cost = (float *)(void *)s->exact_price;
     s->pheromone = s->list_value = (float *)(void *)s->exact_distance;
-    s->parent_cost = (double *)sat__carve(a, seats, sizeof(double));
+    s->list_slot = (int *)sat__carve(a, list, sizeof(int));
+    s->list_length = (int *)sat__carve(a, rows, sizeof(int));
+    s->row_result = s->list_length;
+    s->list_wanted = (int *)sat__carve(a, rows, sizeof(int));
+}
+
+/* One element a row. */
+static void softassign__carve_rows(softassign *s, sat__arena *a)
+{
+    size_t rows = (size_t)s->rows;
+    s->row_largest = s->row_distance = (double *)sat__carve(a, rows, sizeof(double));
+    s->bid = (double *)sat__carve(a, rows, sizeof(double));
+    s->cost_of_row = (double *)sat__carve(a, rows, sizeof(double));
+    s->slot_of_row = (int *)sat__carve(a, rows, sizeof(int));
+    s->next_row = (int *)sat__carve(a, rows, sizeof(int));
+    s->row_stamp = (int *)sat__carve(a, rows, sizeof(int));
+    s->kept = (int *)sat__carve(a, rows, sizeof(int));
+    s->leader = (int *)sat__carve(a, rows, sizeof(int));
+    s->shown = (int *)sat__carve(a, rows, sizeof(int));
+    s->shown_column = (int *)sat__carve(a, rows, sizeof(int));
+    s->stale = (unsigned char *)sat__carve(a, rows, 1);
+}
+
+/* One element a slot. */
+static void softassign__carve_slots(softassign *s, sat__arena *a)
+{
+    size_t seats = (size_t)s->max_slots, padded = (size_t)s->padded;
+    s->price = (double *)sat__carve(a, seats, sizeof(double));
+    s->top = (double *)sat__carve(a, seats, sizeof(double));
+    s->price_f = (float *)sat__carve(a, padded, sizeof(float));
     s->column_sum = (float *)sat__carve(a, seats, sizeof(float));
     s->soft_row = (float *)sat__carve(a, padded, sizeof(float));
     s->slot_column = (int *)sat__carve(a, seats, sizeof(int));
     s->capacity = (int *)sat__carve(a, seats, sizeof(int));
     s->used = (int *)sat__carve(a, seats, sizeof(int));
     s->first_row = (int *)sat__carve(a, seats, sizeof(int));
-    s->slot_of_row = (int *)sat__carve(a, rows, sizeof(int));
-    s->next_row = (int *)sat__carve(a, rows, sizeof(int));
-    s->list_slot = (int *)sat__carve(a, list, sizeof(int));
-    s->list_length = (int *)sat__carve(a, rows, sizeof(int));
-    s->row_result = s->list_length;
-    s->list_wanted = (int *)sat__carve(a, rows, sizeof(int));
+    s->holders = s->touched = (int *)sat__carve(a, seats, sizeof(int));
+    s->raised = (unsigned char *)sat__carve(a, seats, 1);
+}
+
+static void softassign__carve_paths(softassign *s, sat__arena *a)
+{
+    size_t rows = (size_t)s->rows, seats = (size_t)s->max_slots,
+           workers = (size_t)sat__worker_count(&s->options.threads);
+    s->distance = (double *)sat__carve(a, seats > 2 * workers ? seats : 2 * workers, sizeof(double));
+    s->parent_cost = (double *)sat__carve(a, seats, sizeof(double));
     s->parent = (int *)sat__carve(a, seats, sizeof(int));
     s->stamp = (int *)sat__carve(a, seats, sizeof(int));
-    s->row_stamp = (int *)sat__carve(a, rows, sizeof(int));
-    s->holders = s->touched = (int *)sat__carve(a, seats, sizeof(int));
-    s->kept = (int *)sat__carve(a, rows, sizeof(int));
-    s->leader = (int *)sat__carve(a, rows, sizeof(int));
-    s->shown = (int *)sat__carve(a, rows, sizeof(int));
-    s->shown_column = (int *)sat__carve(a, rows, sizeof(int));
     s->order = s->closed = (int *)sat__carve(a, seats + rows, sizeof(int));
     s->heap = (int *)sat__carve(a, seats + rows, sizeof(int));
     s->heap_at = (int *)sat__carve(a, seats + rows, sizeof(int));
-    s->raised = (unsigned char *)sat__carve(a, seats, 1);
-    s->stale = (unsigned char *)sat__carve(a, rows, 1);
+}
+
+/* Projections of features. */
+static void softassign__carve_bound(softassign *s, sat__arena *a, int features)
+{
+    size_t rows = (size_t)s->rows, padded = (size_t)s->padded;
+    s->basis = (double *)sat__carve(a, (size_t)(2 * SOFTASSIGN__DIMS + 1) * (size_t)features, sizeof(double));
+    s->coarse = (float *)sat__carve(a, padded * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
+    s->row_coarse = (float *)sat__carve(a, rows * (size_t)sat__min_int(features, SOFTASSIGN__DIMS), sizeof(float));
+}
+
+static void softassign__carve_scratch(softassign *s, sat__arena *a)
+{
+    size_t padded = (size_t)s->padded;
+    int workers = sat__worker_count(&s->options.threads), w;
     s->scratch = (softassign__scratch *)sat__carve(a, (size_t)workers, sizeof *s->scratch);
     for (w = 0; w < workers; w++) {
         float *keys = (float *)sat__carve(a, padded, sizeof(float));
@@ -3156,6 +3203,17 @@ static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
         s->scratch[w].candidates = candidates;
         s->scratch[w].distances = 0;
     }
+}
+
+static void softassign__carve_solver(softassign *s, sat__arena *a, int features)
+{
+    softassign__carve_matrix(s, a);
+    softassign__carve_slots(s, a);
+    softassign__carve_rows(s, a);
+    softassign__carve_lists(s, a);
+    softassign__carve_paths(s, a);
+    softassign__carve_bound(s, a, features);
+    softassign__carve_scratch(s, a);
 }
 
 static int softassign__progress(softassign *s, const int *seats);
@@ -4018,8 +4076,10 @@ static int softassign__all_tame(const float *cost, int n, float *second)
     softassign__lane_minima m;
     m.least = m.second = sat__f32x4_set1(SOFTASSIGN__INFINITY);
     for (; j + 16 <= n; j += 16) {
-        v[0] = sat__f32x4_load(cost + j), v[1] = sat__f32x4_load(cost + j + 4);
-        v[2] = sat__f32x4_load(cost + j + 8), v[3] = sat__f32x4_load(cost + j + 12);
+        v[0] = sat__f32x4_load(cost + j);
+        v[1] = sat__f32x4_load(cost + j + 4);
+        v[2] = sat__f32x4_load(cost + j + 8);
+        v[3] = sat__f32x4_load(cost + j + 12);
         a = sat__i32x4_and(sat__f32x4_less_equal(sat__f32x4_abs(v[0]), most),
                            sat__f32x4_less_equal(sat__f32x4_abs(v[1]), most));
         b = sat__i32x4_and(sat__f32x4_less_equal(sat__f32x4_abs(v[2]), most),
@@ -4034,19 +4094,19 @@ static int softassign__all_tame(const float *cost, int n, float *second)
 }
 
 /* Into the copy of the matrix, or nowhere. */
-static inline void softassign__store(softassign *s, int row, int column, double cost)
+static inline void softassign__store(const softassign *s, size_t at, double cost)
 {
-    size_t at = (size_t)row * (size_t)s->columns + (size_t)column;
     if (!s->dense || s->in_place) return;
     if (s->wide) s->wide_matrix[at] = cost;
     else s->matrix[at] = (float)cost;
 }
 
-static inline void softassign__check_one(softassign *s, int row, double cost, sat_result *result)
+static inline void softassign__check_one(double cost, double *largest, sat_result *result)
 {
-    sat_result found = softassign__check_cost(cost);
-    if (found != SAT_OK && *result != SAT_ERR_NON_FINITE) *result = found;
-    if (fabs(cost) > s->row_largest[row] && fabs(cost) < (double)SOFTASSIGN__INFINITY) s->row_largest[row] = fabs(cost);
+    double size = fabs(cost);
+    if (size <= (double)SOFTASSIGN__LARGEST_COST) *largest = size > *largest ? size : *largest;
+    else if (*result != SAT_ERR_NON_FINITE && softassign__check_cost(cost) != SAT_OK)
+        *result = softassign__check_cost(cost);
 }
 
 /* Checks what stands in a row, and copies it. */
@@ -4057,29 +4117,34 @@ static sat_result softassign__check_row(softassign *s, int row)
     int j, k, plain = p->cost && !p->row_start && !p->maximise;
     const float *floats = plain ? p->cost + softassign__element(p, row, 0) : NULL;
     float second = SOFTASSIGN__INFINITY;
+    size_t at = (size_t)row * (size_t)s->columns;
+    double largest = 0;
     if (plain && softassign__all_tame(floats, p->columns, &second)) {
         if (s->dense && !s->in_place)
-            memcpy(s->matrix + (size_t)row * (size_t)s->columns, floats, (size_t)p->columns * sizeof(float));
+            memcpy(s->matrix + at, floats, (size_t)p->columns * sizeof(float));
         if (s->has_seen && s->in_place) { /* while it is in the cache */
             softassign__scan q = softassign__scan_row(s, row, (double)second);
             s->seen[row] = softassign__look_within(&q, s->columns);
             return result;
         }
     } else if (p->row_start) {
-        for (j = 0; s->dense && j < p->columns; j++) softassign__store(s, row, j, (double)SOFTASSIGN__INFINITY);
+        for (j = 0; s->dense && j < p->columns; j++) softassign__store(s, at + (size_t)j, (double)SOFTASSIGN__INFINITY);
         for (k = p->row_start[row]; k < p->row_start[row + 1]; k++) {
             double cost = softassign__value(p, k);
-            softassign__check_one(s, row, cost, &result);
-            softassign__store(s, row, p->column_index[k], cost);
+            softassign__check_one(cost, &largest, &result);
+            softassign__store(s, at + (size_t)p->column_index[k], cost);
         }
     } else {
+        ptrdiff_t from = softassign__is_matrix(p) ? softassign__element(p, row, 0) : -1;
+        int matrix = softassign__is_matrix(p);
         for (j = 0; j < p->columns; j++) {
-            double cost = softassign__pair(p, row, j);
-            softassign__check_one(s, row, cost, &result);
-            softassign__store(s, row, j, cost);
+            double cost = matrix ? softassign__value(p, from + j) : softassign__pair(p, row, j);
+            softassign__check_one(cost, &largest, &result);
+            softassign__store(s, at + (size_t)j, cost);
         }
     }
-    if (s->columns > p->columns) softassign__store(s, row, p->columns, softassign__pair(p, row, p->columns));
+    if (s->wide) s->row_largest[row] = largest;
+    if (s->columns > p->columns) softassign__store(s, at + (size_t)p->columns, softassign__pair(p, row, p->columns));
     if (s->has_seen) s->seen[row].at = -1;
     return result;
 }
@@ -4165,7 +4230,7 @@ static int softassign__is_dense(const softassign_problem *p, const softassign_op
     if (!softassign__is_matrix(p))
         return cells <= SOFTASSIGN__MADE_CELLS && !softassign__is_wide(p->rows, p->columns);
     if (cells > SOFTASSIGN__MATRIX_CELLS) return 0;
-    return !p->row_start || p->row_start[p->rows] > cells / SOFTASSIGN__SPARSE;
+    return !p->row_start || cells <= SOFTASSIGN__MADE_CELLS || p->row_start[p->rows] > cells / SOFTASSIGN__SPARSE;
 }
 
 /* What a mandatory slot starts at: four times the widest difference of costs. A chain of moves may save more than that
@@ -4211,7 +4276,7 @@ static sat_result softassign__make_slots(softassign *s)
         }
         room += sat__min_int(capacity, s->rows);
         needed += least;
-        units &= capacity == 1 && least == 0;
+        units &= none || (capacity == 1 && least == 0);
         s->slot_column[j] = j;
         s->capacity[j] = sat__min_int(capacity - least, s->rows);
         s->all_open &= s->capacity[j] > 0;
@@ -4261,6 +4326,8 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     int j, known = s->prices_known, optional = problem->unassigned_cost > 0;
     s->problem = *problem;
     s->columns = problem->columns + optional;
+    s->none = optional ? problem->columns : -1;
+    s->square = s->rows == s->columns && !optional;
     s->wide = !problem->cost && softassign__is_matrix(problem);
     s->integers = s->wide && !problem->cost_double;
     s->projected = softassign__is_features(problem) && !problem->maximise && !s->dense;
@@ -4274,7 +4341,7 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     s->bonus = softassign__switching_bonus(s);
     s->in_place = s->dense && softassign__stays(problem, &s->options);
     s->dense_paths = s->dense && s->unit_capacities && s->options.method == SOFTASSIGN_AUTO;
-    s->has_seen = s->dense_paths && s->rows < s->columns && !known;
+    s->has_seen = s->dense_paths && !s->square && !known;
     for (j = 0; s->has_seen && j < s->columns; j++) softassign__set_price(s, j, 0);
     result = softassign__check_costs(s);
     if (result != SAT_OK) return result;
@@ -4300,7 +4367,7 @@ static sat_result softassign__start(softassign *s, const softassign_problem *pro
     }
     s->next = s->easy = 0;
     s->phase = s->dense_paths ? SOFTASSIGN__PATHS : SOFTASSIGN__LISTS;
-    for (j = 0; known && !(s->dense_paths && s->rows == s->columns) && j < s->slot_count;
+    for (j = 0; known && !(s->dense_paths && s->square) && j < s->slot_count;
          j++) /* a square matrix lets prices rise above 0 */
         if (s->price[j] > s->top[j]) softassign__set_price(s, j, s->top[j]);
     return SAT_OK;
@@ -4425,7 +4492,7 @@ static sat_result softassign__step_slots(softassign *s, size_t budget, int *seat
 {
     sat_result result = softassign__advance(s, budget);
     for (;;) {
-        if (s->dense_paths && s->phase == SOFTASSIGN__PATHS) softassign__dense_publish(s);
+        if (s->dense_paths && s->phase == SOFTASSIGN__PATHS) softassign__dense_publish(s, 0);
         if (result != SAT_OK || softassign__fill(s, seats)) break;
         result = softassign__advance(s, 1); /* forbidden pairs: the paths must decide */
     }
@@ -4767,7 +4834,7 @@ static sat_result softassign__run(softassign *s, softassign__matrix_work *w)
     }
     if (s->options.min_distance > 0) {
         s->excess = -1; /* what follows is another assignment */
-        if (s->dense_paths) softassign__dense_publish(s);
+        if (s->dense_paths) softassign__dense_publish(s, 0);
         if (has_prices) softassign__take_back(s, s->shown);
         softassign__separate(s);
     }
@@ -5203,8 +5270,15 @@ typedef struct softassign__gl_uniforms {
     int size, alpha, inverse_t, factor, scale; /* locations */
 } softassign__gl_uniforms;
 
+/* Textures that a pass reads, and how many of their texels count. */
+typedef struct softassign__gl_sources {
+    unsigned texture[3];
+    int width, height;
+} softassign__gl_sources;
+
 struct softassign_gl {
     sat__gl gl;
+    softassign__gl_sources from;
     softassign_options options;
     sat_allocator allocator;
     unsigned program[SOFTASSIGN__PROGRAMS];
@@ -5367,23 +5441,30 @@ static sat_result softassign__gl_make_textures(softassign_gl *g, int rows, int c
    ------------------------------------------------------------------------------------------------ */
 
 /* One pass into texture `to`; 0 stands for no texture. Textures may be read as bound names. */
-static void softassign__gl_run(softassign_gl *g, int program, int to, int width, int height, unsigned source,
-                               unsigned first, unsigned second, int size_x, int size_y)
+static void softassign__gl_run(softassign_gl *g, int program, int to, int width, int height)
 {
     sat__gl *gl = &g->gl;
-    unsigned bound[3];
+    const softassign__gl_sources *from = &g->from;
     int i;
-    bound[0] = source;
-    bound[1] = first;
-    bound[2] = second;
     sat__gl_pass(gl, g->program[program], g->framebuffer[to], width, height);
     for (i = 0; i < 3; i++) {
         gl->ActiveTexture(SAT__GL_TEXTURE0 + (unsigned)i);
-        gl->BindTexture(SAT__GL_TEXTURE_2D, bound[i]);
+        gl->BindTexture(SAT__GL_TEXTURE_2D, from->texture[i]);
         gl->BindSampler((unsigned)i, 0);
     }
-    gl->Uniform2i(g->uniforms[program].size, size_x, size_y);
+    gl->Uniform2i(g->uniforms[program].size, from->width, from->height);
     sat__gl_draw(gl);
+}
+
+/* What the next passes read: three textures (0: none), of which width x height texels count. */
+static void softassign__gl_read_from(softassign_gl *g, unsigned source, unsigned first, unsigned second, int width,
+                                     int height)
+{
+    g->from.texture[0] = source;
+    g->from.texture[1] = first;
+    g->from.texture[2] = second;
+    g->from.width = width;
+    g->from.height = height;
 }
 
 static void softassign__gl_values(softassign_gl *g, int program, float alpha, float inverse_t, float factor,
@@ -5408,7 +5489,8 @@ static int softassign__gl_reduce(softassign_gl *g, int program, int from, int wi
     while ((vertical ? height : width) > 1) {
         int to = from == a ? a + 1 : a, w = vertical ? width : (width + k - 1) / k,
             h = vertical ? (height + k - 1) / k : height;
-        softassign__gl_run(g, program, to, w, h, g->texture[from], 0, 0, width, height);
+        softassign__gl_read_from(g, g->texture[from], 0, 0, width, height);
+        softassign__gl_run(g, program, to, w, h);
         from = to;
         width = w;
         height = h;
@@ -5454,9 +5536,10 @@ static sat_result softassign__gl_distances(softassign_gl *g, const softassign_pr
     sat_result result = softassign__gl_feature_texture(g, &rows, p->row_features, p->rows, p->feature_count);
     if (result == SAT_OK)
         result = softassign__gl_feature_texture(g, &columns, p->column_features, p->columns, p->feature_count);
-    if (result == SAT_OK)
-        softassign__gl_run(g, SOFTASSIGN__DISTANCE, SOFTASSIGN__D, g->columns, g->rows, 0, rows, columns,
-                           (p->feature_count + 3) / 4, 1);
+    if (result == SAT_OK) {
+        softassign__gl_read_from(g, 0, rows, columns, (p->feature_count + 3) / 4, 1);
+        softassign__gl_run(g, SOFTASSIGN__DISTANCE, SOFTASSIGN__D, g->columns, g->rows);
+    }
     if (rows) g->gl.DeleteTextures(1, &rows);
     if (columns) g->gl.DeleteTextures(1, &columns);
     return result;
@@ -5567,16 +5650,17 @@ static void softassign__gl_start_matrix(softassign_gl *g)
 static void softassign__gl_sinkhorn(softassign_gl *g, int *outlier)
 {
     int w = g->columns, h = g->rows, sums = softassign__gl_reduce(g, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__A, w, h);
-    softassign__gl_run(g, SOFTASSIGN__DIVIDE_COLUMNS, SOFTASSIGN__M, w, h, g->texture[SOFTASSIGN__A], g->texture[sums],
-                       g->texture[*outlier], w, h);
+    softassign__gl_read_from(g, g->texture[SOFTASSIGN__A], g->texture[sums], g->texture[*outlier], w, h);
+    softassign__gl_run(g, SOFTASSIGN__DIVIDE_COLUMNS, SOFTASSIGN__M, w, h);
     if (g->options.outlier_evolves) {
         int to = *outlier == SOFTASSIGN__V ? SOFTASSIGN__OUTLIERS_2 : SOFTASSIGN__V;
-        softassign__gl_run(g, SOFTASSIGN__OUTLIER, to, w, 1, g->texture[*outlier], g->texture[sums], 0, w, 1);
+        softassign__gl_read_from(g, g->texture[*outlier], g->texture[sums], 0, w, 1);
+        softassign__gl_run(g, SOFTASSIGN__OUTLIER, to, w, 1);
         *outlier = to;
     }
     sums = softassign__gl_reduce(g, SOFTASSIGN__SUM_ACROSS, SOFTASSIGN__M, w, h);
-    softassign__gl_run(g, SOFTASSIGN__DIVIDE_ROWS, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M], g->texture[sums], 0,
-                       w, h);
+    softassign__gl_read_from(g, g->texture[SOFTASSIGN__M], g->texture[sums], 0, w, h);
+    softassign__gl_run(g, SOFTASSIGN__DIVIDE_ROWS, SOFTASSIGN__A, w, h);
 }
 
 /* One temperature; afterwards M holds the matrix and *cost the sum of the last Q. */
@@ -5593,17 +5677,18 @@ static sat_result softassign__gl_cool(softassign_gl *g, double t, float *cost)
     for (steady = 0; steady < o->iterations[1]; steady++) {
         int outlier = SOFTASSIGN__OUTLIERS;
         if (steady == o->iterations[1] - 1) {
-            softassign__gl_run(g, SOFTASSIGN__UPDATE_Q, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M],
-                               g->texture[SOFTASSIGN__D], 0, w, h);
+            softassign__gl_read_from(g, g->texture[SOFTASSIGN__M], g->texture[SOFTASSIGN__D], 0, w, h);
+            softassign__gl_run(g, SOFTASSIGN__UPDATE_Q, SOFTASSIGN__A, w, h);
             q = softassign__gl_reduce(g, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__A, w, h);
             q = softassign__gl_reduce(g, SOFTASSIGN__SUM_ACROSS, q, w, 1);
             result = softassign__gl_texel(g, q, cost);
             if (result != SAT_OK) return result;
         }
-        softassign__gl_run(g, SOFTASSIGN__UPDATE_M, SOFTASSIGN__A, w, h, g->texture[SOFTASSIGN__M],
-                           g->texture[SOFTASSIGN__D], 0, w, h);
+        softassign__gl_read_from(g, g->texture[SOFTASSIGN__M], g->texture[SOFTASSIGN__D], 0, w, h);
+        softassign__gl_run(g, SOFTASSIGN__UPDATE_M, SOFTASSIGN__A, w, h);
         for (turn = 0; turn < o->iterations[2]; turn++) softassign__gl_sinkhorn(g, &outlier);
-        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__M, w, h, g->texture[SOFTASSIGN__A], 0, 0, w, h);
+        softassign__gl_read_from(g, g->texture[SOFTASSIGN__A], 0, 0, w, h);
+        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__M, w, h);
     }
     return result;
 }
@@ -5620,8 +5705,8 @@ SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft
         return SAT_ERR_ARGUMENT; /* a stride in floats: as if they were bytes */
     sat__gl_begin(&g->gl, &state, 3);
     softassign__gl_start_matrix(g);
-    softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows, g->texture[SOFTASSIGN__M], 0, 0,
-                       g->columns, g->rows);
+    softassign__gl_read_from(g, g->texture[SOFTASSIGN__M], 0, 0, g->columns, g->rows);
+    softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows);
     for (t = g->options.temperature, i = 0; result == SAT_OK && i < g->options.iterations[0];
          i++, t *= g->options.cooling) {
         float cost;
@@ -5629,8 +5714,8 @@ SOFTASSIGN_DEF sat_result softassign_gl_published(softassign_gl *gl, float *soft
         result = softassign__gl_cool(g, t, &cost);
         if (result != SAT_OK || !((double)cost < lowest)) continue;
         lowest = (double)cost;
-        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows, g->texture[SOFTASSIGN__M], 0, 0,
-                           g->columns, g->rows);
+        softassign__gl_read_from(g, g->texture[SOFTASSIGN__M], 0, 0, g->columns, g->rows);
+        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__S, g->columns, g->rows);
     }
     if (result == SAT_OK && soft) {
         result = sat__gl_attach(&g->gl, g->gl.framebuffer, &g->texture[SOFTASSIGN__S], 1, 0);
@@ -5655,16 +5740,16 @@ static void softassign__gl_turn(softassign_gl *g, int by, int *owners, int *seat
     softassign__gl_values(g, SOFTASSIGN__CHOOSE_FIRST, 0, 0, by == SOFTASSIGN__S ? -1.0f : 1.0f, 0);
     do {
         int program = from == by ? SOFTASSIGN__CHOOSE_FIRST : SOFTASSIGN__CHOOSE_NEXT;
-        softassign__gl_run(g, program, to, (width + k - 1) / k, h, g->texture[from], g->texture[*seats],
-                           g->texture[*owners], width, h);
+        softassign__gl_read_from(g, g->texture[from], g->texture[*seats], g->texture[*owners], width, h);
+        softassign__gl_run(g, program, to, (width + k - 1) / k, h);
         from = to;
         to = to == SOFTASSIGN__ACROSS ? SOFTASSIGN__ACROSS_2 : SOFTASSIGN__ACROSS;
         width = (width + k - 1) / k;
     } while (width > 1);
-    softassign__gl_run(g, SOFTASSIGN__GRANT, next_owners, w, 1, g->texture[*owners], g->texture[*seats],
-                       g->texture[from], w, h);
-    softassign__gl_run(g, SOFTASSIGN__SEAT, next_seats, 1, h, g->texture[*seats], g->texture[next_owners],
-                       g->texture[from], 1, h);
+    softassign__gl_read_from(g, g->texture[*owners], g->texture[*seats], g->texture[from], w, h);
+    softassign__gl_run(g, SOFTASSIGN__GRANT, next_owners, w, 1);
+    softassign__gl_read_from(g, g->texture[*seats], g->texture[next_owners], g->texture[from], 1, h);
+    softassign__gl_run(g, SOFTASSIGN__SEAT, next_seats, 1, h);
     *owners = next_owners;
     *seats = next_seats;
 }
@@ -5680,7 +5765,8 @@ static sat_result softassign__gl_seat_all(softassign_gl *g, int *seats)
     while (result == SAT_OK && left > 0 && left < before) {
         before = left;
         for (turn = 0; turn < 8; turn++) softassign__gl_turn(g, SOFTASSIGN__D, &owners, seats);
-        softassign__gl_run(g, SOFTASSIGN__COUNT, SOFTASSIGN__OUTLIERS_2, 1, 1, g->texture[*seats], 0, 0, 1, g->rows);
+        softassign__gl_read_from(g, g->texture[*seats], 0, 0, 1, g->rows);
+        softassign__gl_run(g, SOFTASSIGN__COUNT, SOFTASSIGN__OUTLIERS_2, 1, 1);
         result = softassign__gl_texel(g, SOFTASSIGN__OUTLIERS_2, &left);
     }
     return result == SAT_OK && left > 0 ? SAT_ERR_LIMIT : result;
@@ -5698,8 +5784,10 @@ SOFTASSIGN_DEF sat_result softassign_gl_assign(softassign_gl *gl, int *column_of
     sat__gl_upload(&g->gl, g->texture[SOFTASSIGN__V], SAT__GL_R32F, g->columns, 1, g->scratch);
     sat__gl_upload(&g->gl, g->texture[SOFTASSIGN__SEATS], SAT__GL_R32F, 1, g->rows, g->scratch);
     result = softassign__gl_seat_all(g, &seats);
-    if (seats != SOFTASSIGN__SEATS) /* the texture whose name is told */
-        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__SEATS, 1, g->rows, g->texture[seats], 0, 0, 1, g->rows);
+    if (seats != SOFTASSIGN__SEATS) { /* the texture whose name is told */
+        softassign__gl_read_from(g, g->texture[seats], 0, 0, 1, g->rows);
+        softassign__gl_run(g, SOFTASSIGN__COPY, SOFTASSIGN__SEATS, 1, g->rows);
+    }
     if (column_of_row) read = sat__gl_read(&g->gl, g->scratch, g->texture[SOFTASSIGN__SEATS], SAT__GL_R32F, 1, g->rows);
     for (i = 0; column_of_row && read == SAT_OK && i < g->rows; i++) column_of_row[i] = (int)g->scratch[i];
     if (result == SAT_OK) result = read;
@@ -5721,7 +5809,8 @@ static int softassign__gl_rows(softassign_gl *g, int price)
     int k = g->options.gather, width = g->columns, to = SOFTASSIGN__ACROSS, from = SOFTASSIGN__D;
     do {
         int w = (width + k - 1) / k, program = from == SOFTASSIGN__D ? SOFTASSIGN__ROWS_FIRST : SOFTASSIGN__ROWS_NEXT;
-        softassign__gl_run(g, program, to, w, g->rows, g->texture[from], 0, g->texture[price], width, g->rows);
+        softassign__gl_read_from(g, g->texture[from], 0, g->texture[price], width, g->rows);
+        softassign__gl_run(g, program, to, w, g->rows);
         from = to;
         to = to == SOFTASSIGN__ACROSS ? SOFTASSIGN__ACROSS_2 : SOFTASSIGN__ACROSS;
         width = w;
@@ -5773,11 +5862,11 @@ SOFTASSIGN_DEF sat_result softassign_gl_sweep(softassign_gl *gl, float *price, d
             result = sat__gl_read(&g->gl, price, g->texture[v], SAT__GL_R32F, g->columns, 1);
             if (result == SAT_OK) result = softassign__gl_bound(g, rows, price, lower_bound);
         }
-        softassign__gl_run(g, SOFTASSIGN__COLUMNS, SOFTASSIGN__DOWN, g->columns, height, g->texture[SOFTASSIGN__D],
-                           g->texture[rows], g->texture[v], g->columns, g->rows);
+        softassign__gl_read_from(g, g->texture[SOFTASSIGN__D], g->texture[rows], g->texture[v], g->columns, g->rows);
+        softassign__gl_run(g, SOFTASSIGN__COLUMNS, SOFTASSIGN__DOWN, g->columns, height);
         sums = softassign__gl_reduce(g, SOFTASSIGN__SUM_DOWN, SOFTASSIGN__DOWN, g->columns, height);
-        softassign__gl_run(g, SOFTASSIGN__UPDATE_PRICES, next, g->columns, 1, g->texture[v], g->texture[sums], 0,
-                           g->columns, 1);
+        softassign__gl_read_from(g, g->texture[v], g->texture[sums], 0, g->columns, 1);
+        softassign__gl_run(g, SOFTASSIGN__UPDATE_PRICES, next, g->columns, 1);
         v = next;
     }
     if (result == SAT_OK) result = sat__gl_read(&g->gl, price, g->texture[v], SAT__GL_R32F, g->columns, 1);

@@ -363,8 +363,9 @@ static void row_of_ways(instance *q, const char *name)
 
 static void table_ways(void)
 {
-    static const int sizes[][2] = {{64, 64},   {64, 128},  {64, 512},   {64, 4096},  {256, 256},  {256, 320}, {256, 512},
-                                   {256, 768}, {256, 1024}, {256, 4096}, {512, 1024}, {512, 2048}, {1024, 1280}};
+    static const int sizes[][2] = {{64, 64},    {64, 128},   {64, 512},    {64, 4096},  {256, 256},
+                                   {256, 320},  {256, 512},  {256, 768},   {256, 1024}, {256, 4096},
+                                   {512, 1024}, {512, 2048}, {1024, 1280}};
     static const int cells[][3] = {{10, 10, 100},  {10, 10, 500},  {10, 10, 1000}, {10, 10, 2000},
                                    {20, 20, 1500}, {20, 20, 4096}, {30, 30, 2000}, {30, 30, 8192}};
     static const char *const photos[] = {"fig_bowl", "dogs", "stream"};
@@ -391,6 +392,129 @@ static void table_ways(void)
             row_of_ways(&q, photos[f]);
             close_instance(&q);
         }
+}
+
+/* ---- other forms of the same costs ---- */
+
+enum { FLOATS, DOUBLES, INTS, GATED, MARGINS, CSR, FORMS };
+
+typedef struct forms {
+    double *wide;
+    int *whole, *start, *index;
+    float *values;
+    double *margin;
+    int allowed;
+} forms;
+
+static forms open_forms(const instance *q)
+{
+    size_t n = (size_t)q->p.rows * (size_t)q->p.columns, k;
+    uint64_t seed = 9;
+    forms f;
+    f.wide = (double *)malloc(n * sizeof *f.wide);
+    f.whole = (int *)malloc(n * sizeof *f.whole);
+    f.index = (int *)malloc(n * sizeof *f.index);
+    f.values = (float *)malloc(n * sizeof *f.values);
+    f.start = (int *)malloc((size_t)(q->p.rows + 1) * sizeof *f.start);
+    f.margin = (double *)malloc((size_t)q->p.rows * sizeof *f.margin);
+    f.allowed = 0;
+    for (k = 0; k < n; k++) {
+        int row = (int)(k / (size_t)q->p.columns), column = (int)(k % (size_t)q->p.columns);
+        f.wide[k] = (double)q->cost[k];
+        f.whole[k] = (int)((double)q->cost[k] * 1e6);
+        if (column == 0) f.start[row] = f.allowed;
+        if (support_uniform(&seed) >= 0.05 && column != row) continue; /* one that is allowed to all rows */
+        f.index[f.allowed] = column;
+        f.values[f.allowed++] = q->cost[k];
+    }
+    f.start[q->p.rows] = f.allowed;
+    return f;
+}
+
+static void close_forms(forms *f)
+{
+    free(f->wide), free(f->whole), free(f->index), free(f->values), free(f->start), free(f->margin);
+}
+
+/* Seconds of scipy's sparse solver, or -1. */
+static double scipy_sparse_seconds(const instance *q, const forms *f, int rounds)
+{
+    char command[768], name[64];
+    FILE *file;
+    double seconds = -1;
+    size_t n = (size_t)f->allowed, rows = (size_t)q->p.rows + 1;
+    snprintf(name, sizeof name, "/tmp/bench_softassign_%ld.bin", (long)getpid());
+    file = fopen(name, "wb");
+    if (!file) return -1;
+    rows = fwrite(f->start, sizeof(int), rows, file) + fwrite(f->index, sizeof(int), n, file) +
+           fwrite(f->values, sizeof(float), n, file);
+    fclose(file);
+    snprintf(command, sizeof command,
+             "/usr/bin/python3 -c \"import numpy,time\nfrom scipy.sparse import csr_matrix\n"
+             "from scipy.sparse.csgraph import min_weight_full_bipartite_matching as f\n"
+             "a=numpy.fromfile('%s',dtype=numpy.int32)\nr=%d\nn=%d\n"
+             "m=csr_matrix((a[r+1+n:].view(numpy.float32).astype(numpy.float64)+1e-9,a[r+1:r+1+n],a[:r+1]),shape=(r,%d))\nb=[]\n"
+             "for i in range(%d):\n t=time.thread_time();f(m);b.append(time.thread_time()-t)\nprint(sorted(b)[len(b)//2])\" 2>/dev/null",
+             name, q->p.rows, f->allowed, q->p.columns, rounds);
+    file = popen(command, "r");
+    if (file) {
+        if (fscanf(file, "%lf", &seconds) != 1) seconds = -1;
+        pclose(file);
+    }
+    remove(name);
+    return seconds;
+}
+
+static void table_forms(void)
+{
+    static const char *const names[FORMS] = {"floats", "doubles", "integers", "floats, rows left out at a price",
+                                             "floats, margins", "CSR, 5 % of the pairs"};
+    static const int sizes[][2] = {{100, 100}, {512, 512}, {512, 2048}};
+    size_t k;
+    int form, have_scipy = system("/usr/bin/python3 -c 'import scipy.sparse.csgraph' >/dev/null 2>&1") == 0;
+    bench_table("Other forms of uniform costs, AUTO, over the floats, and over scipy's dense solver (CSR: its sparse one)",
+                "costs\trows\tcolumns\ttime_ms\tratio_floats\tratio_scipy\tcertified_gap\tdefault");
+    bench_note("rows left out: the price is the dearest pair that the optimum uses, so that few are; margins: one more path a row");
+    if (!have_scipy) bench_missing("scipy", "python3-scipy");
+    for (k = 0; k < 3; k++) {
+        instance q;
+        forms f;
+        double floats = 0, dense, sparse, dearest = 0;
+        int i;
+        if (bench_quick() && k > (bench_smoke() ? 0u : 1u)) break;
+        open_instance(&q, "fig_bowl", sizes[k][0], 1, sizes[k][1], 1);
+        fill_matrix(q.cost, q.p.rows, q.p.columns, UNIFORM);
+        f = open_forms(&q);
+        dense = have_scipy && !bench_quick() ? scipy_seconds(&q, 9) : -1;
+        sparse = have_scipy && !bench_quick() ? scipy_sparse_seconds(&q, &f, 9) : -1;
+        for (form = 0; form < FORMS; form++) {
+            instance r = q;
+            double best = HUGE_VAL, start, peer = form == CSR ? sparse : dense;
+            int round;
+            r.options = softassign_defaults();
+            if (form <= FLOATS || form == GATED || form == MARGINS) r.p.cost = q.cost;
+            if (form == DOUBLES) r.p.cost_double = f.wide;
+            if (form == INTS) r.p.cost_int = f.whole;
+            if (form == GATED) r.p.unassigned_cost = (float)dearest;
+            if (form == MARGINS) r.options.row_margin = f.margin;
+            if (form == CSR) r.p.cost = f.values, r.p.row_start = f.start, r.p.column_index = f.index;
+            for (round = bench_rounds(15); round > 0; round--) {
+                start = bench_clock();
+                run_solver(&r);
+                start = bench_clock() - start;
+                best = start < best ? start : best;
+            }
+            if (form == FLOATS) floats = best;
+            for (i = 0; form == FLOATS && i < q.p.rows; i++) {
+                double c = (double)q.cost[(size_t)i * (size_t)q.p.columns + (size_t)q.x[i]];
+                dearest = c > dearest ? c : dearest;
+            }
+            bench_row("%s\t%d\t%d\t%.4g\t%.3g\t%s\t%.3g\t%d", names[form], q.p.rows, q.p.columns, best * 1e3,
+                      best / floats, bench_cell(best / peer, 3, peer > 0), r.report.gap, form == FLOATS);
+        }
+        close_forms(&f);
+        close_instance(&q);
+    }
 }
 
 /* ---- error against time, all methods ---- */
@@ -750,10 +874,10 @@ static void table_published(void)
 
 int main(int argc, char **argv)
 {
-    static void (*const tables[])(void) = {table_peers, table_dense, table_matrices, table_ways, 
-                                           table_error_time, table_3_1, table_3_2,   table_lists,        table_large,
-                                           table_video, table_temperatures, table_published};
-    static const char *const names[] = {"peers", "dense", "matrices", "ways",         "error", "3_1",
+    static void (*const tables[])(void) = {table_peers,        table_dense, table_matrices, table_ways,  table_forms,
+                                           table_error_time,   table_3_1,   table_3_2,      table_lists, table_large,
+                                           table_video,        table_temperatures,          table_published};
+    static const char *const names[] = {"peers", "dense", "matrices", "ways",         "forms",    "error", "3_1",
                                         "3_2",   "lists", "large",    "video", "temperatures", "published"};
     size_t k;
     bench_start("softassign.h");
