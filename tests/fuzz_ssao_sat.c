@@ -50,6 +50,8 @@ static ssao_sat_options take_options(input *in)
     o.band_rows = take(in, 3) ? 0 : take(in, 40);
     o.bottom_up = take(in, 2);
     o.skip_flat = take(in, 2);
+    o.geometric = take(in, 2);
+    if (take(in, 2)) o.tolerance = 0;
     if (take(in, 2)) o.radius = (double)take_float(in);
     if (take(in, 4) == 0) o.gain = (double)take_float(in);
     if (take(in, 4) == 0) o.power = (double)take_float(in);
@@ -95,8 +97,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
     if (ssao_sat_create(&ao, w, h, &o) != SAT_OK) return 0;
     if (ssao_sat_apply(ao, out, 0, &picture, &stats) == SAT_OK) {
         check(out, w * h, 0);
-        if (stats.sky + stats.tiny + stats.flat + stats.estimated != stats.pixels && stats.farthest > 0 &&
-            stats.estimated)
+        if (stats.sky + stats.tiny + stats.flat + stats.interpolated + stats.estimated != stats.pixels &&
+            stats.farthest > 0 && stats.estimated)
             abort();
         ssao_sat_apply_bent(ao, out, 0, bent, 0, &picture, NULL);
         if (ssao_sat_apply_signed(ao, out, 0, &picture, NULL) == SAT_OK) check(out, w * h, -1);
