@@ -32,9 +32,10 @@
    - An error bound and an expected error for every table, and a plan that picks the cheapest kind for a wanted error.
    - k-ary scans by recursive doubling and by balanced trees, with the work they do counted (Slomp 2012, chapter 4), for
      any type and operation.
-   - OpenGL 3.3 / ES 3.0 passes that build the tiles from textures, 1 to 4 channels at once, bit for bit the CPU's table
-     with its spikes, giants, 64-bit tiles and strips, without an extension; box filters and variances there, and GLSL
-     functions that look boxes up. The passes of Slomp 2012 (trees and recursive doubling, any k) over flat tables, too.
+   - OpenGL 3.3 / ES 3.0 passes, or compute shaders of GL 4.3, that build the tiles from textures, 1 to 4 channels at
+     once, bit for bit the CPU's table with its spikes, giants, 64-bit tiles and strips, without an extension; box
+     filters and variances there, and GLSL functions that look boxes up. The passes of Slomp 2012 (trees and recursive
+     doubling, any k) over flat tables, too.
 
    WHAT IT DOES NOT
 
@@ -505,7 +506,9 @@ extern "C" {
 
 /* Where a call draws its picture; all headers take it. Zeroes (or NULL): the object's own texture. The OpenGL state is
    put back. Blending is off and sRGB codes are written as they are, unless a call says otherwise. A framebuffer's first
-   draw buffer gets the picture. */
+   draw buffer gets the picture.
+   What a call reads is a 2D texture. For one layer of an array (stereo) that is a view of it, glTextureView, with GL
+   4.3; elsewhere let both eyes lie side by side in one texture, and say which by from_x. */
 typedef enum sat_gl_place {
     SAT_GL_OWN,        /* the texture that X_gl_texture names */
     SAT_GL_TEXTURE,    /* level 0 of a 2D texture */
@@ -588,7 +591,8 @@ SAT_DEF const char *sat_explain_gl(char *text, size_t size, const sat_gl_options
 
 /* Belongs to the context that is current in create: it must be current in every call. Textures are made by the
    first build of a size, unless options.width and height name it. Every call leaves the OpenGL state as it was (but for
-   pending errors, which are lost).
+   pending errors, which are lost; where compute shaders run, image units 0 to 3 too). ES has no compute shaders here:
+   3.1 writes no images of two integers a texel. A group has 4 KiB of shared memory for each plane, and 5.
    The CPU alone has doubles and 64-bit integers, updates of a part, streams, covariance, borders other than clipping,
    radii of each pixel, bounds and plans (they hold here for the kinds of the same name). Here alone are two-float sums,
    and the mean that stays on the GPU. */
@@ -905,9 +909,10 @@ static inline uint16_t sat__half_from_float(float value)
 
 /* Base-2 logarithm of a positive number that is no subnormal: exponent plus a polynomial that is exact at both ends of
    the octave, 1 + t; error below 2.3e-6. */
+#define SAT__LOG2_OF(t) 0.442544943f + t * (-0.275600307f + t * (0.18194886f + t * (-0.0959564262f + t * 0.0258414329f)))
 static inline float sat__log2_octave(float t)
 {
-    float q = 0.442544943f + t * (-0.275600307f + t * (0.18194886f + t * (-0.0959564262f + t * 0.0258414329f)));
+    float q = SAT__LOG2_OF(t);
     return t + t * (1 - t) * q;
 }
 
@@ -1520,6 +1525,10 @@ SAT__IEEE_END
 /* GLSL as a string: a macro a function, its directives (#if ...) beside it in quotes. Comments and line ends go; what
    is in the macro has as many ( as ) and is not expanded. */
 #define SAT__GLSL(...) #__VA_ARGS__ "\n"
+
+/* What a macro stands for, as text: constants and equations that C and GLSL share stand in C alone. */
+#define SAT__TEXT_OF(...) #__VA_ARGS__
+#define SAT__TEXT(...) SAT__TEXT_OF(__VA_ARGS__)
 
 /* The names and numbers of the OpenGL registry, as far as the six headers use them. */
 enum {
@@ -7713,6 +7722,7 @@ static sat_result sat__gl_make_tiles(sat_gl *g, int width, int height)
     sat__gl_tiled *t = &g->tiled;
     sat__gl *gl = &g->gl;
     int planes = g->options.channels << g->options.moments, passes = !g->compute, i;
+    int pitch = sat__max_int(width, 256); /* tall narrow pictures have long strips */
     int tiles_x = (width - 1) / SAT__GL_TILE + 1, tiles_y = (height - 1) / SAT__GL_TILE + 1;
     unsigned cells = planes == 1 ? SAT__GL_R32UI : planes == 2 ? SAT__GL_RG32UI : SAT__GL_RGBA32UI;
     double room, strips = sat__gl_strip_texels(width, height, planes, &room);
@@ -7723,10 +7733,10 @@ static sat_result sat__gl_make_tiles(sat_gl *g, int width, int height)
         int width, height;
     } list[] = {{1, &t->cells, cells, width, height},
                 {passes, &t->partial, cells, width, height},
-                {1, &t->strips, SAT__GL_RG32UI, width, (int)((strips - 1) / width) + 1},
+                {1, &t->strips, SAT__GL_RG32UI, pitch, (int)((strips - 1) / pitch) + 1},
                 {1, &t->pool, SAT__GL_R32UI, tiles_x * planes, tiles_y},
                 {1, &t->owners, SAT__GL_RG32UI, tiles_x + 2, ((height - 1) / SAT__SUPER + 1) * planes},
-                {1, &t->wide, SAT__GL_RG32UI, width, (int)((room - 1) / width) + 1},
+                {1, &t->wide, SAT__GL_RG32UI, pitch, (int)((room - 1) / pitch) + 1},
                 {g->options.moments, &t->means, SAT__GL_R32UI, tiles_x * g->options.channels, tiles_y}};
     sat_result result = SAT_OK;
     if (strips > 2e9) return sat__gl_fail(gl, SAT_ERR_SIZE, "an index into the strips does not fit into int", NULL);

@@ -431,6 +431,8 @@ enum {
 #define TONEMAP__UNUSABLE 0x80000000u /* -0: a luminance that counts as 0 and says that the pixel shows its
                                          neighbours */
 #define TONEMAP__HIGHLIGHTS 4.5       /* octaves from the metered luminance up to what a tenth of the picture reaches */
+#define TONEMAP__LUMA 0.2126729, 0.7151522, 0.0721750 /* of Rec. 709's red, green and blue */
+#define TONEMAP__WHITE_X 0.95047f     /* X of the white D65 of Y 1 */
 #define TONEMAP__LOCAL_CAP 256.0f     /* of the scaled luminance in the sums; the display has 0.4 % left beyond it */
 #define TONEMAP__QUANTUM 4096.0f      /* steps a unit: 41 * 41 * 256 * 4096 < 2^31 */
 #define TONEMAP__STEPS 64.0f          /* of the guided filter, an octave: 441 (18 * 64)^2 < 2^31 */
@@ -1059,13 +1061,16 @@ static inline void tonemap__adapt(tonemap *map, const double *measured, double d
 /* Ashikhmin's perceptual capacity C: the number of just noticeable steps below a luminance in cd/m2, the integral of
    1 / threshold with thresholds 0.0014, 0.4027 L, 0.4027, 0.0556 L. The constants make it continuous: the published
    2.4483 jumps at 0.0034. */
+#define TONEMAP__CAPACITY(cd, ln)                                                                                      \
+    (cd < 0.0034f    ? cd * (1.0f / 0.0014f)                                                                           \
+     : cd < 1.0f     ? 16.5431894f + ln * (1.0f / 0.4027f)                                                             \
+     : cd < 7.2444f  ? 16.5431894f + (cd - 1.0f) * (1.0f / 0.4027f)                                                    \
+                     : -3.56579561f + ln * (1.0f / 0.0556f))
+
 static inline float tonemap__capacity(float cd)
 {
     float ln = 0.693147181f * sat__log2(cd < TONEMAP__DARKEST ? TONEMAP__DARKEST : cd);
-    if (cd < 0.0034f) return cd * (1 / 0.0014f);
-    if (cd < 1) return 16.5431894f + ln * (1 / 0.4027f);
-    if (cd < 7.2444f) return 16.5431894f + (cd - 1) * (1 / 0.4027f);
-    return -3.56579561f + ln * (1 / 0.0556f);
+    return TONEMAP__CAPACITY(cd, ln);
 }
 
 /* Eq A.10 and A.11 as a polynomial of log2 of the illuminance from 2^-24 to 10 lux, within 0.001 (0.2 codes) and
@@ -1127,7 +1132,7 @@ static inline void tonemap__to_xyz(double *m, tonemap_primaries primaries)
 
 static inline void tonemap__prepare_colours(tonemap__colours *colours, const tonemap_options *o)
 {
-    static const double rec709[3] = {0.2126729, 0.7151522, 0.0721750}; /* what the other headers take */
+    static const double rec709[3] = {TONEMAP__LUMA}; /* what the other headers take */
     const double balance[3] = {o->balance_red, o->balance_green, o->balance_blue};
     double from[9], to[9], inverse[9];
     int i, c;
@@ -1923,7 +1928,7 @@ static inline void tonemap__shift_red4(sat__f32x4 *v, sat__f32x4 luminance, sat_
 {
     sat__f32x4 one = sat__f32x4_set1(1), x = sat__f32x4_add(sat__f32x4_mul(sat__f32x4_set1(f->red_x[0]), v[0]),
                                                             sat__f32x4_mul(sat__f32x4_set1(f->red_x[1]), v[1]));
-    sat__f32x4 y = sat__f32x4_mul(sat__f32x4_set1(0.95047f), luminance), q, c, dx;
+    sat__f32x4 y = sat__f32x4_mul(sat__f32x4_set1(TONEMAP__WHITE_X), luminance), q, c, dx;
     sat__i32x4 red;
     int i;
     x = sat__f32x4_add(x, sat__f32x4_mul(sat__f32x4_set1(f->red_x[2]), v[2]));
@@ -2664,6 +2669,9 @@ static const char tonemap__glsl_library[] =
     "#define TONEMAP_PHI_TERM 12.8\n"
     "#define TONEMAP_SCALES 8\n"
     "#endif\n"
+    "const vec3 tonemap_luma = vec3(" SAT__TEXT(TONEMAP__LUMA) ");\n"
+    "const float tonemap_white_x = " SAT__TEXT(TONEMAP__WHITE_X) ";\n"
+    "const float tonemap_darkest = " SAT__TEXT(TONEMAP__DARKEST) ";\n"
     SAT__GLSL(
         float tonemap_sane(float y) {
             uint bits = floatBitsToUint(y);
@@ -2672,7 +2680,7 @@ static const char tonemap__glsl_library[] =
         })
     SAT__GLSL(
         float tonemap_luminance(vec3 rgb) {
-            return tonemap_sane(0.2126729 * rgb.r + 0.7151522 * rgb.g + 0.0721750 * rgb.b);
+            return tonemap_sane(tonemap_luma.r * rgb.r + tonemap_luma.g * rgb.g + tonemap_luma.b * rgb.b);
         })
     SAT__GLSL(
         float tonemap_rho(float lux) {
@@ -2682,7 +2690,7 @@ static const char tonemap__glsl_library[] =
     SAT__GLSL(
         /* x, step: X, and colour of a step of X, of the primaries */
         vec3 tonemap_mesopic_in(vec3 rgb, float luminance, float rho, vec3 x, vec3 step) {
-            float y = 0.95047 * max(luminance, 7.8886e-31);
+            float y = tonemap_white_x * max(luminance, tonemap_darkest);
             float q = min(dot(rgb, x) / y, 1048576.0);
             if (!(q > 1.0 && rho < 1.0)) return rgb;
             float c = 1.0 + rho * (pow(q, 1.0 / 3.0) - 1.0);
@@ -2746,8 +2754,9 @@ static const char tonemap__glsl_reduce[] =
             uint bits = floatBitsToUint(y);
             if (!(y > 0.0) || bits >= 0x71800000u) return ivec4(0);
             float t = uintBitsToFloat((bits & 0x007fffffu) | 0x3f800000u) - 1.0;
-            float q = -0.0959564262 + t * 0.0258414329;
-            q = 0.442544943 + t * (-0.275600307 + t * (0.18194886 + t * q));
+)
+    "float q = " SAT__TEXT(SAT__LOG2_OF(t)) ";\n"
+    SAT__GLSL(
             return weight * ivec4(int(bits >> 23) - 127, int((t + t * (1.0 - t) * q) * 65536.0 + 0.5), 1, 0);
         })
     "#else\n"
@@ -2924,7 +2933,7 @@ static const char tonemap__glsl_state[] =
     "#endif\n"
     "#if TONEMAP_METERING == 0\n"
     SAT__GLSL(
-                average = max(average + means.x - means.w, top + means.y - 4.5);
+                average = max(average + means.x - means.w, top + means.y - TONEMAP_HIGHLIGHTS);
                 average = second.z = tonemap_hold(second.z, first.w <= 0.0, average, 64.0);)
     "#endif\n"
     SAT__GLSL(
@@ -3167,14 +3176,14 @@ static const char tonemap__glsl_map[] =
         uniform int mixes;
         out vec4 value;
         float tonemap_capacity(float cd) {
-            float ln = log(max(cd, 7.8886e-31));
-            if (cd < 0.0034) return cd / 0.0014;
-            if (cd < 1.0) return 16.5431894 + ln / 0.4027;
-            return cd < 7.2444 ? 16.5431894 + (cd - 1.0) / 0.4027 : ln / 0.0556 - 3.56579561;
+            float ln = log(max(cd, TONEMAP_DARKEST));
+)
+    "return " SAT__TEXT(TONEMAP__CAPACITY(cd, ln)) ";\n"
+    SAT__GLSL(
         })
     SAT__GLSL(
         vec3 tonemap_gamut(vec3 v, float grey) {
-            v = min(max(v, 0.0), 5.7646075e17);
+            v = min(max(v, 0.0), TONEMAP_GAMUT_TOP);
             float top = max(max(v.r, v.g), v.b);
             if (TONEMAP_GAMUT < 0.0 || !(top > 1.0)) return v;
             float dim = exp2(-TONEMAP_GAMUT * log2(top));
@@ -3217,7 +3226,7 @@ static const char tonemap__glsl_map[] =
             float low = tonemap_capacity(cd * exp2(second.x)), high = tonemap_capacity(cd * exp2(second.y)),
                 display = key;
             if (second.y - second.x > 0.125) display = (tonemap_capacity(la * cd / scale) - low) / (high - low);
-            gain = max(display, 0.0) * scale / max(la, 7.8886e-31);)
+            gain = max(display, 0.0) * scale / max(la, TONEMAP_DARKEST);)
     "#elif TONEMAP_OPERATOR == 4\n"
     SAT__GLSL(gain = scale * (TONEMAP_BURN == 1 ? exp2(-first.z) : 1.0 / peak);)
     "#elif TONEMAP_OPERATOR > 5\n"
@@ -3352,6 +3361,9 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define_float(gl, "TONEMAP_OCTAVES", TONEMAP__OCTAVES);
     sat__gl_define_float(gl, "TONEMAP_OCTAVE", TONEMAP__STEPS); /* in steps */
     sat__gl_define_float(gl, "TONEMAP_LOCAL_CAP", TONEMAP__LOCAL_CAP);
+    sat__gl_define_float(gl, "TONEMAP_DARKEST", TONEMAP__DARKEST);
+    sat__gl_define_float(gl, "TONEMAP_GAMUT_TOP", TONEMAP__GAMUT_TOP);
+    sat__gl_define_float(gl, "TONEMAP_HIGHLIGHTS", (float)TONEMAP__HIGHLIGHTS);
     sat__gl_define_text(gl, "TONEMAP_COUNTS", g->given & TONEMAP__IF_COUNTED ? "usampler2D" : "sampler2D");
     sat__gl_define(gl, "TONEMAP_BURN",
                    !tonemap__is_infinite(o->white) && (o->white > 0 || o->operation != TONEMAP_LINEAR));

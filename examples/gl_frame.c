@@ -1,6 +1,7 @@
 /* gl_frame - a frame that stays on the GPU, by public calls only.     SPDX-License-Identifier: MIT-0 OR Unlicense
 
-       gl_frame                                       a window; its title names the milliseconds of each stage
+       gl_frame                                       a window; its title names the milliseconds of each stage (by time
+                                                      queries, which OpenGL ES lacks)
        gl_frame --frames 9 --out frame.png            without a window (OSMesa; LIGHTSCAN_GL=egl: the GPU)
 
    gl_scene.h draws colour, normals and depth. ssao_sat.h and fiv.h read its textures by name, a pass of the renderer
@@ -199,7 +200,7 @@ static int frame_window(frame *f, int width, int height, const common_settings *
     const sat_gl_target target = sat_gl_to_framebuffer(0, 0, 0);
     GLFWwindow *window;
     char text[200];
-    int i, ok;
+    int i = 0, ok;
     if (!glfwInit()) return common_say(common, "there is no display to open a window on; --out FILE does without");
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
@@ -207,16 +208,14 @@ static int frame_window(frame *f, int width, int height, const common_settings *
     window = glfwCreateWindow(width, height, "lightscan", NULL, NULL);
     if (!window) return glfwTerminate(), common_say(common, "no window with OpenGL 3.3");
     glfwMakeContextCurrent(window);
+    glfwGetFramebufferSize(window, &width, &height); /* pixels, where a window is measured in other units */
     ok = frame_create(f, glfwGetProcAddress, width, height, &common->threads);
-    for (i = 0; ok && !glfwWindowShouldClose(window); ++i) {
+    for (; ok && !glfwWindowShouldClose(window); glfwSwapBuffers(window), glfwPollEvents()) {
         ok = frame_draw(f, &target, i ? 1 / 60.0 : 0);
-        if (i % 30 == 2) glfwSetWindowTitle(window, frame_times(f, text, sizeof text));
-        glfwSwapBuffers(window);
-        glfwPollEvents();
+        if (i++ % 30 == 2) glfwSetWindowTitle(window, frame_times(f, text, sizeof text));
     }
     frame_destroy(f);
-    glfwTerminate();
-    return ok;
+    return glfwTerminate(), ok;
 }
 #endif
 

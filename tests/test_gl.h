@@ -371,7 +371,7 @@ TEST(tables_take_smaller_pictures)
 TEST(objects_take_smaller_pictures)
 {
     static unsigned char own[16 * GL_N], there[16 * GL_N];
-    static const int calls[] = {GL_TONE};
+    static const int calls[] = {GL_TONE, GL_AO};
     static gl_scene s, small;
     sat_gl_target to = sat_gl_to(SAT_GL_OWN, 0, 0, 0, 0, 0);
     sat__gl_state state;
@@ -386,7 +386,7 @@ TEST(objects_take_smaller_pictures)
         EXPECT_EQ(gl_call(&s, call, NULL), SAT_OK);
         EXPECT_EQ(gl_call(&small, call, NULL), SAT_OK);
         to.width = GL_SMALL_W, to.height = GL_SMALL_H;
-        s.input.width = GL_SMALL_W, s.input.height = GL_SMALL_H;
+        s.input = small.input; /* another size is another projection */
         EXPECT_EQ(gl_call(&s, call, &to), SAT_OK);
         sat__gl_begin(&gl_f, &state, 1);
         EXPECT_EQ(sat__gl_read(&gl_f, own, gl_own(&s, call), gl_format(call), GL_SMALL_W, GL_SMALL_H), SAT_OK);
@@ -395,10 +395,62 @@ TEST(objects_take_smaller_pictures)
         EXPECT(memcmp(own, there, (size_t)(bytes * GL_SMALL_W * GL_SMALL_H)) == 0);
         to.width = s.input.width = GL_W + 1;
         EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_SIZE);
-        s.input.width = GL_W, s.input.height = GL_H;
+        s.input = ssao_sat_input_linear(NULL, GL_W, GL_H, 1);
     }
     gl_destroy(&s);
     gl_destroy(&small);
+    gl_close();
+}
+
+/* One layer of an array, by glTextureView: the picture of a texture of its own. */
+TEST(a_layer_is_an_input_by_a_view_of_it)
+{
+    void(SAT__GL_CALL * storage)(unsigned target, int levels, unsigned internal, int width, int height, int depth);
+    void(SAT__GL_CALL * view)(unsigned texture, unsigned target, unsigned of, unsigned internal, unsigned level,
+                              unsigned levels, unsigned layer, unsigned layers);
+    static unsigned char own[16 * GL_N], there[16 * GL_N], texels[16 * GL_N];
+    static gl_scene s;
+    sat_gl_proc procs[2];
+    int call;
+    if (!gl_open()) return;
+    procs[0] = gl_screen.get_proc("glTexStorage3D");
+    procs[1] = gl_screen.get_proc("glTextureView");
+    if (!gl_f.has_compute || !procs[0] || !procs[1]) {
+        expect_skip("needs OpenGL 4.3");
+        gl_close();
+        return;
+    }
+    memcpy(&storage, &procs[0], sizeof storage);
+    memcpy(&view, &procs[1], sizeof view);
+    gl_create(&s, gl_screen.get_proc);
+    gl_fill(&s);
+    for (call = 0; call < GL_RAIN; call++) {
+        unsigned *input = call == GL_TONE ? &s.hdr : call == GL_AO ? &s.depth : &s.points, kept = *input, array, layer;
+        unsigned internal = call == GL_AO ? SAT__GL_R32F : SAT__GL_RGBA32F, format, type;
+        sat__gl_state state;
+        sat__gl_transfer(internal, &format, &type);
+        EXPECT_EQ(gl_call(&s, call, NULL), SAT_OK);
+        sat__gl_begin(&gl_f, &state, 1);
+        EXPECT_EQ(sat__gl_read(&gl_f, own, gl_own(&s, call), gl_format(call), GL_W, GL_H), SAT_OK);
+        EXPECT_EQ(sat__gl_read(&gl_f, texels, kept, internal, GL_W, GL_H), SAT_OK);
+        gl_f.GenTextures(1, &array);
+        gl_f.BindTexture(SAT__GL_TEXTURE_2D_ARRAY, array);
+        storage(SAT__GL_TEXTURE_2D_ARRAY, 1, internal, GL_W, GL_H, 2);
+        gl_f.TexSubImage3D(SAT__GL_TEXTURE_2D_ARRAY, 0, 0, 0, 1, GL_W, GL_H, 1, format, type, texels);
+        gl_f.GenTextures(1, &layer);
+        view(layer, SAT__GL_TEXTURE_2D, array, internal, 0, 1, 1, 1);
+        sat__gl_end(&gl_f, &state);
+        *input = layer;
+        EXPECT_EQ(gl_call(&s, call, NULL), SAT_OK);
+        *input = kept;
+        sat__gl_begin(&gl_f, &state, 1);
+        EXPECT_EQ(sat__gl_read(&gl_f, there, gl_own(&s, call), gl_format(call), GL_W, GL_H), SAT_OK);
+        sat__gl_end(&gl_f, &state);
+        EXPECT(memcmp(own, there, (gl_format(call) == SAT__GL_RGBA32F ? 16 : 4) * GL_N) == 0);
+        gl_f.DeleteTextures(1, &layer);
+        gl_f.DeleteTextures(1, &array);
+    }
+    gl_destroy(&s);
     gl_close();
 }
 
@@ -674,6 +726,88 @@ TEST(after_create_nothing_is_made)
     softassign_gl_destroy(match);
     gl_destroy(&s);
     EXPECT(support_memory_clean(&memory[0]) && support_memory_clean(&memory[1]));
+}
+
+/* ---- a context that is lost, before or after create: an error or nothing, but an end */
+
+static int gl_is_lost;
+static unsigned SAT__GL_CALL gl_lost_error(void) { return gl_is_lost ? 0x0507u : 0u; }
+static sat_gl_proc gl_lost_proc(const char *name)
+{
+    return strcmp(name, "glGetError") == 0 ? (sat_gl_proc)gl_lost_error : gl_fake_proc(name);
+}
+
+TEST(a_lost_context_ends_in_an_error)
+{
+    static gl_scene s;
+    sat_gl *tables = NULL;
+    tonemap_gl *tone = NULL;
+    int k;
+    memset(&gl_fake, 0, sizeof gl_fake);
+    memset(&s, 0, sizeof s);
+    for (k = 0; k < 2; k++) {
+        sat_gl_options go = sat_gl_defaults();
+        go.format = k ? SAT_GL_TWO_FLOAT : SAT_GL_TILED;
+        go.width = go.height = 40;
+        gl_is_lost = 1;
+        EXPECT_EQ(sat_gl_create(&tables, gl_lost_proc, &go), SAT_ERR_GL_STATE);
+        EXPECT(strstr(sat_gl_message(tables), "0x0507") != NULL);
+        sat_gl_destroy(tables);
+        gl_is_lost = 0;
+        go.width = go.height = 0;
+        EXPECT_EQ(sat_gl_create(&tables, gl_lost_proc, &go), SAT_OK);
+        EXPECT_EQ(sat_gl_build(tables, 0, 5, 40, 30), SAT_OK);
+        gl_is_lost = 1;
+        EXPECT_EQ(sat_gl_build(tables, 0, 5, 40, 30), SAT_OK); /* nothing is asked in a frame */
+        EXPECT_EQ(sat_gl_build(tables, 0, 5, 41, 30), SAT_ERR_GL_STATE);
+        sat_gl_destroy(tables);
+    }
+    EXPECT_EQ(tonemap_gl_create(&tone, gl_lost_proc, 40, 30, NULL), SAT_ERR_GL_STATE);
+    EXPECT(tonemap_gl_message(tone)[0] != 0);
+    tonemap_gl_destroy(tone);
+    gl_is_lost = 0;
+    gl_create(&s, gl_lost_proc);
+    s.hdr = 1, s.depth = 2, s.normals = 3, s.points = 4;
+    gl_is_lost = 1;
+    for (k = 0; k < GL_RAIN; k++) gl_call(&s, k, NULL);
+    gl_destroy(&s);
+    gl_is_lost = 0;
+}
+
+/* Half floats, bytes, integers and depth where floats are asked for: no crash, no state, and the next call is right. */
+TEST(textures_of_other_formats_do_no_harm)
+{
+    static const unsigned formats[] = {SAT__GL_RGBA16F, SAT__GL_RGBA8, SAT__GL_R32UI, SAT__GL_DEPTH_COMPONENT24,
+                                       SAT__GL_RG32F, SAT__GL_RGB32F};
+    static unsigned char first[4 * GL_N], after[4 * GL_N];
+    static gl_scene s;
+    sat__gl_state state;
+    size_t k;
+    if (!gl_open()) return;
+    gl_create(&s, gl_screen.get_proc);
+    gl_fill(&s);
+    EXPECT_EQ(gl_call(&s, GL_TONE, NULL), SAT_OK);
+    sat__gl_begin(&gl_f, &state, 1);
+    EXPECT_EQ(sat__gl_read(&gl_f, first, gl_own(&s, GL_TONE), SAT__GL_RGBA8, GL_W, GL_H), SAT_OK);
+    sat__gl_end(&gl_f, &state);
+    for (k = 0; k < sizeof formats / sizeof *formats; k++) {
+        unsigned texture = gl_texture(formats[k], GL_W, GL_H, NULL), kept = s.hdr;
+        int framebuffer = -1;
+        s.hdr = texture;
+        gl_call(&s, GL_TONE, NULL);
+        s.hdr = kept;
+        sat__gl_clear_errors(&gl_f);
+        gl_f.GetIntegerv(SAT__GL_DRAW_FRAMEBUFFER_BINDING, &framebuffer);
+        EXPECT_EQ(framebuffer, 0);
+        EXPECT_EQ(gl_call(&s, GL_TONE, NULL), SAT_OK);
+        sat__gl_begin(&gl_f, &state, 1);
+        EXPECT_EQ(sat__gl_read(&gl_f, after, gl_own(&s, GL_TONE), SAT__GL_RGBA8, GL_W, GL_H), SAT_OK);
+        sat__gl_end(&gl_f, &state);
+        EXPECT(memcmp(first, after, sizeof first) == 0);
+        gl_f.DeleteTextures(1, &texture);
+    }
+    gl_destroy(&s);
+    gl_close();
 }
 
 /* ---- options that change: what the new ones give is what an object made with them gives */

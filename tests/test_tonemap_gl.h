@@ -438,50 +438,93 @@ TEST(gl_takes_smaller_pictures)
     screen_close(&s);
 }
 
+/* ---- one picture after the other, on both */
+
+typedef struct pair {
+    screen s;
+    int width, height;
+    float *pixels;
+    unsigned char *codes[2];
+    unsigned hdr;
+    tonemap *map;
+    tonemap_gl *gl;
+} pair;
+
+/* 0 without OpenGL. */
+static int pair_open(pair *p, int width, int height, const tonemap_options *o)
+{
+    memset(p, 0, sizeof *p);
+    if (!screen_open(&p->s)) return 0;
+    p->width = width;
+    p->height = height;
+    p->pixels = lit_pixels(width, height, 0);
+    p->codes[0] = (unsigned char *)malloc((size_t)(width * height) * 8);
+    p->codes[1] = p->codes[0] + width * height * 4;
+    p->hdr = screen_texture(&p->s, SAT__GL_RGBA32F, width, height, p->pixels);
+    EXPECT_EQ(tonemap_create(&p->map, width, height, o), SAT_OK);
+    EXPECT_EQ(tonemap_gl_create(&p->gl, p->s.context.get_proc, width, height, o), SAT_OK);
+    return 1;
+}
+
+static void pair_close(pair *p)
+{
+    tonemap_destroy(p->map);
+    tonemap_gl_destroy(p->gl);
+    p->s.gl.DeleteTextures(1, &p->hdr);
+    screen_close(&p->s);
+    free(p->pixels);
+    free(p->codes[0]);
+}
+
+/* The largest difference of two codes of the next picture, the same one times `light`. */
+static int pair_step(pair *p, double light, double dt)
+{
+    int n = p->width * p->height * 4, i, worst = 0;
+    float *scaled = (float *)malloc((size_t)n * sizeof(float));
+    sat_image view = sat_image_f32(scaled, p->width, p->height, 4);
+    sat__gl_state state;
+    for (i = 0; i < n; ++i) scaled[i] = (float)((double)p->pixels[i] * light);
+    sat__gl_begin(&p->s.gl, &state, 1);
+    sat__gl_upload(&p->s.gl, p->hdr, SAT__GL_RGBA32F, p->width, p->height, scaled);
+    sat__gl_end(&p->s.gl, &state);
+    EXPECT_EQ(tonemap_apply_u8(p->map, p->codes[0], 0, &view, dt, NULL), SAT_OK);
+    EXPECT_EQ(tonemap_gl_apply(p->gl, 0, p->hdr, dt), SAT_OK);
+    screen_read(&p->s, p->codes[1], tonemap_gl_texture(p->gl), p->width, p->height);
+    for (i = 0; i < n; ++i)
+        if (i % 4 != 3 && abs((int)p->codes[0][i] - (int)p->codes[1][i]) > worst)
+            worst = abs((int)p->codes[0][i] - (int)p->codes[1][i]);
+    free(scaled);
+    return worst;
+}
+
 /* The rounded luminances and their sums are the CPU's integers. */
 TEST(gl_sums_are_the_cpus_integers)
 {
     enum { W = 90, H = 70 };
-    screen s;
-    float *pixels = lit_pixels(W, H, 0);
-    sat_image view = sat_image_f32(pixels, W, H, 4);
-    unsigned char *out = (unsigned char *)malloc(W * H * 4);
-    uint32_t *quanta = (uint32_t *)malloc(W * H * 4);
+    static uint32_t quanta[W * H];
     int32_t row[W + 3], sums[4]; /* quantise writes by fours */
     tonemap_options o = local_options();
-    tonemap *map = NULL;
-    tonemap_gl *gl = NULL;
+    pair p;
     const sat__gl_target *level;
     sat__gl_state state;
-    unsigned hdr;
     int x, y, off = 0;
     int64_t log_sum;
-    if (!screen_open(&s)) { free(pixels); free(out); free(quanta); return; }
-    hdr = screen_texture(&s, SAT__GL_RGBA32F, W, H, pixels);
-    EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
-    EXPECT_EQ(tonemap_apply_u8(map, out, W * 4, &view, 0, NULL), SAT_OK);
-    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
-    EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, 0), SAT_OK);
-    sat__gl_begin(&s.gl, &state, 1);
-    EXPECT_EQ(sat__gl_read(&s.gl, quanta, gl->target[TONEMAP__T_QUANTA].texture, SAT__GL_R32UI, W, H), SAT_OK);
-    level = &gl->target[TONEMAP__T_LEVEL + gl->levels - 1];
-    EXPECT_EQ(sat__gl_read(&s.gl, sums, level->texture, SAT__GL_RGBA32I, 1, 1), SAT_OK);
-    sat__gl_end(&s.gl, &state);
+    if (!pair_open(&p, W, H, &o)) return;
+    EXPECT(pair_step(&p, 1, 0) <= 1);
+    sat__gl_begin(&p.s.gl, &state, 1);
+    EXPECT_EQ(sat__gl_read(&p.s.gl, quanta, p.gl->target[TONEMAP__T_QUANTA].texture, SAT__GL_R32UI, W, H), SAT_OK);
+    level = &p.gl->target[TONEMAP__T_LEVEL + p.gl->levels - 1];
+    EXPECT_EQ(sat__gl_read(&p.s.gl, sums, level->texture, SAT__GL_RGBA32I, 1, 1), SAT_OK);
+    sat__gl_end(&p.s.gl, &state);
     log_sum = (int64_t)sums[0] * 65536 + sums[1];
-    EXPECT_NEAR((double)(log_sum - map->worker[0].log_sum) / 65536 / (W * H), 0, 1e-6);
+    EXPECT_NEAR((double)(log_sum - p.map->worker[0].log_sum) / 65536 / (W * H), 0, 1e-6);
     EXPECT_EQ(sums[2], W * H);
     for (y = 0; y < H; ++y) {
-        tonemap__quantise(row, map->luminance + y * map->row, W, &map->frame);
+        tonemap__quantise(row, p.map->luminance + y * p.map->row, W, &p.map->frame);
         for (x = 0; x < W; ++x) off += abs(row[x] - (int32_t)quanta[y * W + x]) > (row[x] >> 20) + 1;
     }
     EXPECT_EQ(off, 0);
-    tonemap_destroy(map);
-    tonemap_gl_destroy(gl);
-    s.gl.DeleteTextures(1, &hdr);
-    screen_close(&s);
-    free(pixels);
-    free(out);
-    free(quanta);
+    pair_close(&p);
 }
 
 TEST(gl_state_comes_back)
@@ -528,68 +571,31 @@ TEST(gl_state_comes_back)
     free(pixels);
 }
 
-/* The brightness of the middle of a picture whose light changes by a factor, over time. */
+/* Light that changes by a factor, over time. */
 TEST(gl_adapts_as_the_cpu_does)
 {
-    enum { W = 24, H = 18 };
     const double dt[6] = {0, 0.1, 0.3, 0, 2, 1}, light[6] = {1, 100, 100, 0, 0.1, 0.1005};
-    screen s;
-    float *pixels = lit_pixels(W, H, 0), *scaled = (float *)malloc(W * H * 16);
-    unsigned char cpu[W * H * 4], gpu[W * H * 4];
-    sat_image view = sat_image_f32(scaled, W, H, 4);
     tonemap_options o = local_options();
-    tonemap *map = NULL;
-    tonemap_gl *gl = NULL;
-    unsigned hdr;
-    int i, k, worst = 0;
+    pair p;
+    int k;
     o.adapt_seconds = 0.5;
     o.darker_seconds = 1.5;
-    if (!screen_open(&s)) { free(pixels); free(scaled); return; }
-    hdr = screen_texture(&s, SAT__GL_RGBA32F, W, H, pixels);
-    EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
-    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
-    for (k = 0; k < 6; ++k) {
-        sat__gl_state state;
-        for (i = 0; i < W * H * 4; ++i) scaled[i] = (float)((double)pixels[i] * light[k]);
-        sat__gl_begin(&s.gl, &state, 1);
-        sat__gl_upload(&s.gl, hdr, SAT__GL_RGBA32F, W, H, scaled);
-        sat__gl_end(&s.gl, &state);
-        EXPECT_EQ(tonemap_apply_u8(map, cpu, W * 4, &view, dt[k], NULL), SAT_OK);
-        EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, dt[k]), SAT_OK);
-        screen_read(&s, gpu, tonemap_gl_texture(gl), W, H);
-        for (i = 0; i < W * H * 4; ++i)
-            if (i % 4 != 3 && abs((int)cpu[i] - (int)gpu[i]) > worst) worst = abs((int)cpu[i] - (int)gpu[i]);
-    }
-    EXPECT(worst <= 1);
-    tonemap_destroy(map);
-    tonemap_gl_destroy(gl);
-    s.gl.DeleteTextures(1, &hdr);
-    screen_close(&s);
-    free(pixels);
-    free(scaled);
+    if (!pair_open(&p, 24, 18, &o)) return;
+    for (k = 0; k < 6; ++k) EXPECT(pair_step(&p, light[k], dt[k]) <= 1);
+    pair_close(&p);
 }
 
 /* What is a uniform changes between two pictures, as on the CPU; what is compiled is refused and changes nothing. */
 TEST(gl_options_change_between_pictures)
 {
-    enum { W = 40, H = 30 };
-    screen s;
-    float *pixels = lit_pixels(W, H, 0);
-    unsigned char cpu[W * H * 4], gpu[W * H * 4];
-    sat_image view = sat_image_f32(pixels, W, H, 4);
     tonemap_options o = local_options(), other;
-    tonemap *map = NULL;
-    tonemap_gl *gl = NULL;
-    unsigned hdr;
-    int i, k, worst = 0;
+    pair p;
+    int k;
     EXPECT_EQ(tonemap_gl_set_options(NULL, &o), SAT_ERR_ARGUMENT);
-    if (!screen_open(&s)) { free(pixels); return; }
-    hdr = screen_texture(&s, SAT__GL_RGBA32F, W, H, pixels);
     o.white = 5;
     o.adapt_seconds = 1;
-    EXPECT_EQ(tonemap_create(&map, W, H, &o), SAT_OK);
-    EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
-    EXPECT_EQ(tonemap_gl_set_options(gl, NULL), SAT_ERR_ARGUMENT); /* the default's white is infinite */
+    if (!pair_open(&p, 40, 30, &o)) return;
+    EXPECT_EQ(tonemap_gl_set_options(p.gl, NULL), SAT_ERR_ARGUMENT); /* the default's white is infinite */
     for (k = 0; k < 9; ++k) {
         other = o;
         if (k == 0) other.operation = TONEMAP_LINEAR;
@@ -601,7 +607,7 @@ TEST(gl_options_change_between_pictures)
         if (k == 6) other.metering = TONEMAP_METERING_LOG_AVERAGE;
         if (k == 7) other.key = 0;
         if (k == 8) other.adapt_seconds = -1;
-        EXPECT_EQ(tonemap_gl_set_options(gl, &other), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(tonemap_gl_set_options(p.gl, &other), SAT_ERR_ARGUMENT);
     }
     for (k = 0; k < 6; ++k) {
         if (k == 1) o.key = 0.4;
@@ -609,20 +615,11 @@ TEST(gl_options_change_between_pictures)
         if (k == 3) o.exposure = 0.1;
         if (k == 4) o.exposure = 0, o.adapt_high = 0.02;
         if (k == 5) o.darker_seconds = 0.3;
-        EXPECT_EQ(tonemap_set_options(map, &o), SAT_OK);
-        EXPECT_EQ(tonemap_gl_set_options(gl, &o), SAT_OK);
-        EXPECT_EQ(tonemap_apply_u8(map, cpu, W * 4, &view, 0.2, NULL), SAT_OK);
-        EXPECT_EQ(tonemap_gl_apply(gl, 0, hdr, 0.2), SAT_OK);
-        screen_read(&s, gpu, tonemap_gl_texture(gl), W, H);
-        for (i = 0; i < W * H * 4; ++i)
-            if (i % 4 != 3 && abs((int)cpu[i] - (int)gpu[i]) > worst) worst = abs((int)cpu[i] - (int)gpu[i]);
+        EXPECT_EQ(tonemap_set_options(p.map, &o), SAT_OK);
+        EXPECT_EQ(tonemap_gl_set_options(p.gl, &o), SAT_OK);
+        EXPECT(pair_step(&p, 1, 0.2) <= 1);
     }
-    EXPECT(worst <= 1);
-    tonemap_destroy(map);
-    tonemap_gl_destroy(gl);
-    s.gl.DeleteTextures(1, &hdr);
-    screen_close(&s);
-    free(pixels);
+    pair_close(&p);
 }
 
 static sat_gl_proc no_proc(const char *name)
