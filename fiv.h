@@ -121,7 +121,7 @@
      0.002 to 0.005 at 1.0 to 1.3 times it; 0.5 R above, 0.011 to 0.034, 0.004 to 0.021, 0.011 to 0.075, at 1/50. Twenty
      lamps: 0.0005, with 8 lights 0.04; more lights than 2 to 8 change nothing in city, forest and night. A disc's
      penumbra: 0.008, as of a point 0.07.
-   - Shared masks, pixels R / 300 apart at the bunny's foot: a fifth of the time, 0.010 rms of the largest off.
+   - Shared masks, pixels R / 300 apart at the bunny's foot: a sixth of the time, 0.0012 rms of the largest off.
    - A mask costs 0.94 times Embree's eight-wide rays at 3.7k triangles, 1.3 to 1.75 times at 11k to 48k.
    - Two occluders, 64x33x30: NRMSE 0.034 with eq 14-15, 0.0105 FIV_SCALED, 0.007 FIV_MASK.
    - Cut by the horizon: FIV_SCALED has 0.14 to 0.36 of the error of (d + R) / 2R at d = 0 to 0.6 R.
