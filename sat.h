@@ -1485,6 +1485,20 @@ static inline void sat__f32x4_load4(const float *p, sat__f32x4 *r, sat__f32x4 *g
 }
 #endif
 
+/* row[x] = above[x] + in[0] + ... + in[x] modulo 2^32. All three are to be longer than width: it reads and writes up to
+   three beyond. */
+static inline void sat__add_row(uint32_t *row, const uint32_t *above, const int32_t *in, int width)
+{
+    sat__i32x4 carry = sat__i32x4_set1(0);
+    int x;
+    for (x = 0; x < width; x += 4) {
+        sat__i32x4 sum = sat__i32x4_add(sat__i32x4_prefix(sat__i32x4_load(in + x)), carry);
+        carry = sat__i32x4_last(sum);
+        sat__i32x4_store((int32_t *)(void *)(row + x),
+                         sat__i32x4_add(sum, sat__i32x4_load((const int32_t *)(const void *)(above + x))));
+    }
+}
+
 /* What a sibling's implementation calls to be sure that sat.h was implemented, and in this version. */
 static inline int sat__version_matches(void)
 {
@@ -3562,18 +3576,40 @@ static void sat__replace(float *p, int n, float limit, int care, sat__tally *tal
     }
 }
 
-/* Pixels [x0, x0 + n) of a row as floats: a pointer into the image where nothing has to change. */
-static const float *sat__prepare(const sat_table *t, const sat_image *image, int y, int x0, int n, int channel,
-                                 int worker, int care, sat__tally *tally)
+/* Pixels [x0, x0 + n) of row y of the image: who reads them, how closely, and where it is counted. */
+typedef struct sat__strip {
+    const sat_image *image;
+    int channel, y, x0, n, worker, care;
+    sat__tally *tally;
+} sat__strip;
+
+static inline sat__strip sat__strip_of(const sat_image *image, int channel, int y, int x0, sat__tally *tally)
 {
-    float *scratch = t->pixels + (size_t)worker * SAT__MAX_STRIP, mean = t->mean[channel];
+    sat__strip strip;
+    strip.image = image;
+    strip.channel = channel;
+    strip.y = y;
+    strip.x0 = x0;
+    strip.n = sat__min_int(image->width - x0, SAT__MAX_STRIP);
+    strip.worker = 0;
+    strip.care = SAT__CLAMP_ALL;
+    strip.tally = tally;
+    return strip;
+}
+
+/* Its pixels as floats: a pointer into the image where nothing has to change. */
+static const float *sat__prepare(const sat_table *t, const sat__strip *strip)
+{
+    const sat_image *image = strip->image;
+    const int y = strip->y, x0 = strip->x0, n = strip->n, channel = strip->channel, care = strip->care;
+    float *scratch = t->pixels + (size_t)strip->worker * SAT__MAX_STRIP, mean = t->mean[channel];
     const float *p = scratch;
     int i;
     if (image->format == SAT_F32 && image->channels == 1) p = (const float *)sat__image_row(image, y) + x0;
     else sat__read_row(scratch, image, y, x0, x0 + n, channel);
     if (care != SAT__TRUST && !sat__is_tame(p, n, care == SAT__CLAMP_ALL ? (float)t->limit : 3.4028235e38f)) {
         if (p != scratch) memcpy(scratch, p, (size_t)n * sizeof(float));
-        sat__replace(scratch, n, (float)t->limit, care, tally);
+        sat__replace(scratch, n, (float)t->limit, care, strip->tally);
         p = scratch;
     }
     if (t->options.subtract_mean) {
@@ -4205,7 +4241,7 @@ static float sat__giant_limit(const sat_table *t) { return t->limit < 1e20 ? (fl
 static void sat__choose_quantum(const sat_table *t, sat__tile *tile, const sat__source *from, int rows,
                                 sat__extent e)
 {
-    float threshold = e.sum / ((float)(1 << 2 * t->shift) * 1024); /* 2^-12 of such a pixel is lost */
+    float threshold = e.sum / ((float)(1 << 2 * t->shift) * 256); /* 2^-14 of such a pixel is lost */
     int y, count = 0;
     tile->slot = 0;
     tile->quantum = sat__tile_quantum((double)e.sum, 31);
@@ -4587,13 +4623,15 @@ typedef union sat__carry {
 } sat__carry;
 
 /* Row sums of pixels [x0, x0 + n) into a row of a flat table. */
-static void sat__flat_piece(const sat_table *t, const sat_image *image, int channel, int y, int x0, int n,
-                            unsigned char *row, sat__carry *carry, int worker, int care, sat__tally *tally, int stream)
+static void sat__flat_piece(const sat_table *t, unsigned char *row, sat__carry *carry, const sat__strip *strip,
+                            int stream)
 {
-    const float *in = sat__prepare(t, image, y, x0, n, channel, worker, care, tally);
-    uint32_t *integers = t->integers ? t->integers + (size_t)worker * SAT__MAX_STRIP : NULL;
-    void *out = row + ((size_t)x0 + 1) * t->element,
-         *column = t->columns + (size_t)channel * t->columns_stride + (size_t)x0 * t->element;
+    const int n = strip->n;
+    const float *in = sat__prepare(t, strip);
+    uint32_t *integers = t->integers ? t->integers + (size_t)strip->worker * SAT__MAX_STRIP : NULL;
+    sat__tally *tally = strip->tally;
+    void *out = row + ((size_t)strip->x0 + 1) * t->element,
+         *column = t->columns + (size_t)strip->channel * t->columns_stride + (size_t)strip->x0 * t->element;
     int32_t signs = 0;
     if (integers) sat__quantise(t, integers, in, n);
     switch (t->options.kind) {
@@ -4623,10 +4661,14 @@ static void sat__flat_block(const sat__build *b, int strip0, int strip1, int y0,
         unsigned char *row = sat__row(t, b->channel, y + 1);
         sat__carry carry;
         memcpy(&carry, row + (size_t)strip0 * SAT__STRIP * t->element, t->element);
-        for (strip = strip0; strip < strip1; strip++)
-            sat__flat_piece(t, b->image, b->channel, y, strip * SAT__STRIP,
-                            sat__min_int(SAT__STRIP, t->width - strip * SAT__STRIP), row, &carry, worker, b->care,
-                            t->tallies + b->channel * t->bands + strip, b->stream);
+        for (strip = strip0; strip < strip1; strip++) {
+            sat__strip piece = sat__strip_of(b->image, b->channel, y, strip * SAT__STRIP,
+                                             t->tallies + b->channel * t->bands + strip);
+            piece.n = sat__min_int(SAT__STRIP, piece.n);
+            piece.worker = worker;
+            piece.care = b->care;
+            sat__flat_piece(t, row, &carry, &piece, b->stream);
+        }
     }
 }
 
@@ -4680,8 +4722,8 @@ static void sat__tally_flat(sat_table *t, const sat_image *image)
         }
         for (y = 0; y < t->height; y++)
             for (x = 0; x < t->width; x += SAT__MAX_STRIP) {
-                int n = sat__min_int(t->width - x, SAT__MAX_STRIP);
-                sat__measure(sat__prepare(t, image, y, x, n, channel, 0, SAT__CLAMP_ALL, &ignored), n, total);
+                sat__strip strip = sat__strip_of(image, channel, y, x, &ignored);
+                sat__measure(sat__prepare(t, &strip), strip.n, total);
             }
     }
 }
@@ -4702,8 +4744,8 @@ static double sat__largest_pixel(const sat_table *t, const sat_image *image)
     for (channel = 0; channel < image->channels; channel++)
         for (y = 0; y < image->height; y++)
             for (x = 0; x < image->width; x += SAT__MAX_STRIP) {
-                int n = sat__min_int(image->width - x, SAT__MAX_STRIP);
-                sat__measure(sat__prepare(t, image, y, x, n, channel, 0, SAT__CLAMP_ALL, &tally), n, &tally);
+                sat__strip strip = sat__strip_of(image, channel, y, x, &tally);
+                sat__measure(sat__prepare(t, &strip), strip.n, &tally);
             }
     return tally.largest;
 }
@@ -4774,9 +4816,9 @@ static void sat__measure_means(sat_table *t, const sat_image *image)
         double total = 0;
         for (y = 0; y < t->height; y++)
             for (x = 0; x < t->width; x += SAT__MAX_STRIP) {
-                int n = sat__min_int(t->width - x, SAT__MAX_STRIP);
-                const float *p = sat__prepare(t, image, y, x, n, channel, 0, SAT__CLAMP_ALL, &ignored);
-                for (i = 0; i < n; i++) total += (double)p[i];
+                sat__strip strip = sat__strip_of(image, channel, y, x, &ignored);
+                const float *p = sat__prepare(t, &strip);
+                for (i = 0; i < strip.n; i++) total += (double)p[i];
             }
         t->mean[channel] = (float)(total / ((double)t->width * (double)t->height));
     }
@@ -5212,22 +5254,6 @@ static void sat__tile_columns(double *v, const sat_table *t, int channel, const 
     }
 }
 
-/* Spikes of one tile onto the boxes of n output pixels from x on. */
-static void sat__add_spikes(double *sum, const sat_table *t, int channel, const sat__span *y, int tx, int radius, int x,
-                            int n)
-{
-    int i, j, k;
-    for (j = 0; j < y->count; j++) {
-        size_t index = sat__tile_index(t, channel, y->tile[j], tx);
-        const sat__spike *s = t->spikes + index * SAT__SPIKES;
-        for (k = 0; k < t->tiles[index].spikes; k++) {
-            int at = (tx << t->shift) + s[k].x - x;
-            if (s[k].y < y->begin[j] || s[k].y >= y->end[j]) continue;
-            for (i = sat__max_int(0, at - radius); i < n && i <= at + radius; i++) sum[i] += (double)s[k].value;
-        }
-    }
-}
-
 /* Tiles of the rows that one output row needs, each computed once unless the radius is very large. */
 enum { SAT__LINE_COLUMNS = 2048, SAT__LINE_TILES = 256 };
 
@@ -5270,10 +5296,33 @@ static inline double sat__line_edge(sat__filter_line *f, int tx)
     return f->edges[slot];
 }
 
-/* Sums around n pixels from x on, whose boxes all begin in one tile and end in one tile. Where a radius spans more
-   tiles than there are slots, the columns of the first tile are put aside. */
-static void sat__line_sums(double *sum, sat__filter_line *f, int x, int n, int first, int last)
+/* n output pixels from x on, whose boxes all begin in tile column `first` and end in `last`. */
+typedef struct sat__run {
+    int x, n, first, last;
+} sat__run;
+
+/* Spikes of one tile column onto their boxes. */
+static void sat__add_spikes(double *sum, const sat__filter_line *f, const sat__run *run, int tx)
 {
+    const sat_table *t = f->table;
+    int i, j, k;
+    for (j = 0; j < f->y.count; j++) {
+        size_t index = sat__tile_index(t, f->channel, f->y.tile[j], tx);
+        const sat__spike *s = t->spikes + index * SAT__SPIKES;
+        for (k = 0; k < t->tiles[index].spikes; k++) {
+            int at = (tx << t->shift) + s[k].x - run->x;
+            if (s[k].y < f->y.begin[j] || s[k].y >= f->y.end[j]) continue;
+            for (i = sat__max_int(0, at - f->radius); i < run->n && i <= at + f->radius; i++)
+                sum[i] += (double)s[k].value;
+        }
+    }
+}
+
+/* Sums of a run. Where a radius spans more
+   tiles than there are slots, the columns of the first tile are put aside. */
+static void sat__line_sums(double *sum, sat__filter_line *f, const sat__run *run)
+{
+    const int x = run->x, n = run->n, first = run->first, last = run->last;
     const sat_table *t = f->table;
     double edge = 0, rest = 0, whole = 0, aside[SAT__MAX_TILE_SIDE];
     const double *low = NULL;
@@ -5297,7 +5346,7 @@ static void sat__line_sums(double *sum, sat__filter_line *f, int x, int n, int f
         double left = i < skip ? 0 : low[i - skip];
         sum[i] = one ? whole - left : ((edge - left) + rest) + whole;
     }
-    for (tx = first; tx <= last; tx++) sat__add_spikes(sum, t, f->channel, &f->y, tx, r, x, n);
+    for (tx = first; tx <= last; tx++) sat__add_spikes(sum, f, run, tx);
     /* spikes of whole tile rows are in the strips already */
     if (f->giants)
         for (i = 0; i < n; i++)
@@ -5307,9 +5356,9 @@ static void sat__line_sums(double *sum, sat__filter_line *f, int x, int n, int f
 }
 
 /* The same where no border cuts a box and no spike or giant is near: straight to the means. */
-static void sat__line_means(float *out, size_t step, sat__filter_line *f, int x, int n, int first, int last,
-                            double inverse)
+static void sat__line_means(float *out, size_t step, sat__filter_line *f, const sat__run *run, double inverse)
 {
+    const int x = run->x, n = run->n, first = run->first, last = run->last;
     const sat_table *t = f->table;
     double edge = 0, rest = 0;
     const double *low, *high;
@@ -5346,6 +5395,7 @@ static int sat__has_spikes(const sat_table *t, int channel, int band)
 static void sat__filter_tiled(float *out, const sat_table *t, int channel, int radius, int y0, int y1)
 {
     sat__filter_line f;
+    sat__run run;
     double sum[SAT__MAX_TILE_SIDE], height = (double)(y1 - y0), inverse;
     int x, i, n, spiky = 0, room = SAT__LINE_COLUMNS >> t->shift;
     int step = t->channels, width = t->width, r = sat__min_int(radius, width);
@@ -5367,11 +5417,15 @@ static void sat__filter_tiled(float *out, const sat_table *t, int channel, int r
         if (last < t->tiles_x - 1) n = sat__min_int(n, ((last + 1) << t->shift) - r - x);
         if (x < r) n = sat__min_int(n, r - x); /* the picture's borders stand apart */
         else if (x < width - r) n = sat__min_int(n, width - r - x);
+        run.x = x;
+        run.n = n;
+        run.first = first;
+        run.last = last;
         if (x >= r && x < width - r && !spiky && !f.giants && last - first < room) {
-            sat__line_means(out + (size_t)x * (size_t)step, (size_t)step, &f, x, n, first, last, inverse);
+            sat__line_means(out + (size_t)x * (size_t)step, (size_t)step, &f, &run, inverse);
             continue;
         }
-        sat__line_sums(sum, &f, x, n, first, last);
+        sat__line_sums(sum, &f, &run);
         for (i = 0; i < n; i++) {
             int x0 = x + i > r ? x + i - r : 0, x1 = width - (x + i) > r ? x + i + r + 1 : width;
             out[(size_t)(x + i) * (size_t)step] = (float)(sum[i] * (1 / ((double)(x1 - x0) * height)));
@@ -5570,9 +5624,11 @@ static void sat__survey(sat_table *t, const sat_image *image, double *tile_sums,
     for (channel = 0; channel < image->channels; channel++)
         for (y = 0; y < t->height; y++)
             for (x = 0; x < t->width; x += tile) {
-                int n = sat__min_int(tile, t->width - x);
-                const float *p = sat__prepare(t, image, y, x, n, channel, 0, SAT__CLAMP_ALL, total);
+                sat__strip strip = sat__strip_of(image, channel, y, x, total);
+                const float *p;
                 double *sum = &tile_sums[x / tile];
+                int n = strip.n = sat__min_int(tile, strip.n);
+                p = sat__prepare(t, &strip);
                 if (y % tile == 0) *sum = 0;
                 sat__measure(p, n, total);
                 for (i = 0; i < n; i++) *sum += fabs((double)p[i]);
@@ -5850,14 +5906,20 @@ SAT_DEF sat_result sat_moments_build(sat_moments *moments, const sat_image *imag
     return SAT_ERR_NON_FINITE;
 }
 
-/* Four corners inside one tile; x0, y0 are the tile's own where a corner lies on its border. */
-static inline double sat__moment_corners(const double *p, size_t stride, int left, int top, int x0, int y0, int x1,
-                                         int y1)
+/* The part of a box inside one tile; left and top: it begins at the tile's own first column and row. */
+typedef struct sat__moment_part {
+    sat__box box;
+    int left, top;
+} sat__moment_part;
+
+static inline double sat__moment_corners(const sat_moments *t, int plane, const sat__moment_part *part)
 {
-    const double *high = p + (size_t)(y1 - 1) * stride, *low = high - (size_t)(y1 - y0) * stride;
-    double sum = high[x1 - 1];
-    if (!left) sum -= high[x0 - 1];
-    if (!top) sum -= left ? low[x1 - 1] : low[x1 - 1] - low[x0 - 1];
+    const sat__box *box = &part->box;
+    const double *high = t->sums + (size_t)plane * t->plane + (size_t)(box->y1 - 1) * t->stride,
+                 *low = high - (size_t)(box->y1 - box->y0) * t->stride;
+    double sum = high[box->x1 - 1];
+    if (!part->left) sum -= high[box->x0 - 1];
+    if (!part->top) sum -= part->left ? low[box->x1 - 1] : low[box->x1 - 1] - low[box->x0 - 1];
     return sum;
 }
 
@@ -5865,48 +5927,58 @@ typedef struct sat__moment {
     double n, a, b, co; /* count, means, co-moment */
 } sat__moment;
 
-static inline void sat__moment_join(sat__moment *m, const sat_moments *t, int channel, int other, int plane, int tx,
-                                    int ty, const int box[4])
+/* Two channels and the plane of their products; plane < 0: means only. */
+typedef struct sat__moment_pair {
+    int channel, other, plane;
+} sat__moment_pair;
+
+static inline void sat__moment_join(sat__moment *m, const sat_moments *t, sat__moment_pair pair, sat__box box, int tx,
+                                    int ty)
 {
     size_t tiles = (size_t)t->tiles_x * (size_t)t->tiles_y, tile = (size_t)ty * (size_t)t->tiles_x + (size_t)tx;
-    int left = tx * SAT__MOMENT_TILE, top = ty * SAT__MOMENT_TILE;
-    int x0 = sat__max_int(box[0], left), y0 = sat__max_int(box[1], top);
-    int x1 = sat__min_int(box[2] - left, SAT__MOMENT_TILE) + left,
-        y1 = sat__min_int(box[3] - top, SAT__MOMENT_TILE) + top;
-    double n = (double)(x1 - x0) * (double)(y1 - y0), both = m->n + n, a, b, co, delta_a, delta_b;
-    a = sat__moment_corners(t->sums + (size_t)channel * t->plane, t->stride, x0 == left, y0 == top, x0, y0, x1, y1);
-    b = other == channel
-            ? a
-            : sat__moment_corners(t->sums + (size_t)other * t->plane, t->stride, x0 == left, y0 == top, x0, y0, x1, y1);
-    co = plane < 0 ? 0
-                   : sat__moment_corners(t->sums + (size_t)plane * t->plane, t->stride, x0 == left, y0 == top, x0, y0,
-                                         x1, y1) -
-                         a * b / n;
-    if (other == channel && !(co > 0)) co = 0;
-    delta_a = (double)t->means[(size_t)channel * tiles + tile] + a / n - m->a;
-    delta_b = other == channel ? delta_a : (double)t->means[(size_t)other * tiles + tile] + b / n - m->b;
+    int left = tx * SAT__MOMENT_TILE, top = ty * SAT__MOMENT_TILE, same = pair.other == pair.channel;
+    sat__moment_part part;
+    double n, both, a, b, co, delta_a, delta_b;
+    part.box = sat__box_of(sat__max_int(box.x0, left), sat__max_int(box.y0, top),
+                           sat__min_int(box.x1 - left, SAT__MOMENT_TILE) + left,
+                           sat__min_int(box.y1 - top, SAT__MOMENT_TILE) + top);
+    part.left = part.box.x0 == left;
+    part.top = part.box.y0 == top;
+    n = (double)(part.box.x1 - part.box.x0) * (double)(part.box.y1 - part.box.y0);
+    both = m->n + n;
+    a = sat__moment_corners(t, pair.channel, &part);
+    b = same ? a : sat__moment_corners(t, pair.other, &part);
+    co = pair.plane < 0 ? 0 : sat__moment_corners(t, pair.plane, &part) - a * b / n;
+    if (same && !(co > 0)) co = 0;
+    delta_a = (double)t->means[(size_t)pair.channel * tiles + tile] + a / n - m->a;
+    delta_b = same ? delta_a : (double)t->means[(size_t)pair.other * tiles + tile] + b / n - m->b;
     m->co += co + delta_a * delta_b * (m->n / both * n);
     m->a += delta_a * (n / both);
     m->b += delta_b * (n / both);
     m->n = both;
 }
 
-/* plane < 0: means only. */
-static sat__moment sat__moment_box(const sat_moments *t, int channel, int other, int plane, int x0, int y0, int x1,
-                                   int y1)
+static sat__moment sat__moment_box(const sat_moments *t, sat__moment_pair pair, sat__box box)
 {
     sat__moment m;
-    int box[4], tx, ty;
+    int tx, ty;
     m.n = m.a = m.b = m.co = 0;
-    box[0] = sat__max_int(x0, 0);
-    box[1] = sat__max_int(y0, 0);
-    box[2] = sat__min_int(x1, t->width);
-    box[3] = sat__min_int(y1, t->height);
-    if (box[0] >= box[2] || box[1] >= box[3]) return m;
-    for (ty = box[1] >> SAT__MOMENT_SHIFT; ty <= (box[3] - 1) >> SAT__MOMENT_SHIFT; ty++)
-        for (tx = box[0] >> SAT__MOMENT_SHIFT; tx <= (box[2] - 1) >> SAT__MOMENT_SHIFT; tx++)
-            sat__moment_join(&m, t, channel, other, plane, tx, ty, box);
+    box = sat__box_of(sat__max_int(box.x0, 0), sat__max_int(box.y0, 0), sat__min_int(box.x1, t->width),
+                      sat__min_int(box.y1, t->height));
+    if (box.x0 >= box.x1 || box.y0 >= box.y1) return m;
+    for (ty = box.y0 >> SAT__MOMENT_SHIFT; ty <= (box.y1 - 1) >> SAT__MOMENT_SHIFT; ty++)
+        for (tx = box.x0 >> SAT__MOMENT_SHIFT; tx <= (box.x1 - 1) >> SAT__MOMENT_SHIFT; tx++)
+            sat__moment_join(&m, t, pair, box, tx, ty);
     return m;
+}
+
+static sat__moment_pair sat__moment_pair_of(const sat_moments *m, int channel, int other)
+{
+    sat__moment_pair pair;
+    pair.channel = channel;
+    pair.other = other;
+    pair.plane = sat__moment_plane(m, channel, other);
+    return pair;
 }
 
 static int sat__moment_pair_is_valid(const sat_moments *m, int channel, int other)
@@ -5917,16 +5989,18 @@ static int sat__moment_pair_is_valid(const sat_moments *m, int channel, int othe
 
 SAT_DEF double sat_moments_mean(const sat_moments *moments, int channel, int x0, int y0, int x1, int y1)
 {
-    return sat__moment_pair_is_valid(moments, channel, channel)
-               ? sat__moment_box(moments, channel, channel, -1, x0, y0, x1, y1).a
-               : 0;
+    sat__moment_pair pair;
+    if (!sat__moment_pair_is_valid(moments, channel, channel)) return 0;
+    pair.channel = pair.other = channel;
+    pair.plane = -1;
+    return sat__moment_box(moments, pair, sat__box_of(x0, y0, x1, y1)).a;
 }
 
 SAT_DEF double sat_covariance(const sat_moments *moments, int channel, int other, int x0, int y0, int x1, int y1)
 {
     sat__moment m;
     if (!sat__moment_pair_is_valid(moments, channel, other)) return 0;
-    m = sat__moment_box(moments, channel, other, sat__moment_plane(moments, channel, other), x0, y0, x1, y1);
+    m = sat__moment_box(moments, sat__moment_pair_of(moments, channel, other), sat__box_of(x0, y0, x1, y1));
     return m.n > 0 ? m.co / m.n : 0;
 }
 
@@ -5946,15 +6020,17 @@ static void sat__moments_filter_rows(int begin, int end, int worker, void *conte
 {
     const sat__moments_filter *f = (const sat__moments_filter *)context;
     const sat_moments *t = f->moments;
-    int x, y, plane = sat__moment_plane(t, f->channel, f->other), r = f->radius;
+    const sat__moment_pair pair = sat__moment_pair_of(t, f->channel, f->other);
+    int x, y, r = f->radius;
     (void)worker;
     for (y = begin; y < end; y++) {
         float *out = (float *)(void *)(f->out + (ptrdiff_t)y * f->stride);
         float *mean = f->mean ? (float *)(void *)(f->mean + (ptrdiff_t)y * f->stride) : NULL;
         for (x = 0; x < t->width; x++) {
-            sat__moment m =
-                sat__moment_box(t, f->channel, f->other, plane, x > r ? x - r : 0, y > r ? y - r : 0,
-                                t->width - x > r ? x + r + 1 : t->width, t->height - y > r ? y + r + 1 : t->height);
+            sat__moment m = sat__moment_box(t, pair,
+                                            sat__box_of(x > r ? x - r : 0, y > r ? y - r : 0,
+                                                        t->width - x > r ? x + r + 1 : t->width,
+                                                        t->height - y > r ? y + r + 1 : t->height));
             out[x] = (float)(m.co / m.n);
             if (mean) mean[x] = (float)m.a;
         }
@@ -6070,7 +6146,6 @@ static void sat__stream_take(sat_stream *s, const sat_image *row)
     sat_table *t = s->table;
     uint64_t corner_row = s->taken + 1;
     int channel, x, slot = sat__ring_row(s, corner_row);
-    int care = SAT__CLAMP_ALL; /* no row can be built again */
     if (t->options.kind == SAT_KIND_TILED) {
         float *rows = t->ring_pixels + (size_t)(s->taken - s->built) * (size_t)t->width * (size_t)t->channels;
         for (channel = 0; channel < t->channels; channel++)
@@ -6088,9 +6163,11 @@ static void sat__stream_take(sat_stream *s, const sat_image *row)
         sat__carry carry;
         memset(sums, 0, t->element);
         memset(&carry, 0, sizeof carry);
-        for (x = 0; x < t->width; x += SAT__STRIP)
-            sat__flat_piece(t, row, channel, 0, x, sat__min_int(SAT__STRIP, t->width - x), sums, &carry, 0, care,
-                            &t->total[channel], 0);
+        for (x = 0; x < t->width; x += SAT__STRIP) {
+            sat__strip strip = sat__strip_of(row, channel, 0, x, &t->total[channel]); /* no row can be built again */
+            strip.n = sat__min_int(SAT__STRIP, strip.n);
+            sat__flat_piece(t, sums, &carry, &strip, 0);
+        }
     }
     s->taken++;
 }
@@ -6851,7 +6928,7 @@ static const char sat__glsl_settle[] =
             take_spikes(e);
             uint bits = floatBitsToUint(e.x), exponent = (bits >> 23) + ((bits & 0x7fffffu) >= 8386931u ? 1u : 0u);
             record = uvec4(e.x > 0.0 ? max(exponent, 31u) - 30u << 23 : 0u, floatBitsToUint(full),
-                           uint(count | counts.x << 4 | counts.y << 17) | wants_wide(e.x / 1048576.0) << 30,
+                           uint(count | counts.x << 4 | counts.y << 17) | wants_wide(e.x / 262144.0) << 30,
                            uint(counts.z + giants - listed | listed << 12) | uint(cut) << 20);
             uvec4 words = uvec4(0u), low = uvec4(0u), high = uvec4(0u);
             for (int i = 0; i < count; i++) {
@@ -7336,7 +7413,7 @@ static const char sat__glsl_group_sums[] =
                 vec2 e = extent();
                 take_spikes(e);
                 for (int i = lane; i < 1024; i += 128)
-                    if (abs(held[i]) > 0.0 && abs(held[i]) < e.x / 1048576.0) small++;
+                    if (abs(held[i]) > 0.0 && abs(held[i]) < e.x / 262144.0) small++;
                 small = sum_of(small) < 8u ? 0u : 1u;
                 uvec4 record = uvec4(quantum_of(e.x), floatBitsToUint(full), 0u, 0u);
                 record.z = uint(count) | (bad.x & 65535u) << 4 | bad.x >> 16 << 17 | small << 30;

@@ -1247,16 +1247,13 @@ static inline void tonemap__quantise(int32_t *out, const float *luminance, int w
 static inline void tonemap__add_ring_row(const tonemap *map, tonemap__worker *w, int j)
 {
     const uint32_t *above = tonemap__ring_row(map, w, j) + TONEMAP__BOXES + 1;
-    uint32_t *row = tonemap__ring_row(map, w, j + 1) + TONEMAP__BOXES + 1, sum = 0;
+    uint32_t *row = tonemap__ring_row(map, w, j + 1) + TONEMAP__BOXES + 1;
     int32_t *quanta = (int32_t *)(void *)w->edge;
     int x, end = map->ring_row - TONEMAP__BOXES - 1;
     tonemap__quantise(quanta, map->luminance + (size_t)j * (size_t)map->row, map->width, &map->frame);
     memset(row - TONEMAP__BOXES - 1, 0, (TONEMAP__BOXES + 1) * sizeof *row);
-    for (x = 0; x < map->width; x++) {
-        sum += (uint32_t)quanta[x];
-        row[x] = above[x] + sum;
-    }
-    for (; x < end; x++) row[x] = row[map->width - 1];
+    sat__add_row(row, above, quanta, map->width);
+    for (x = map->width; x < end; x++) row[x] = row[map->width - 1];
 }
 
 /* A row that is searched: its luminances, where La goes, and the boxes around its pixels: sums above and below, and the

@@ -75,15 +75,44 @@ static void all_lanes(void)
     add_floats(sat__i32x4_to_f32(m)), add_floats(sat__f32x4_from_bits(m)), add_ints(sat__i32x4_shift_right(m, 23));
     c = sat__f32x4_set1(2147483520.0f); /* the largest that truncates; min and max give the second for NaN */
     add_ints(sat__f32x4_truncate(sat__f32x4_max(sat__f32x4_min(a, c), sat__f32x4_set1(-2147483520.0f))));
+    add_ints(sat__f32x4_round(sat__f32x4_max(sat__f32x4_min(a, c), sat__f32x4_set1(-2147483520.0f))));
+    add_ints(sat__f32x4_round(sat__f32x4_set1((float)(int32_t)draw() * (1 / 1024.0f)))); /* halves, too */
+    add_ints(sat__i32x4_prefix(m)), add_ints(sat__i32x4_last(n));
     i = sat__i32x4_any(sat__f32x4_less(a, b)) + 2 * sat__i32x4_all(sat__f32x4_less(a, b));
     add(&i, sizeof i);
     sat__f32x4_load3(f, &a, &b, &c), add_floats(a), add_floats(b), add_floats(c);
     sat__f32x4_load4(f, &a, &b, &c, &d), add_floats(a), add_floats(b), add_floats(c), add_floats(d);
 }
 
+/* Tiles and filters of a picture with spikes, giants, NaN and subnormals. */
+static void a_table(int width, int height, int tile)
+{
+    static float p[200 * 150], out[200 * 150];
+    sat_image image = sat_image_f32(p, width, height, 1);
+    sat_options o = sat_defaults();
+    sat_table *t;
+    int i, radius;
+    for (i = 0; i < width * height; i++) p[i] = draw() >> 24 ? (float)(draw() >> 8) / 16777216.0f : draw_any();
+    o.tile = tile;
+    if (sat_create(&t, width, height, 1, &o) != SAT_OK) return;
+    sat_build(t, &image);
+    for (radius = 0; radius < 120; radius = radius * 3 + 1) {
+        sat_box_filter(out, 0, t, radius);
+        add(out, (size_t)(width * height) * sizeof *out);
+    }
+    for (i = 0; i < 300; i++) {
+        int x = (int)(draw() % (unsigned)width), y = (int)(draw() % (unsigned)height);
+        int x1 = x + (int)(draw() >> 25), y1 = y + (int)(draw() >> 25);
+        double sum = sat_sum(t, 0, x, y, x1, y1);
+        add(&sum, sizeof sum);
+    }
+    sat_destroy(t);
+}
+
 int main(void)
 {
     int i;
+    for (i = 0; i < 40; i++) a_table(1 + i * 37 % 200, 1 + i * 53 % 150, 8 << i % 5);
     for (i = 0; i < 100000; i++) all_lanes();
     printf("lanes %016llx\n", (unsigned long long)hash);
     return 0;
