@@ -2675,14 +2675,14 @@ static inline void raindrop__reenter(raindrop_drop *drop, double at[3], const ra
     const raindrop_rain_options *o = &job->rain->options;
     double size = (double)o->box_size[1], top = (double)o->centre[1] + size / 2,
            old = job->rise - (double)drop->velocity[1], through = job->rise - (double)o->wind[1];
-    double left = old > 0 ? below / old : 0, speed = old,
-           fastest = (o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(o->diameter_max_mm)) + through;
+    double left = old > 0 ? below / old : 0, speed = old, fastest;
     uint32_t stream = job->rain->step * 512u;
     int turn;
     if (o->diameter_mm > 0) {
         at[1] = top - fmod(below, size);
         return;
     }
+    fastest = (o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(o->diameter_max_mm)) + through;
     if (left > raindrop__forgets(o, fastest)) {
         raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 0, 0));
         below = (double)raindrop__uniform(raindrop__hash(o->seed, stream + 1, i)) * size;
@@ -2732,6 +2732,7 @@ static void raindrop__advance_range(int begin, int end, int worker, void *contex
     const raindrop__advance_job *job = (const raindrop__advance_job *)context;
     raindrop_rain *rain = job->rain;
     const raindrop_rain_options *o = &rain->options;
+    const int reenters = !rain->own && job->dt > 0; /* in a pause the box only wraps; else the fall brought them out */
     double way[3], low[3], at[3];
     int chunk, i, axis;
     (void)worker;
@@ -2742,7 +2743,7 @@ static void raindrop__advance_range(int begin, int end, int worker, void *contex
             raindrop_drop *drop = &rain->drops[i];
             moving |= raindrop__move(way, drop, rain, job->dt);
             for (axis = 0; axis < 3; axis++) at[axis] = (double)drop->position[axis] + way[axis];
-            if (!rain->own && way[1] < job->rise * job->dt && at[1] < low[1])
+            if (reenters && at[1] < low[1])
                 raindrop__reenter(drop, at, job, low[1] - at[1], (uint32_t)i);
             for (axis = 0; axis < 3; axis++) {
                 double size = (double)o->box_size[axis];
