@@ -44,14 +44,15 @@
      SOFTASSIGN_STATIC S          every function private to the file
      SOFTASSIGN_DEF S             linkage of the functions
      SOFTASSIGN_GL S              the passes of section 3.7 and the entropic sweep for OpenGL
-     SOFTASSIGN_NO_HEURISTICS     without greedy, 2-opt, annealing, ants      (3.0 of 39 KB; `make size`)
-     SOFTASSIGN_NO_MATRIX         without ENTROPIC and PUBLISHED              (7.2 KB)
-     SOFTASSIGN_NO_MOSAIC         without the picture helpers                 (2.7 KB)
+     SOFTASSIGN_NO_HEURISTICS     without greedy, 2-opt, annealing, ants      (3.1 of 61 KB; `make size`)
+     SOFTASSIGN_NO_MATRIX         without ENTROPIC and PUBLISHED              (7.3 KB)
+     SOFTASSIGN_NO_MOSAIC         without the picture helpers                 (2.8 KB)
      SAT_NO_SIMD, SAT_NO_STDLIB, SAT_ASSERT as in sat.h. A method left out returns SAT_ERR_ARGUMENT.
 
    MEMORY, THREADS, ERRORS
      AUTO reads a given matrix of floats or doubles where it stands, and copies it (up to 64 million cells) only with a
-     bonus, maximise or unassigned_cost; integers, and sparse ones of an eighth and more, are copied. softassign_solve
+     bonus, maximise or unassigned_cost; integers are copied, and sparse ones up to 600 000 cells or of one cell in 32;
+     features and functions make a matrix up to 600 000 cells. softassign_solve
      allocates once (ENTROPIC and PUBLISHED twice) and releases; a solver allocates in create only. Lists take 12 x
      neighbours bytes a row: 3.2 MB in all for 900 x 8192, 27 MB for 8192 x 65536 (the matrix: 30, 2147 MB). One
      solver, one thread at a time; different solvers at once. sat_threads speeds up lists, sweeps and checks. Errors
@@ -81,19 +82,19 @@
      Making one costs 16 numbers a column: projections on the main directions bound the distance from below, and the
      others are never computed (stats.distances_computed). Sparse softassign with inequality columns finds the prices,
      shortest augmenting paths the assignment, and columns that were left with a price below 0 are raised back along a
-     reverse path (finish). Given matrices, and all problems up to
-     100 000 cells, go to a dense solver without lists: column reduction (square), augmenting row reduction, shortest
-     paths with vector scans, on the matrix where it stands; AUTO leaves it for lists where a wide matrix competes.
+     reverse path (finish). Given matrices, and what makes one of up to 600 000 cells, go to a dense solver without
+     lists: column reduction (square), augmenting row reduction, shortest paths on the matrix where it stands, scanned
+     in floats that leave out all that cannot matter. AUTO leaves it for lists where rows compete and 128 rows and more
+     have 3000 columns and more, at least four a row: from there on lists are faster (table "What AUTO chooses from").
      Time over a plain LAPJV's (Jonker and Volgenant 1987) and over scipy's, checks and proof included, one thread:
                                      512^2        1024^2       256 x 1024
-       uniform                       0.65 0.20    0.74 0.17    1.0  0.16
-       integers to n                 0.96 0.24    0.96 0.17    1.2  0.19
-       zeros and ones                0.55 0.45    0.54 0.47    0.48 0.36
-       points in a plane             0.72 0.47    0.76 0.42    0.94 0.19
-       low rank                      0.82 0.53    0.72 0.35    0.89 0.60
-       i * j shuffled                0.62 0.89    0.56 0.66    0.63 0.81
-       5 % cheap pairs               0.61 0.19    0.95 0.10    1.1  0.19
-
+       uniform                       0.40 0.15    0.50 0.09    0.63 0.10
+       integers to n                 0.58 0.17    0.54 0.13    0.48 0.19
+       zeros and ones                0.46 0.44    0.41 0.39    0.14 0.10
+       points in a plane             0.50 0.36    0.44 0.36    0.43 0.18
+       low rank                      0.50 0.37    0.38 0.29    0.34 0.32
+       i * j shuffled                0.44 0.77    0.66 0.56    0.37 0.64
+       5 % cheap pairs               0.43 0.20    0.48 0.12    0.47 0.22
    COST (one thread, measured by tests/bench/bench_softassign.c on real photographs and tiles)
      time from features to the proven answer, as a ratio to scipy's linear_sum_assignment and to a plain LAPJV, both
      without the time of their matrix:           900 x 8192 (six photos)           2048 x 8192 (three photos)
@@ -190,8 +191,8 @@ extern "C" {
    ------------------------------------------------------------------------------------------------ */
 
 typedef enum softassign_method {
-    SOFTASSIGN_AUTO,        /* the optimum: a given matrix densely (wide ones whose rows compete: on lists), others as
-                               SOFTASSIGN_EXACT above 100 000 cells */
+    SOFTASSIGN_AUTO,        /* the optimum: given matrices, and what makes one of up to 600 000 cells, densely (wide
+                               ones whose rows compete: on lists), others as SOFTASSIGN_EXACT */
     SOFTASSIGN_EXACT,       /* the optimum: softassign prices on lists, shortest augmenting paths, finish */
     SOFTASSIGN_FAST,        /* auction on lists; certified to options.gap. With minimum_use, and where the auction
                                does not get there: SOFTASSIGN_EXACT, and stats.method says so */
@@ -1967,7 +1968,7 @@ static softassign__pair_of_least softassign__look_within(softassign__scan *q, in
             for (; !(within & 15); within >>= 4) k += 4;
             if (within & 1) softassign__take_value(&two, k, softassign__scan_value(q, k));
         }
-        q->patience -= !(two.second < before);
+        q->patience = two.second > two.least ? q->patience - !(two.second < before) : 0; /* a tie: only below it */
         if (!(two.second < q->limit)) continue;
         q->limit = two.second;
         q->most = softassign__round_up(q->limit);

@@ -2104,6 +2104,46 @@ TEST(softassign_integers_are_exact_in_large_sums)
     free(start), free(index), free(cost), free(x);
 }
 
+/* Small matrices that other solvers were told about: forbidden pairs where rows are fewer, a row of gates, a transposed
+   one, pairs that are nearly equal, no pair at all. */
+TEST(softassign_matrices_that_solvers_stumble_over)
+{
+    const float inf = SOFTASSIGN__INFINITY;
+    const float few[6] = {inf, 11, 8, 8, inf, 7},
+                gates[16] = {-625,       2187.5f,    -156.25f, 1e6f, -2500, 1e6f, -2500, -2500,
+                             -1015.625f, -1015.625f, 1e6f,     1e6f, 1e6f,  1e6f, 1e6f,  1e6f};
+    const float four[16] = {9, 7.6f, 7.5f, 7, 3.5f, 8.5f, 5.5f, 6.5f, 12.5f, 9.5f, 9, 10.5f, 4.5f, 11, 9.5f, 11.5f};
+    static float equal[60 * 60];
+    softassign_problem p;
+    softassign_stats r;
+    int x[60], i;
+    memset(&p, 0, sizeof p);
+    p.rows = 2, p.columns = 3, p.cost = few;
+    EXPECT_EQ(softassign_solve(x, &p, NULL, &r), SAT_OK);
+    EXPECT(r.cost == 16 && x[0] == 2 && x[1] == 0);
+    p.rows = p.columns = 4, p.cost = gates;
+    EXPECT_EQ(softassign_solve(x, &p, NULL, &r), SAT_OK);
+    EXPECT(r.cost == 1e6 - 625 - 2500 - 1015.625 && r.complete && r.gap < 1e-12);
+    p.cost = four;
+    EXPECT_EQ(softassign_solve(x, &p, NULL, &r), SAT_OK);
+    EXPECT_NEAR(r.cost, 7 + 5.5 + 9.5 + 4.5, 1e-6);
+    p.rows = 3, p.columns = 2, p.cost = few;
+    EXPECT_EQ(softassign_solve(x, &p, NULL, &r), SAT_ERR_LIMIT);
+    p.unassigned_cost = 9; /* a row may stay without */
+    EXPECT_EQ(softassign_solve(x, &p, NULL, &r), SAT_OK);
+    EXPECT(x[0] == -1 && r.cost == 9 + 8 + 7); /* {inf, 11}, {8, 8}, {inf, 7} */
+    p.unassigned_cost = 0;
+    p.rows = p.columns = 60, p.cost = equal;
+    for (i = 0; i < 3600; i++) equal[i] = 1 + (float)(i * 7919 % 3) * 1.1920929e-7f;
+    EXPECT_EQ(softassign_solve(x, &p, NULL, &r), SAT_OK);
+    EXPECT(r.complete && r.gap < 1e-12 && r.cost >= 60 && r.cost < 60.00001);
+    for (i = 0; i < 3600; i++) equal[i] = inf;
+    EXPECT_EQ(softassign_solve(x, &p, NULL, &r), SAT_ERR_LIMIT);
+    p.unassigned_cost = 2;
+    EXPECT_EQ(softassign_solve(x, &p, NULL, &r), SAT_OK);
+    EXPECT(r.cost == 120 && x[0] == -1 && x[59] == -1);
+}
+
 /* Many rows, features and lists: as a matrix with a column of its own for every row. */
 TEST(softassign_rows_left_out_of_larger_problems)
 {
