@@ -371,7 +371,7 @@ TEST(tables_take_smaller_pictures)
 TEST(objects_take_smaller_pictures)
 {
     static unsigned char own[16 * GL_N], there[16 * GL_N];
-    static const int calls[] = {GL_TONE, GL_AO};
+    static const int calls[] = {GL_TONE, GL_AO, GL_SHADOWS};
     static gl_scene s, small;
     sat_gl_target to = sat_gl_to(SAT_GL_OWN, 0, 0, 0, 0, 0);
     sat__gl_state state;
