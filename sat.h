@@ -19,11 +19,11 @@
    WHAT IT DOES
 
    - Tables that keep their precision where plain float tables lose it: over 14 decades, 3 x 3 boxes come out right to
-     2e-6 at the 99th percentile and 1e-4 at worst, where light changes by a decade in 100 pixels or by four in 64
+     2e-6 at the 99th percentile and 4e-5 at worst, where light changes by a decade in 100 pixels or by four in 64
      (2e-7, 6e-7 where it is smooth). The default, SAT_KIND_TILED, sums integers in every 32 x 32 tile, with a quantum
      of the tile's own, and a box of up to 65 pixels a side reads only the tiles that it touches: bright pixels,
      infinities and skies elsewhere change nothing. tile = 64 filters faster and errs more (2e-6, 6e-6 where it is
-     smooth; 2e-4, 1 where it is not: bench_sat's "Side of a tile").
+     smooth; 4e-4, 1 where it is not: bench_sat's "Side of a tile").
    - 8- and 16-bit pictures without any error. Flat tables in integers modulo 2^32, too: no order of additions matters.
    - Means over boxes with real corners, beyond the border (clip, zero, clamp, mirror, wrap), with a radius for each
      pixel; box filters of whole images, also of images that arrive a row at a time; dirty rectangles.
@@ -94,22 +94,28 @@
    COST
 
    A build writes each sum once and reads each pixel once (TILED: twice, the second time from the cache). Per pixel and
-   channel: 4.8 bytes (TILED; 21 in a column one pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE). A lookup reads
+   channel: 4.9 bytes (TILED; 21 in a column one pixel wide), 4 (FLOAT, FIXED32), 8 (DOUBLE). A lookup reads
    4 sums (TILED: up to 4 a touched tile, at most 9 tiles; beyond, 16 for each super tile of 1024 pixels). Measured
    ratios, one core of a busy machine, SSE2 (bench_sat, QUICK=1):
 
      build, time over a memcpy of the same traffic     512^2        2048^2
-       TILED                                           5.1 to 7.9   2.4 to 3.4 (tile = 64: 2.0 to 2.9)
-       FLOAT, DOUBLE                                   2.9 to 3.6   1.0 to 1.4
-       FIXED32                                         4.6 to 5.6   2.1 to 2.8
-     cv::integral over FLOAT, over DOUBLE              2.1, 1.5     1.6, 1.3
+       TILED                                           4.5 to 6.1   1.9 to 2.5 (tile = 64: 1.8 to 2.2; bright pixels
+                                                                    to be kept apart in every tile: 3.5 to 4.2)
+       FLOAT, DOUBLE                                   2.4 to 3.7   1.0 to 1.5
+       FIXED32                                         4.6          1.7 to 2.1
+     cv::integral over FLOAT, over DOUBLE              1.9, 1.7     1.7 to 2.3, 1.5
      box filter over cv::blur at radius 1, 5, 20, 100, 1024^2
-       TILED                                           1.1 1.1 1.1 1.0, with the build 1.9 2.8 2.4 1.7 (tile = 64: two
-                                                       thirds to all of it)
-       FLOAT, DOUBLE, FIXED32                          0.7 to 0.8, 0.6 to 0.7, 0.5 to 0.7
-     random boxes in a table that the cache holds (2048^2), over four bare reads of floats, at radius 1, 5, 20, 100
-       TILED by sat_sums                               5 6 9 19 (tile = 64: 6 5 6 18)
-       FLOAT by sat_sum, by sat_sums                   2.4 to 2.9, 1.9 to 2.1
+       TILED                                           1.0 1.0 1.2 1.2, with the build 1.5 1.7 1.9 1.7 (tile = 64: 0.7
+                                                       0.8 0.8 0.9, 1.4 1.6 1.6 1.4)
+       FLOAT, DOUBLE, FIXED32                          0.7 to 0.8, 0.7 to 0.8, 0.6 to 0.8
+     lookups over four bare reads of floats at radius 1, 5, 20, 100: random boxes in a table that the cache holds;
+     around each pixel, row by row
+       TILED by sat_view_sum                           2.9 3.8 6.5 8; 3.5 5.5 10 17
+       TILED by sat_sums                               3.4 4.2 7 9; 4.8 6.7 11 17
+       FLOAT by sat_sums                               1.7 to 2.1; 3.1
+       doubles, four bare reads                        1.1; 0.9
+     A tile's lookup is 40 instructions where bare reads take 15, and a box across tiles reads 6 to 16 cache lines where
+     bare reads touch 4: that is what is left. A build reads each pixel twice, for its tile's quantum and for its cells.
 */
 
 /*
@@ -313,12 +319,12 @@ typedef enum sat_non_finite {
 
 typedef struct sat_options {
     sat_kind kind;             /* SAT_KIND_TILED */
-    int tile;                  /* 32; 8..128; a power of two: tile side of SAT_KIND_TILED; 64 errs 4 to 100 times as
+    int tile;                  /* 32; 8..128; a power of two: tile side of SAT_KIND_TILED; 64 errs 7 to 100 times as
                                   much and filters in 0.6 of the time */
     int subtract_mean;         /* 0; 0..1; 1 (FLOAT, DOUBLE): Hensley 2005. Good at low contrast; makes dark boxes of
                                   HDR images about 100 times worse */
     double quantum;            /* 0; 0..1e300; 0: the finest power of two that max_value and max_box_area allow; FIXED32
-                                  kinds only */
+                                  only */
     double max_value;          /* 0; 0..1e300; 0: as large as the kind can sum (FIXED32: the largest |pixel| of the
                                   first build). > 0: pixels beyond +-max_value are clamped to it and counted */
     double max_box_area;       /* 0; 0..1e300; 0: the whole table; FIXED32: no larger box is ever asked for */
@@ -4242,14 +4248,14 @@ static void sat__choose_quantum(const sat_table *t, sat__tile *tile, const sat__
                                 sat__extent e)
 {
     float threshold = e.sum / ((float)(1 << 2 * t->shift) * 256); /* 2^-14 of such a pixel is lost */
-    int y, count = 0;
+    int y, count = 0, most = sat__max_int(8, (1 << 2 * t->shift) / 128); /* more than even noise has: 2 in 1000 */
     tile->slot = 0;
     tile->quantum = sat__tile_quantum((double)e.sum, 31);
     tile->wants = 0;
     if (!(e.sum > 0) || !(e.smallest < threshold)) return;
-    for (y = 0; y < rows && count < 8; y++)
-        count += sat__count_below(from->p + y * from->step, t->options.tile, threshold, 8 - count);
-    tile->wants = count >= 8;
+    for (y = 0; y < rows && count < most; y++)
+        count += sat__count_below(from->p + y * from->step, t->options.tile, threshold, most - count);
+    tile->wants = count >= most;
 }
 
 /* Takes a tile apart: job->pixels then hold what its cells sum. known: NULL, or the extent of a tile without giants. */
