@@ -3077,8 +3077,6 @@ FIV_DEF sat_result fiv_occluder_invalidate(fiv_occluder *o, const float *positio
 
 /* >> lookups */
 
-/* ---- lookups */
-
 /* Half floats of this table are finite, so that one multiplication does for normal and subnormal numbers. */
 static inline float fiv__half(uint16_t half)
 {
@@ -4476,7 +4474,7 @@ static int fiv__read_header(fiv_occluder *from, fiv__save *s, const unsigned cha
     o.contact_map = from->contact_side;
     fiv__set_grid(from, &o);
     samples = fiv__grid_samples(&from->grid);
-    if (s->triangles > 0x7fffffff / 3 || s->clusters < 0) return 0;
+    if (s->triangles > 0x7fffffff / 3 || s->skipped > 0x7fffffff / 3 - s->triangles || s->clusters < 0) return 0;
     from->few = s->triangles + s->skipped <= FIV__FEW;
     if (s->vertices > 3 * s->triangles + 4 * (uint64_t)s->clusters) return 0;
     if ((uint64_t)s->clusters != (s->triangles + FIV__CLUSTER - 1) / FIV__CLUSTER) return 0;

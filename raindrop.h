@@ -2441,7 +2441,7 @@ struct raindrop_rain {
 #define RAINDROP__BEST_SPEED 9.32                           /* of falling drops, Best 1950: m/s, mm and a power */
 #define RAINDROP__BEST_MM 1.77
 #define RAINDROP__BEST_POWER 1.147
-#define RAINDROP__OBLATE(d) 1.0048 + d * (5.7e-4 + d * (-2.628e-2 + d * (3.682e-3 - d * 1.677e-4)))
+#define RAINDROP__OBLATE(d) (1.0048 + (d) * (5.7e-4 + (d) * (-2.628e-2 + (d) * (3.682e-3 - (d) * 1.677e-4))))
 #define RAINDROP__PERIOD 16.0 /* seconds; frequencies of oscillations are whole multiples of 1 over it */
 
 /* Stokes' law for the smallest and Best 1950 for the others, blended; rms 4 % of Gunn and Kinzer's table. */

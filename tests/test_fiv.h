@@ -1488,6 +1488,18 @@ TEST(forged_saves_are_refused)
         fiv_occluder_destroy(back);
     }
     EXPECT(refused > 50);
+    { /* counts whose sum wraps around: many triangles must not pass for few */
+        fiv__save head;
+        EXPECT_EQ(fiv_occluder_save(bytes, size, o), SAT_OK);
+        memcpy(&head, bytes, sizeof head);
+        head.skipped = (uint64_t)0 - head.triangles;
+        memcpy(bytes, &head, sizeof head);
+        hash = fiv__hash(FIV__HASH, bytes + 16, size - 16);
+        memcpy(bytes + 8, &hash, 8);
+        EXPECT(head.triangles > FIV__FEW);
+        EXPECT_EQ(fiv_occluder_load(&back, bytes, size, NULL), SAT_ERR_DATA);
+        EXPECT(back == NULL);
+    }
     free(bytes);
     fiv_occluder_destroy(o);
     reference_mesh_free(&m);
