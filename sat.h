@@ -103,7 +103,7 @@
                                                                     to be kept apart in every tile: 3.5 to 4.2)
        FLOAT, DOUBLE                                   2.4 to 3.7   1.0 to 1.5
        FIXED32                                         4.6          1.7 to 2.1
-     cv::integral over FLOAT, over DOUBLE              1.9, 1.7     1.7 to 2.3, 1.5
+     cv::integral over FLOAT, over DOUBLE              1.9 to 3.1, 1.7  1.7 to 2.3, 1.5
      box filter over cv::blur at radius 1, 5, 20, 100, 1024^2
        TILED                                           1.0 1.0 1.2 1.2, with the build 1.5 1.7 1.9 1.7 (tile = 64: 0.7
                                                        0.8 0.8 0.9, 1.4 1.6 1.6 1.4)
