@@ -159,13 +159,25 @@ static void set_method(instance *q, softassign_method method)
 
 static double excess(const instance *q) { return (q->report.cost - q->optimum) / q->optimum; }
 
+/* The number that a command prints, or -1; the file that it read is removed. */
+static double printed_seconds(const char *command, const char *name)
+{
+    FILE *file = popen(command, "r");
+    double seconds = -1;
+    if (file) {
+        if (fscanf(file, "%lf", &seconds) != 1) seconds = -1;
+        pclose(file);
+    }
+    remove(name);
+    return seconds;
+}
+
 /* Seconds of scipy's solver alone (best of `rounds`), or -1 where there is none. */
 static double scipy_seconds(const instance *q, int rounds)
 {
     char command[512];
     char name[64];
     FILE *file;
-    double seconds = -1;
     size_t n = (size_t)q->p.rows * (size_t)q->p.columns;
     snprintf(name, sizeof name, "/tmp/bench_softassign_%ld.bin", (long)getpid());
     file = fopen(name, "wb");
@@ -180,13 +192,7 @@ static double scipy_seconds(const instance *q, int rounds)
              "c=numpy.fromfile('%s',dtype=numpy.float32).reshape(%d,%d).astype(numpy.float64)\nb=[]\n"
              "for i in range(%d):\n t=time.thread_time();f(c);b.append(time.thread_time()-t)\nprint(sorted(b)[len(b)//2])\" 2>/dev/null",
              name, q->p.rows, q->p.columns, rounds);
-    file = popen(command, "r");
-    if (file) {
-        if (fscanf(file, "%lf", &seconds) != 1) seconds = -1;
-        pclose(file);
-    }
-    remove(name);
-    return seconds;
+    return printed_seconds(command, name);
 }
 
 static const char *const method_names[] = {"auto",   "exact",          "fast",      "entropic", "published",
@@ -441,7 +447,6 @@ static double scipy_sparse_seconds(const instance *q, const forms *f, int rounds
 {
     char command[768], name[64];
     FILE *file;
-    double seconds = -1;
     size_t n = (size_t)f->allowed, rows = (size_t)q->p.rows + 1;
     snprintf(name, sizeof name, "/tmp/bench_softassign_%ld.bin", (long)getpid());
     file = fopen(name, "wb");
@@ -456,13 +461,7 @@ static double scipy_sparse_seconds(const instance *q, const forms *f, int rounds
              "m=csr_matrix((a[r+1+n:].view(numpy.float32).astype(numpy.float64)+1e-9,a[r+1:r+1+n],a[:r+1]),shape=(r,%d))\nb=[]\n"
              "for i in range(%d):\n t=time.thread_time();f(m);b.append(time.thread_time()-t)\nprint(sorted(b)[len(b)//2])\" 2>/dev/null",
              name, q->p.rows, f->allowed, q->p.columns, rounds);
-    file = popen(command, "r");
-    if (file) {
-        if (fscanf(file, "%lf", &seconds) != 1) seconds = -1;
-        pclose(file);
-    }
-    remove(name);
-    return seconds;
+    return printed_seconds(command, name);
 }
 
 static void table_forms(void)
