@@ -4,22 +4,28 @@
 #include "metrics.h"
 #include "gl_context.h"
 #include "gl_es.h"
+#include "gl_share.h"
 
 typedef struct screen { gl_context context; sat__gl gl; } screen;
 
+/* One context for all tests: they share what is compiled. */
 static int screen_open(screen *s)
 {
-    if (!gl_context_open(&s->context, 3, 3)) {
-        expect_skip(s->context.message);
-        return 0;
+    static gl_context context;
+    static int opened;
+    if (!opened) {
+        opened = gl_context_open(&context, 3, 3) ? 1 : -1;
+        if (opened > 0) context.get_proc = gl_share(context.get_proc);
     }
-    return EXPECT_EQ(sat__gl_open(&s->gl, s->context.get_proc), SAT_OK);
+    s->context = context;
+    if (opened > 0) return EXPECT_EQ(sat__gl_open(&s->gl, s->context.get_proc), SAT_OK);
+    expect_skip(s->context.message);
+    return 0;
 }
 
 static void screen_close(screen *s)
 {
     sat__gl_close(&s->gl);
-    gl_context_close(&s->context);
 }
 
 static unsigned screen_texture(screen *s, unsigned internal, int width, int height, const void *pixels)
