@@ -101,51 +101,88 @@ static inline void reference_free(reference_scene *s)
     memset(s, 0, sizeof *s);
 }
 
+static inline void reference_cross(double out[3], const double a[3], const double b[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1], out[1] = a[2] * b[0] - a[0] * b[2], out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static inline double reference_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline void reference_minus(double out[3], const double a[3], const double b[3])
+{
+    out[0] = a[0] - b[0], out[1] = a[1] - b[1], out[2] = a[2] - b[2];
+}
+
 static inline int reference_hits(double p[3][3], const double origin[3], const double d[3])
 {
     double a[3], b[3], o[3], q[3], r[3], det, u, v;
-    int k;
-    for (k = 0; k < 3; k++) a[k] = p[1][k] - p[0][k], b[k] = p[2][k] - p[0][k], o[k] = origin[k] - p[0][k];
-    for (k = 0; k < 3; k++) q[k] = d[(k + 1) % 3] * b[(k + 2) % 3] - d[(k + 2) % 3] * b[(k + 1) % 3];
-    det = a[0] * q[0] + a[1] * q[1] + a[2] * q[2];
+    reference_minus(a, p[1], p[0]), reference_minus(b, p[2], p[0]), reference_minus(o, origin, p[0]);
+    reference_cross(q, d, b);
+    det = reference_dot(a, q);
     if (det == 0) return 0;
-    u = (o[0] * q[0] + o[1] * q[1] + o[2] * q[2]) / det;
+    u = reference_dot(o, q) / det;
     if (!(u >= 0 && u <= 1)) return 0;
-    for (k = 0; k < 3; k++) r[k] = o[(k + 1) % 3] * a[(k + 2) % 3] - o[(k + 2) % 3] * a[(k + 1) % 3];
-    v = (d[0] * r[0] + d[1] * r[1] + d[2] * r[2]) / det;
+    reference_cross(r, o, a);
+    v = reference_dot(d, r) / det;
     if (!(v >= 0 && u + v <= 1)) return 0;
-    return (b[0] * r[0] + b[1] * r[1] + b[2] * r[2]) / det > 0;
+    return reference_dot(b, r) / det > 0;
 }
 
-/* 1 when the ray meets a triangle in front of its origin. */
-static inline int reference_occluded(const reference_scene *s, const double origin[3], const double d[3])
+/* Cuts the span of a ray by one axis of a box: `low` and `high` from the origin, `inverse` 1 / d, 0 for a d of 0. */
+static inline void reference_slab(double span[2], double low, double high, double inverse)
 {
+    double a = low * inverse, b = high * inverse, first = a < b ? a : b, end = a < b ? b : a;
+    if (inverse == 0) {
+        if (low > 0 || high < 0) span[0] = 1e301;
+        return;
+    }
+    span[0] = first > span[0] ? first : span[0];
+    span[1] = end < span[1] ? end : span[1];
+}
+
+static inline int reference_enters(const reference_node *n, const double o[3], const double inverse[3])
+{
+    double span[2] = {0, 1e300};
+    reference_slab(span, n->low[0] - o[0], n->high[0] - o[0], inverse[0]);
+    reference_slab(span, n->low[1] - o[1], n->high[1] - o[1], inverse[1]);
+    reference_slab(span, n->low[2] - o[2], n->high[2] - o[2], inverse[2]);
+    return span[0] <= span[1] * (1 + 1e-12) + 1e-12;
+}
+
+/* 1 when the ray meets a triangle in front of its origin. *last (may be NULL) is the triangle that the ray before met,
+   or -1: its neighbour most often meets the same. */
+static inline int reference_occluded_near(const reference_scene *s, int *last, const double origin[3],
+                                          const double d[3])
+{
+    double inverse[3];
     int stack[64], depth = 0, k, i;
     if (s->count == 0) return 0;
+    if (last && *last >= 0 && reference_hits(s->corner[*last], origin, d)) return 1;
+    for (k = 0; k < 3; k++) inverse[k] = d[k] == 0 ? 0 : 1 / d[k];
     stack[depth++] = 0;
     while (depth) {
         const reference_node *n = &s->nodes[stack[--depth]];
-        double near_t = 0, far_t = 1e300;
-        for (k = 0; k < 3; k++) {
-            double a = (n->low[k] - origin[k]) / d[k], b = (n->high[k] - origin[k]) / d[k];
-            if (d[k] == 0) {
-                if (origin[k] < n->low[k] || origin[k] > n->high[k]) near_t = 1e301;
-                continue;
-            }
-            if (a > b) { double t = a; a = b; b = t; }
-            if (a > near_t) near_t = a;
-            if (b < far_t) far_t = b;
-        }
-        if (near_t > far_t * (1 + 1e-12) + 1e-12) continue;
+        if (!reference_enters(n, origin, inverse)) continue;
         if (n->count == 0) {
             stack[depth++] = n->right;
             stack[depth++] = (int)(n - s->nodes) + 1;
             continue;
         }
         for (i = n->first; i < n->first + n->count; i++)
-            if (reference_hits(s->corner[i], origin, d)) return 1;
+            if (reference_hits(s->corner[i], origin, d)) {
+                if (last) *last = i;
+                return 1;
+            }
     }
     return 0;
+}
+
+static inline int reference_occluded(const reference_scene *s, const double origin[3], const double d[3])
+{
+    return reference_occluded_near(s, NULL, origin, d);
 }
 
 /* Eq 6 over the M lights of an environment that the point sees. */
@@ -153,13 +190,15 @@ static inline void reference_irradiance(double rgb[3], const reference_scene *s,
                                         const float *powers, size_t lights, const float point[3], const float normal[3])
 {
     double o[3] = {(double)point[0], (double)point[1], (double)point[2]};
+    int last = -1;
     size_t i;
     rgb[0] = rgb[1] = rgb[2] = 0;
     for (i = 0; i < lights; i++) {
         const float *w = directions + 3 * i, *p = powers + 3 * i;
         double d[3] = {(double)w[0], (double)w[1], (double)w[2]};
         double cosine = d[0] * (double)normal[0] + d[1] * (double)normal[1] + d[2] * (double)normal[2];
-        if (!(cosine > 0) || (p[0] == 0 && p[1] == 0 && p[2] == 0) || (s && reference_occluded(s, o, d))) continue;
+        if (!(cosine > 0) || (p[0] == 0 && p[1] == 0 && p[2] == 0)) continue;
+        if (s && reference_occluded_near(s, &last, o, d)) continue;
         rgb[0] += (double)p[0] * cosine, rgb[1] += (double)p[1] * cosine, rgb[2] += (double)p[2] * cosine;
     }
 }
