@@ -2604,22 +2604,27 @@ RAINDROP_DEF sat_result raindrop_fall(raindrop_drop *drop, const float wind[3], 
 
 /* ---- sizes */
 
-/* A diameter in mm. In a volume sizes are Marshall-Palmer's, by the inverse of its integral; at a plane that rises with
-   the speed `rise` through the air they arrive weighted with v + rise: a diameter is taken with that probability over
-   the fastest's, else the next one is tried. */
-static inline double raindrop__diameter(const raindrop_rain_options *o, uint32_t stream, uint32_t i, int at_plane,
-                                        double rise)
+/* What all drops of a step share. rise: speed of the box upwards in this step; through: the same through the air, which
+   may move up or down; fastest: speed of the largest drops through the box. */
+typedef struct raindrop__advance_job { raindrop_rain *rain; double dt, rise, through, fastest; } raindrop__advance_job;
+
+/* A diameter in mm. In a volume (no plane) sizes are Marshall-Palmer's, by the inverse of its integral; at a plane that
+   rises through the air they arrive weighted with their speed through it: a diameter is taken with that probability
+   over the fastest's, else the next one is tried. */
+static inline double raindrop__diameter(const raindrop_rain_options *o, uint32_t stream, uint32_t i,
+                                        const raindrop__advance_job *plane)
 {
     double lambda = raindrop__lambda(o->rate_mm_h), span = o->diameter_max_mm - o->diameter_min_mm,
            all = -expm1(-lambda * span), d;
-    double fastest = raindrop_terminal_velocity(o->diameter_max_mm) + rise;
     uint32_t attempt;
     if (o->diameter_mm > 0) return o->diameter_mm;
     for (attempt = 0;; attempt++) {
         uint32_t bits = raindrop__hash(o->seed, stream + 16 + attempt, i);
         d = o->diameter_min_mm - log1p(-(double)raindrop__uniform(bits) * all) / lambda;
-        if (!at_plane || o->speed > 0 || attempt == 255) return d;
-        if ((double)raindrop__uniform(raindrop__mix(bits)) * fastest < raindrop_terminal_velocity(d) + rise) return d;
+        if (!plane || o->speed > 0 || attempt == 255) return d;
+        if ((double)raindrop__uniform(raindrop__mix(bits)) * plane->fastest <
+            raindrop_terminal_velocity(d) + plane->through)
+            return d;
     }
 }
 
@@ -2646,14 +2651,11 @@ static void raindrop__create_range(int begin, int end, int worker, void *context
         raindrop_drop *drop = &rain->drops[i];
         for (axis = 0; axis < 3; axis++)
             drop->position[axis] = raindrop__place(o, axis, raindrop__hash(o->seed, (uint32_t)axis, (uint32_t)i));
-        raindrop__give_size(drop, o, raindrop__diameter(o, 0, (uint32_t)i, 0, 0));
+        raindrop__give_size(drop, o, raindrop__diameter(o, 0, (uint32_t)i, NULL));
     }
 }
 
 /* ---- one step of all drops */
-
-/* rise: speed of the box upwards in this step. */
-typedef struct raindrop__advance_job { raindrop_rain *rain; double dt, rise; } raindrop__advance_job;
 
 static inline float raindrop__wrap(double position, double low, double size)
 {
@@ -2674,21 +2676,19 @@ static inline void raindrop__reenter(raindrop_drop *drop, double at[3], const ra
 {
     const raindrop_rain_options *o = &job->rain->options;
     double size = (double)o->box_size[1], top = (double)o->centre[1] + size / 2,
-           old = job->rise - (double)drop->velocity[1], through = job->rise - (double)o->wind[1];
-    double left = old > 0 ? below / old : 0, speed = old, fastest;
+           old = job->rise - (double)drop->velocity[1], left = old > 0 ? below / old : 0, speed = old;
     uint32_t stream = job->rain->step * 512u;
     int turn;
     if (o->diameter_mm > 0) {
         at[1] = top - fmod(below, size);
         return;
     }
-    fastest = (o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(o->diameter_max_mm)) + through;
-    if (left > raindrop__forgets(o, fastest)) {
-        raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 0, 0));
+    if (left > raindrop__forgets(o, job->fastest)) {
+        raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, NULL));
         below = (double)raindrop__uniform(raindrop__hash(o->seed, stream + 1, i)) * size;
     } else {
         for (turn = 0;; turn++, stream += RAINDROP__TURN) {
-            raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, 1, through));
+            raindrop__give_size(drop, o, raindrop__diameter(o, stream, i, job));
             speed = job->rise - (double)drop->velocity[1];
             if (!(left * speed >= size) || turn == 255) break;
             left -= size / speed;
@@ -2757,13 +2757,17 @@ static void raindrop__advance_range(int begin, int end, int worker, void *contex
 
 RAINDROP_DEF sat_result raindrop_rain_advance(raindrop_rain *rain, double dt)
 {
+    const raindrop_rain_options *o;
     raindrop__advance_job job;
     int chunk, chunks, moving = 0;
     if (!rain || !sat__is_finite_double(dt) || dt < 0) return SAT_ERR_ARGUMENT;
+    o = &rain->options;
     chunks = raindrop__chunk_count(rain->count);
     job.rain = rain;
     job.dt = dt;
-    job.rise = raindrop__rise_of(&rain->height, &rain->options, dt);
+    job.rise = raindrop__rise_of(&rain->height, o, dt);
+    job.through = job.rise - (double)o->wind[1];
+    job.fastest = (o->speed > 0 ? (double)o->speed : raindrop_terminal_velocity(o->diameter_max_mm)) + job.through;
     if (dt > 0) rain->step++;
     rain->time = fmod(rain->time + fmod(dt, RAINDROP__PERIOD), RAINDROP__PERIOD);
     sat__parallel_for(&rain->options.threads, chunks, raindrop__advance_range, &job);

@@ -198,7 +198,17 @@ static inline void reference_draw(float *fine, unsigned char *mask, int width, i
     }
 }
 
-/* The whole picture, background included; returns 0 when memory is short. */
+/* Whether a drop touches a pixel of the same window of reference_ssim. */
+static inline int reference_near(const unsigned char *mask, int width, int height, int x, int y)
+{
+    int x0 = x > 7 ? x - 7 : 0, x1 = x + 8 < width ? x + 8 : width, row;
+    for (row = y > 7 ? y - 7 : 0; row < height && row < y + 8; row++)
+        if (memchr(mask + (size_t)row * (size_t)width + x0, 1, (size_t)(x1 - x0))) return 1;
+    return 0;
+}
+
+/* The whole picture, background included; with a mask only what the measures below look at, the rest black. Returns 0
+   when memory is short. */
 static inline int reference_render(float *rgb, unsigned char *mask, int width, int height, int side,
                                    const raindrop_camera *camera, const raindrop_drop *drops, int count,
                                    const raindrop_environment *environment, int orders)
@@ -207,17 +217,9 @@ static inline int reference_render(float *rgb, unsigned char *mask, int width, i
     double focal = 0.5 * (double)h / tan(0.5 * (double)camera->fov_y);
     float *fine = (float *)malloc(w * h * 3 * sizeof *fine);
     reference_order *order = (reference_order *)malloc((size_t)(count + 1) * sizeof *order);
-    int i, j, x, y, c, s, t;
+    int i, j, x, y, c, seen;
     if (!fine || !order) { free(fine); free(order); return 0; }
-    for (j = 0; j < (int)h; j++) {
-        for (i = 0; i < (int)w; i++) {
-            double d[3];
-            float f[3];
-            reference_ray(d, camera, (i + 0.5 - 0.5 * (double)w) / focal, (0.5 * (double)h - j - 0.5) / focal);
-            for (c = 0; c < 3; c++) f[c] = (float)d[c];
-            raindrop_environment_sample(fine + 3 * ((size_t)j * w + (size_t)i), environment, f, 0);
-        }
-    }
+    for (k = 0; k < w * h; k++) fine[3 * k] = -1; /* no light yet */
     for (i = 0; i < count; i++) {
         order[i].at = i;
         order[i].depth = 0;
@@ -230,15 +232,19 @@ static inline int reference_render(float *rgb, unsigned char *mask, int width, i
         reference_draw(fine, mask, width, height, side, camera, &drops[order[i].at], environment, orders);
     for (y = 0; y < height; y++) {
         for (x = 0; x < width; x++) {
-            for (c = 0; c < 3; c++) {
-                double sum = 0;
-                for (t = 0; t < side; t++)
-                    for (s = 0; s < side; s++) {
-                        k = 3 * ((size_t)(y * side + t) * w + (size_t)(x * side + s)) + (size_t)c;
-                        sum += (double)fine[k];
-                    }
-                rgb[3 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)c] = (float)(sum / (side * side));
-            }
+            double sum[3] = {0, 0, 0};
+            k = (size_t)y * (size_t)width + (size_t)x;
+            seen = !mask || reference_near(mask, width, height, x, y);
+            for (j = y * side; seen && j < (y + 1) * side; j++)
+                for (i = x * side; i < (x + 1) * side; i++) {
+                    float *light = fine + 3 * ((size_t)j * w + (size_t)i), f[3];
+                    double d[3];
+                    reference_ray(d, camera, (i + 0.5 - (double)w / 2) / focal, ((double)h / 2 - j - 0.5) / focal);
+                    for (c = 0; c < 3; c++) f[c] = (float)d[c];
+                    if (light[0] < 0) raindrop_environment_sample(light, environment, f, 0);
+                    for (c = 0; c < 3; c++) sum[c] += (double)light[c];
+                }
+            for (c = 0; c < 3; c++) rgb[3 * k + (size_t)c] = (float)(sum[c] / (side * side));
         }
     }
     free(fine);
@@ -246,14 +252,15 @@ static inline int reference_render(float *rgb, unsigned char *mask, int width, i
     return 1;
 }
 
-/* ---- one lamp in one drop before black, by rays fine enough to hit it: its light in pixels, and where its middle is;
+/* ---- one lamp in one round drop before black, by rays fine enough to hit it: its light in pixels, and where its
+   middle is;
    the orders up to 1 as raindrop_render has them by default, the later ones' light with the last */
 
 static inline void reference_lamp(double *out, int width, int height, const raindrop_camera *camera,
                                   const raindrop_drop *drop, const raindrop_lamp *lamp)
 {
     const double focal = 0.5 * height / tan(0.5 * (double)camera->fov_y), pi = acos(-1.0);
-    double to[3], rel[3], distance = 0, wide, radiance, z = 0, x = 0, y = 0, reach, step;
+    double to[3], rel[3], distance = 0, length, wide, radiance, z = 0, x = 0, y = 0, reach, step;
     int i, j, k, c, n;
     for (c = 0; c < 3; c++) {
         rel[c] = (double)drop->position[c] - (double)camera->position[c];
@@ -274,15 +281,19 @@ static inline void reference_lamp(double *out, int width, int height, const rain
     for (j = 0; j < n; j++)
         for (i = 0; i < n; i++) {
             double px = 0.5 * width + focal * x / z - reach + (i + 0.5) * step,
-                   py = 0.5 * height - focal * y / z - reach + (j + 0.5) * step, d[3], light = 0;
+                   py = 0.5 * height - focal * y / z - reach + (j + 0.5) * step, d[3], normal[3], light = 0;
             reference_real origin[3], direction[3];
             reference_drop traced;
             reference_ray(d, camera, (px - 0.5 * width) / focal, (0.5 * height - py) / focal);
+            /* what enters a sphere leaves in the plane of the ray and the centre: is the lamp there at all? */
+            for (c = 0; c < 3; c++) normal[c] = d[(c + 1) % 3] * rel[(c + 2) % 3] - d[(c + 2) % 3] * rel[(c + 1) % 3];
+            length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+            if (fabs(normal[0] * to[0] + normal[1] * to[1] + normal[2] * to[2]) > length * sin(wide)) continue;
             for (c = 0; c < 3; c++) {
                 origin[c] = (reference_real)(-rel[c] / (double)drop->radius);
                 direction[c] = (reference_real)d[c];
             }
-            traced = reference_trace(origin, direction, (reference_real)drop->axis_ratio, (reference_real)1.33L);
+            traced = reference_trace(origin, direction, 1, (reference_real)1.33L);
             if (!traced.hit) continue;
             for (k = -1; k < 2; k++) {
                 const reference_real *leaves = k < 0 ? traced.reflected : traced.order[k];
