@@ -11,8 +11,10 @@ enum { GL_W = 37, GL_H = 22, GL_N = GL_W * GL_H, GL_BIG_W = 90, GL_BIG_H = 60 };
 static gl_context gl_screen;
 static sat__gl gl_f;
 
+/* The context is made by the first test, for all of them. */
 static int gl_open(void)
 {
+    if (gl_screen.context) return 1;
     if (!gl_context_open(&gl_screen, 3, 3)) {
         expect_skip(gl_screen.message);
         return 0;
@@ -20,12 +22,7 @@ static int gl_open(void)
     return EXPECT_EQ(sat__gl_open(&gl_f, gl_screen.get_proc), SAT_OK);
 }
 
-static void gl_close(void)
-{
-    EXPECT_EQ(gl_f.GetError(), 0);
-    sat__gl_close(&gl_f);
-    gl_context_close(&gl_screen);
-}
+static void gl_close(void) { EXPECT_EQ(gl_f.GetError(), 0); }
 
 static unsigned gl_texture(unsigned internal, int width, int height, const void *pixels)
 {
@@ -112,14 +109,13 @@ static unsigned gl_input(gl_scene *s, int call)
     return call == GL_TONE ? s->hdr : call == GL_AO ? s->depth : s->points;
 }
 
-/* Objects for pictures of this size; the occluder and its light are the CPU's. */
-static void gl_create_sized(gl_scene *s, sat_gl_get_proc *get_proc, int width, int height)
+/* What all scenes read: the occluder, its light and the drops are the CPU's. */
+static void gl_create_cpu(gl_scene *s)
 {
     static float sky[16 * 8 * 3];
     sat_image image = sat_image_f32(sky, 16, 8, 3);
     fiv_occluder_options fo = fiv_occluder_defaults();
     raindrop_rain_options ro = raindrop_rain_defaults();
-    raindrop_gl_options rg = raindrop_gl_defaults();
     support_fill(sky, 16 * 8 * 3, 0.1, 2, 3);
     fo.theta = 8, fo.phi = 5, fo.rho = 4;
     s->mesh = reference_knot(2, 3, 20, 6, 0.25);
@@ -131,15 +127,24 @@ static void gl_create_sized(gl_scene *s, sat_gl_get_proc *get_proc, int width, i
     memset(&s->instance, 0, sizeof s->instance);
     s->instance.occluder = s->occluder;
     s->instance.scale = 1;
+    ro.rate_mm_h = 300;
+    ro.box_size[0] = ro.box_size[1] = ro.box_size[2] = 2;
+    EXPECT_EQ(raindrop_environment_create(&s->mirror, &image, NULL, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_rain_create(&s->drops, &ro), SAT_OK);
+}
+
+/* Objects for pictures of this size. */
+static void gl_create_sized(gl_scene *s, sat_gl_get_proc *get_proc, int width, int height)
+{
+    static gl_scene cpu;
+    raindrop_gl_options rg = raindrop_gl_defaults();
+    if (!cpu.drops) gl_create_cpu(&cpu);
+    *s = cpu;
     EXPECT_EQ(tonemap_gl_create(&s->tone, get_proc, width, height, NULL), SAT_OK);
     EXPECT_EQ(ssao_sat_gl_create(&s->ao, get_proc, width, height, NULL), SAT_OK);
     EXPECT_EQ(fiv_gl_create(&s->shadows, get_proc, width, height, NULL), SAT_OK);
     EXPECT_EQ(fiv_gl_set_scene(s->shadows, s->light, &s->instance, 1), SAT_OK);
     rg.lamps = rg.oscillation = 1;
-    ro.rate_mm_h = 300;
-    ro.box_size[0] = ro.box_size[1] = ro.box_size[2] = 2;
-    EXPECT_EQ(raindrop_environment_create(&s->mirror, &image, NULL, NULL), SAT_OK);
-    EXPECT_EQ(raindrop_rain_create(&s->drops, &ro), SAT_OK);
     EXPECT_EQ(raindrop_gl_create(&s->rain, get_proc, &rg), SAT_OK);
     EXPECT_EQ(raindrop_gl_set_environment(s->rain, s->mirror), SAT_OK);
     EXPECT_EQ(raindrop_gl_set_rain(s->rain, s->drops), SAT_OK);
@@ -171,11 +176,17 @@ static void gl_destroy(gl_scene *s)
     ssao_sat_gl_destroy(s->ao);
     fiv_gl_destroy(s->shadows);
     raindrop_gl_destroy(s->rain);
-    raindrop_rain_destroy(s->drops);
-    raindrop_environment_destroy(s->mirror);
-    fiv_occluder_destroy(s->occluder);
-    fiv_environment_destroy(s->light);
-    reference_mesh_free(&s->mesh);
+}
+
+/* A scene with its inputs, made by the first test that draws, for all of them; who changes it changes it back. */
+static gl_scene *gl_open_scene(void)
+{
+    static gl_scene shared;
+    if (shared.tone) return &shared;
+    if (!gl_open()) return NULL;
+    gl_create(&shared, gl_screen.get_proc);
+    gl_fill(&shared);
+    return &shared;
 }
 
 /* The picture `small` at (x, y) of `big`, rows reversed or not, and nothing elsewhere; the number of wrong pixels. */
@@ -198,11 +209,10 @@ TEST(pictures_go_where_the_target_says)
     static unsigned char own[16 * GL_N], big[16 * GL_BIG_W * GL_BIG_H];
     static const int corners[][3] = {{0, 0, 0}, {41, 20, 0}, {11, 3, 1}, {70, -9, 0}, {-5, 50, 1}};
     static const float nothing[4] = {0, 0, 0, 0};
-    static gl_scene s;
+    gl_scene *s;
     int call, k, place;
-    if (!gl_open()) return;
-    gl_create(&s, gl_screen.get_proc);
-    gl_fill(&s);
+    s = gl_open_scene();
+    if (!s) return;
     for (call = 0; call < GL_CALLS; call++) {
         unsigned internal = gl_format(call), framebuffer = 0, format, type;
         unsigned texture = gl_texture(internal, GL_BIG_W, GL_BIG_H, NULL);
@@ -215,9 +225,9 @@ TEST(pictures_go_where_the_target_says)
         EXPECT_EQ(sat__gl_attach(&gl_f, gl_f.framebuffer, &small, 1, 0), SAT_OK);
         gl_f.ClearBufferfv(SAT__GL_COLOR, 0, nothing);
         sat__gl_end(&gl_f, &state);
-        EXPECT_EQ(gl_call(&s, call, call == GL_RAIN ? &alone : NULL), SAT_OK);
+        EXPECT_EQ(gl_call(s, call, call == GL_RAIN ? &alone : NULL), SAT_OK);
         sat__gl_begin(&gl_f, &state, 1);
-        EXPECT_EQ(sat__gl_read(&gl_f, own, call == GL_RAIN ? small : gl_own(&s, call), internal, GL_W, GL_H), SAT_OK);
+        EXPECT_EQ(sat__gl_read(&gl_f, own, call == GL_RAIN ? small : gl_own(s, call), internal, GL_W, GL_H), SAT_OK);
         EXPECT_EQ(sat__gl_framebuffer(&gl_f, &framebuffer, &texture, 1, 0), SAT_OK);
         sat__gl_end(&gl_f, &state);
         for (place = SAT_GL_TEXTURE; place <= SAT_GL_FRAMEBUFFER; place++)
@@ -234,7 +244,7 @@ TEST(pictures_go_where_the_target_says)
                     gl_f.FramebufferTextureLayer(SAT__GL_FRAMEBUFFER, SAT__GL_COLOR_ATTACHMENT0, array, 0, 1 + k % 2);
                 gl_f.ClearBufferfv(SAT__GL_COLOR, 0, nothing);
                 sat__gl_end(&gl_f, &state);
-                EXPECT_EQ(gl_call(&s, call, &to), SAT_OK);
+                EXPECT_EQ(gl_call(s, call, &to), SAT_OK);
                 gl_read(big, framebuffer, internal, GL_BIG_W, GL_BIG_H);
                 EXPECT_EQ(gl_compare(big, own, bytes, corners[k][0], corners[k][1], corners[k][2]), 0);
                 sat__gl_begin(&gl_f, &state, 1);
@@ -248,7 +258,6 @@ TEST(pictures_go_where_the_target_says)
         gl_f.DeleteTextures(1, &array);
         gl_f.DeleteTextures(1, &small);
     }
-    gl_destroy(&s);
     gl_close();
 }
 
@@ -258,27 +267,26 @@ TEST(inputs_may_lie_anywhere_in_their_textures)
     static float big[4 * GL_BIG_W * GL_BIG_H], small[4 * GL_N];
     static unsigned char own[16 * GL_N], there[16 * GL_N];
     static const int corners[][2] = {{0, 0}, {41, 20}, {3, 17}};
-    static gl_scene s;
+    gl_scene *s;
     sat_gl_target to = sat_gl_to(SAT_GL_OWN, 0, 0, 0, 0, 0);
     sat__gl_state state;
     int call, k, i, normals;
-    if (!gl_open()) return;
-    gl_create(&s, gl_screen.get_proc);
-    gl_fill(&s);
+    s = gl_open_scene();
+    if (!s) return;
     for (call = 0; call < GL_RAIN; call++)
         for (k = 0; k < 3; k++)
             for (normals = call != GL_AO; normals < 2; normals++) {
                 unsigned *inputs[3], kept[3], internal = gl_format(call), framebuffer = 0;
                 int count = 0, j;
-                if (call == GL_TONE) inputs[count++] = &s.hdr;
-                if (call == GL_AO) inputs[count++] = &s.depth;
-                if (call == GL_SHADOWS) inputs[count++] = &s.points;
-                if (call != GL_TONE) inputs[count++] = &s.normals;
-                kept[2] = s.normals;
-                if (!normals) s.normals = 0, count = 1; /* from depth */
-                EXPECT_EQ(gl_call(&s, call, NULL), SAT_OK);
+                if (call == GL_TONE) inputs[count++] = &s->hdr;
+                if (call == GL_AO) inputs[count++] = &s->depth;
+                if (call == GL_SHADOWS) inputs[count++] = &s->points;
+                if (call != GL_TONE) inputs[count++] = &s->normals;
+                kept[2] = s->normals;
+                if (!normals) s->normals = 0, count = 1; /* from depth */
+                EXPECT_EQ(gl_call(s, call, NULL), SAT_OK);
                 sat__gl_begin(&gl_f, &state, 1);
-                EXPECT_EQ(sat__gl_read(&gl_f, own, gl_own(&s, call), internal, GL_W, GL_H), SAT_OK);
+                EXPECT_EQ(sat__gl_read(&gl_f, own, gl_own(s, call), internal, GL_W, GL_H), SAT_OK);
                 for (j = 0; j < count; j++) {
                     kept[j] = *inputs[j];
                     EXPECT_EQ(sat__gl_framebuffer(&gl_f, &framebuffer, &kept[j], 1, 0), SAT_OK);
@@ -295,20 +303,19 @@ TEST(inputs_may_lie_anywhere_in_their_textures)
                 sat__gl_end(&gl_f, &state);
                 to.from_x = corners[k][0];
                 to.from_y = corners[k][1];
-                EXPECT_EQ(gl_call(&s, call, &to), SAT_OK);
+                EXPECT_EQ(gl_call(s, call, &to), SAT_OK);
                 sat__gl_begin(&gl_f, &state, 1);
-                EXPECT_EQ(sat__gl_read(&gl_f, there, gl_own(&s, call), internal, GL_W, GL_H), SAT_OK);
+                EXPECT_EQ(sat__gl_read(&gl_f, there, gl_own(s, call), internal, GL_W, GL_H), SAT_OK);
                 EXPECT(memcmp(own, there, sizeof(float) * GL_N * (internal == SAT__GL_RGBA32F ? 4 : 1)) == 0);
                 for (j = 0; j < count; j++) {
                     gl_f.DeleteTextures(1, inputs[j]);
                     *inputs[j] = kept[j];
                 }
                 sat__gl_end(&gl_f, &state);
-                s.normals = kept[2];
+                s->normals = kept[2];
             }
     to.from_y = -1;
-    for (call = 0; call < GL_RAIN; call++) EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_ARGUMENT);
-    gl_destroy(&s);
+    for (call = 0; call < GL_RAIN; call++) EXPECT_EQ(gl_call(s, call, &to), SAT_ERR_ARGUMENT);
     gl_close();
 }
 
@@ -372,32 +379,31 @@ TEST(objects_take_smaller_pictures)
 {
     static unsigned char own[16 * GL_N], there[16 * GL_N];
     static const int calls[] = {GL_TONE, GL_AO, GL_SHADOWS};
-    static gl_scene s, small;
+    static gl_scene small;
+    gl_scene *s;
     sat_gl_target to = sat_gl_to(SAT_GL_OWN, 0, 0, 0, 0, 0);
     sat__gl_state state;
     size_t k;
-    if (!gl_open()) return;
-    gl_create(&s, gl_screen.get_proc);
+    s = gl_open_scene();
+    if (!s) return;
     gl_create_sized(&small, gl_screen.get_proc, GL_SMALL_W, GL_SMALL_H);
-    gl_fill(&s);
-    small.hdr = s.hdr, small.depth = s.depth, small.normals = s.normals, small.points = s.points;
+    small.hdr = s->hdr, small.depth = s->depth, small.normals = s->normals, small.points = s->points;
     for (k = 0; k < sizeof calls / sizeof *calls; k++) {
         int call = calls[k], bytes = gl_format(call) == SAT__GL_RGBA32F ? 16 : 4;
-        EXPECT_EQ(gl_call(&s, call, NULL), SAT_OK);
+        EXPECT_EQ(gl_call(s, call, NULL), SAT_OK);
         EXPECT_EQ(gl_call(&small, call, NULL), SAT_OK);
         to.width = GL_SMALL_W, to.height = GL_SMALL_H;
-        s.input = small.input; /* another size is another projection */
-        EXPECT_EQ(gl_call(&s, call, &to), SAT_OK);
+        s->input = small.input; /* another size is another projection */
+        EXPECT_EQ(gl_call(s, call, &to), SAT_OK);
         sat__gl_begin(&gl_f, &state, 1);
-        EXPECT_EQ(sat__gl_read(&gl_f, own, gl_own(&s, call), gl_format(call), GL_SMALL_W, GL_SMALL_H), SAT_OK);
+        EXPECT_EQ(sat__gl_read(&gl_f, own, gl_own(s, call), gl_format(call), GL_SMALL_W, GL_SMALL_H), SAT_OK);
         EXPECT_EQ(sat__gl_read(&gl_f, there, gl_own(&small, call), gl_format(call), GL_SMALL_W, GL_SMALL_H), SAT_OK);
         sat__gl_end(&gl_f, &state);
         EXPECT(memcmp(own, there, (size_t)(bytes * GL_SMALL_W * GL_SMALL_H)) == 0);
-        to.width = s.input.width = GL_W + 1;
-        EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_SIZE);
-        s.input = ssao_sat_input_linear(NULL, GL_W, GL_H, 1);
+        to.width = s->input.width = GL_W + 1;
+        EXPECT_EQ(gl_call(s, call, &to), SAT_ERR_SIZE);
+        s->input = ssao_sat_input_linear(NULL, GL_W, GL_H, 1);
     }
-    gl_destroy(&s);
     gl_destroy(&small);
     gl_close();
 }
@@ -409,10 +415,11 @@ TEST(a_layer_is_an_input_by_a_view_of_it)
     void(SAT__GL_CALL * view)(unsigned texture, unsigned target, unsigned of, unsigned internal, unsigned level,
                               unsigned levels, unsigned layer, unsigned layers);
     static unsigned char own[16 * GL_N], there[16 * GL_N], texels[16 * GL_N];
-    static gl_scene s;
+    gl_scene *s;
     sat_gl_proc procs[2];
     int call;
-    if (!gl_open()) return;
+    s = gl_open_scene();
+    if (!s) return;
     procs[0] = gl_screen.get_proc("glTexStorage3D");
     procs[1] = gl_screen.get_proc("glTextureView");
     if (!gl_f.has_compute || !procs[0] || !procs[1]) {
@@ -422,16 +429,15 @@ TEST(a_layer_is_an_input_by_a_view_of_it)
     }
     memcpy(&storage, &procs[0], sizeof storage);
     memcpy(&view, &procs[1], sizeof view);
-    gl_create(&s, gl_screen.get_proc);
-    gl_fill(&s);
     for (call = 0; call < GL_RAIN; call++) {
-        unsigned *input = call == GL_TONE ? &s.hdr : call == GL_AO ? &s.depth : &s.points, kept = *input, array, layer;
+        unsigned *input = call == GL_TONE ? &s->hdr : call == GL_AO ? &s->depth : &s->points;
+        unsigned kept = *input, array, layer;
         unsigned internal = call == GL_AO ? SAT__GL_R32F : SAT__GL_RGBA32F, format, type;
         sat__gl_state state;
         sat__gl_transfer(internal, &format, &type);
-        EXPECT_EQ(gl_call(&s, call, NULL), SAT_OK);
+        EXPECT_EQ(gl_call(s, call, NULL), SAT_OK);
         sat__gl_begin(&gl_f, &state, 1);
-        EXPECT_EQ(sat__gl_read(&gl_f, own, gl_own(&s, call), gl_format(call), GL_W, GL_H), SAT_OK);
+        EXPECT_EQ(sat__gl_read(&gl_f, own, gl_own(s, call), gl_format(call), GL_W, GL_H), SAT_OK);
         EXPECT_EQ(sat__gl_read(&gl_f, texels, kept, internal, GL_W, GL_H), SAT_OK);
         gl_f.GenTextures(1, &array);
         gl_f.BindTexture(SAT__GL_TEXTURE_2D_ARRAY, array);
@@ -441,51 +447,48 @@ TEST(a_layer_is_an_input_by_a_view_of_it)
         view(layer, SAT__GL_TEXTURE_2D, array, internal, 0, 1, 1, 1);
         sat__gl_end(&gl_f, &state);
         *input = layer;
-        EXPECT_EQ(gl_call(&s, call, NULL), SAT_OK);
+        EXPECT_EQ(gl_call(s, call, NULL), SAT_OK);
         *input = kept;
         sat__gl_begin(&gl_f, &state, 1);
-        EXPECT_EQ(sat__gl_read(&gl_f, there, gl_own(&s, call), gl_format(call), GL_W, GL_H), SAT_OK);
+        EXPECT_EQ(sat__gl_read(&gl_f, there, gl_own(s, call), gl_format(call), GL_W, GL_H), SAT_OK);
         sat__gl_end(&gl_f, &state);
         EXPECT(memcmp(own, there, (gl_format(call) == SAT__GL_RGBA32F ? 16 : 4) * GL_N) == 0);
         gl_f.DeleteTextures(1, &layer);
         gl_f.DeleteTextures(1, &array);
     }
-    gl_destroy(&s);
     gl_close();
 }
 
 TEST(targets_that_cannot_be_are_refused)
 {
-    static gl_scene s;
+    gl_scene *s;
     unsigned integers, framebuffer = 0, after = 0;
     int call, k;
-    if (!gl_open()) return;
-    gl_create(&s, gl_screen.get_proc);
-    gl_fill(&s);
+    s = gl_open_scene();
+    if (!s) return;
     integers = gl_texture(SAT__GL_DEPTH_COMPONENT24, GL_W, GL_H, NULL);
     gl_f.GenFramebuffers(1, &framebuffer); /* without an attachment */
     for (call = 0; call < GL_CALLS; call++) {
         sat_gl_target to = sat_gl_to_texture(0);
-        EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_ARGUMENT);
-        to = sat_gl_to_texture(gl_input(&s, call));
-        if (call != GL_RAIN) EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_ARGUMENT);
-        to = sat_gl_to_layer(gl_input(&s, call), -1);
-        EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(gl_call(s, call, &to), SAT_ERR_ARGUMENT);
+        to = sat_gl_to_texture(gl_input(s, call));
+        if (call != GL_RAIN) EXPECT_EQ(gl_call(s, call, &to), SAT_ERR_ARGUMENT);
+        to = sat_gl_to_layer(gl_input(s, call), -1);
+        EXPECT_EQ(gl_call(s, call, &to), SAT_ERR_ARGUMENT);
         k = 9;
         memcpy(&to.place, &k, sizeof to.place);
-        EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(gl_call(s, call, &to), SAT_ERR_ARGUMENT);
         to = sat_gl_to_framebuffer(framebuffer, 0, 0);
-        EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_GL_STATE);
+        EXPECT_EQ(gl_call(s, call, &to), SAT_ERR_GL_STATE);
         to = sat_gl_to_texture(integers); /* depth is no colour */
-        EXPECT_EQ(gl_call(&s, call, &to), SAT_ERR_GL_STATE);
+        EXPECT_EQ(gl_call(s, call, &to), SAT_ERR_GL_STATE);
         sat__gl_clear_errors(&gl_f);
-        EXPECT_EQ(gl_call(&s, call, NULL), SAT_OK); /* and nothing is left behind */
+        EXPECT_EQ(gl_call(s, call, NULL), SAT_OK); /* and nothing is left behind */
         gl_f.GetIntegerv(SAT__GL_DRAW_FRAMEBUFFER_BINDING, (int *)&after);
         EXPECT_EQ(after, 0);
     }
     gl_f.DeleteFramebuffers(1, &framebuffer);
     gl_f.DeleteTextures(1, &integers);
-    gl_destroy(&s);
     gl_close();
 }
 
@@ -515,10 +518,10 @@ static void gl_world(double out[3], const double v[3], int is_point)
 TEST(shadows_from_a_depth_buffer_are_those_from_points)
 {
     static float points[4 * GL_N], normals[4 * GL_N], depth[GL_N], world_normals[4 * GL_N], a[4 * GL_N], b[4 * GL_N];
-    static gl_scene s;
+    gl_scene *s;
     int kind, i, k;
-    if (!gl_open()) return;
-    gl_create(&s, gl_screen.get_proc);
+    s = gl_open_scene();
+    if (!s) return;
     for (kind = 0; kind < 3; kind++) {
         double p[16], inverse[16], worst = 0, largest = 0;
         unsigned textures[4];
@@ -563,10 +566,10 @@ TEST(shadows_from_a_depth_buffer_are_those_from_points)
         textures[2] = gl_texture(SAT__GL_DEPTH_COMPONENT32F, GL_W, GL_H, depth);
         textures[3] = gl_texture(SAT__GL_RGBA32F, GL_W, GL_H, normals);
         for (k = 0; k < 2; k++) {
-            EXPECT_EQ(fiv_gl_irradiance(s.shadows, NULL, textures[2 * k], textures[2 * k + 1], k ? &view : NULL),
+            EXPECT_EQ(fiv_gl_irradiance(s->shadows, NULL, textures[2 * k], textures[2 * k + 1], k ? &view : NULL),
                       SAT_OK);
             sat__gl_begin(&gl_f, &state, 1);
-            sat__gl_read(&gl_f, k ? b : a, fiv_gl_texture(s.shadows), SAT__GL_RGBA32F, GL_W, GL_H);
+            sat__gl_read(&gl_f, k ? b : a, fiv_gl_texture(s->shadows), SAT__GL_RGBA32F, GL_W, GL_H);
             sat__gl_end(&gl_f, &state);
         }
         for (i = 0; i < 4 * GL_N; i++) {
@@ -577,7 +580,6 @@ TEST(shadows_from_a_depth_buffer_are_those_from_points)
         EXPECT(worst < 1e-4 * largest && largest > 0);
         gl_f.DeleteTextures(4, textures);
     }
-    gl_destroy(&s);
     gl_close();
 }
 
@@ -587,14 +589,14 @@ TEST(drops_are_tested_against_any_depth_buffer)
 {
     static float pictures[5][4 * GL_N];
     static const float nothing[4] = {0, 0, 0, 0};
-    static gl_scene s;
+    gl_scene *s;
     raindrop_camera camera = raindrop_camera_defaults();
     float n = 0.1f, f = 20, t = tanf(0.5f * camera.fov_y), distance = 0.7f, a[3], b[3];
     unsigned colour, depth, framebuffer = 0;
     sat_gl_target to;
     int kind, i, k, drawn = 0, all = 0;
-    if (!gl_open()) return;
-    gl_create(&s, gl_screen.get_proc);
+    s = gl_open_scene();
+    if (!s) return;
     colour = gl_texture(SAT__GL_RGBA32F, GL_W, GL_H, NULL);
     depth = gl_texture(SAT__GL_DEPTH_COMPONENT32F, GL_W, GL_H, NULL);
     camera.depth_near = n;
@@ -615,7 +617,7 @@ TEST(drops_are_tested_against_any_depth_buffer)
         gl_f.ClearBufferfv(0x1801, 0, &clear); /* GL_DEPTH */
         sat__gl_end(&gl_f, &state);
         to = sat_gl_to_framebuffer(framebuffer, 0, 0);
-        EXPECT_EQ(raindrop_gl_render(s.rain, &to, GL_W, GL_H, &camera, kind < 3 ? p : NULL, NULL), SAT_OK);
+        EXPECT_EQ(raindrop_gl_render(s->rain, &to, GL_W, GL_H, &camera, kind < 3 ? p : NULL, NULL), SAT_OK);
         gl_read(pictures[kind], framebuffer, SAT__GL_RGBA32F, GL_W, GL_H);
     }
     for (i = 0; i < 4 * GL_N; i++) {
@@ -626,12 +628,11 @@ TEST(drops_are_tested_against_any_depth_buffer)
     for (k = 1; k < 4; k++) EXPECT(memcmp(pictures[0], pictures[k], sizeof pictures[0]) == 0);
     {
         float ortho[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -0.1f, 0, 0, 0, 0, 1};
-        EXPECT_EQ(raindrop_gl_render(s.rain, &to, GL_W, GL_H, &camera, ortho, NULL), SAT_ERR_ARGUMENT);
+        EXPECT_EQ(raindrop_gl_render(s->rain, &to, GL_W, GL_H, &camera, ortho, NULL), SAT_ERR_ARGUMENT);
     }
     gl_f.DeleteFramebuffers(1, &framebuffer);
     gl_f.DeleteTextures(1, &colour);
     gl_f.DeleteTextures(1, &depth);
-    gl_destroy(&s);
     gl_close();
 }
 
@@ -780,33 +781,31 @@ TEST(textures_of_other_formats_do_no_harm)
     static const unsigned formats[] = {SAT__GL_RGBA16F, SAT__GL_RGBA8, SAT__GL_R32UI, SAT__GL_DEPTH_COMPONENT24,
                                        SAT__GL_RG32F, SAT__GL_RGB32F};
     static unsigned char first[4 * GL_N], after[4 * GL_N];
-    static gl_scene s;
+    gl_scene *s;
     sat__gl_state state;
     size_t k;
-    if (!gl_open()) return;
-    gl_create(&s, gl_screen.get_proc);
-    gl_fill(&s);
-    EXPECT_EQ(gl_call(&s, GL_TONE, NULL), SAT_OK);
+    s = gl_open_scene();
+    if (!s) return;
+    EXPECT_EQ(gl_call(s, GL_TONE, NULL), SAT_OK);
     sat__gl_begin(&gl_f, &state, 1);
-    EXPECT_EQ(sat__gl_read(&gl_f, first, gl_own(&s, GL_TONE), SAT__GL_RGBA8, GL_W, GL_H), SAT_OK);
+    EXPECT_EQ(sat__gl_read(&gl_f, first, gl_own(s, GL_TONE), SAT__GL_RGBA8, GL_W, GL_H), SAT_OK);
     sat__gl_end(&gl_f, &state);
     for (k = 0; k < sizeof formats / sizeof *formats; k++) {
-        unsigned texture = gl_texture(formats[k], GL_W, GL_H, NULL), kept = s.hdr;
+        unsigned texture = gl_texture(formats[k], GL_W, GL_H, NULL), kept = s->hdr;
         int framebuffer = -1;
-        s.hdr = texture;
-        gl_call(&s, GL_TONE, NULL);
-        s.hdr = kept;
+        s->hdr = texture;
+        gl_call(s, GL_TONE, NULL);
+        s->hdr = kept;
         sat__gl_clear_errors(&gl_f);
         gl_f.GetIntegerv(SAT__GL_DRAW_FRAMEBUFFER_BINDING, &framebuffer);
         EXPECT_EQ(framebuffer, 0);
-        EXPECT_EQ(gl_call(&s, GL_TONE, NULL), SAT_OK);
+        EXPECT_EQ(gl_call(s, GL_TONE, NULL), SAT_OK);
         sat__gl_begin(&gl_f, &state, 1);
-        EXPECT_EQ(sat__gl_read(&gl_f, after, gl_own(&s, GL_TONE), SAT__GL_RGBA8, GL_W, GL_H), SAT_OK);
+        EXPECT_EQ(sat__gl_read(&gl_f, after, gl_own(s, GL_TONE), SAT__GL_RGBA8, GL_W, GL_H), SAT_OK);
         sat__gl_end(&gl_f, &state);
         EXPECT(memcmp(first, after, sizeof first) == 0);
         gl_f.DeleteTextures(1, &texture);
     }
-    gl_destroy(&s);
     gl_close();
 }
 
@@ -847,16 +846,17 @@ TEST(options_that_shaders_are_made_for_are_refused)
 }
 
 TEST(options_that_change_are_those_of_a_new_object)
-{
+{ /* the last test: the objects change, and go */
     static float picture[4 * GL_N], a[GL_N], b[GL_N];
-    static gl_scene s;
+    gl_scene *s;
     sat_gl *tables[2];
     sat_gl_options go = sat_gl_defaults(), other;
     fiv_gl_options fo = fiv_gl_defaults();
     sat__gl_state state;
     unsigned source;
     int k;
-    if (!gl_open()) return;
+    s = gl_open_scene();
+    if (!s) return;
     support_fill(picture, 4 * GL_N, 0, 3, 9);
     source = gl_texture(SAT__GL_RGBA32F, GL_W, GL_H, picture);
     go.format = SAT_GL_FIXED32;
@@ -879,19 +879,19 @@ TEST(options_that_change_are_those_of_a_new_object)
     EXPECT(memcmp(a, b, sizeof a) == 0);
     EXPECT_NEAR(sat_gl_quantum(tables[0]), sat_gl_quantum(tables[1]), 0);
     for (k = 0; k < 2; k++) sat_gl_destroy(tables[k]);
-    gl_create(&s, gl_screen.get_proc);
-    gl_fill(&s);
     fo.penumbra = 2;
-    EXPECT_EQ(fiv_gl_set_options(s.shadows, &fo), SAT_OK);
+    EXPECT_EQ(fiv_gl_set_options(s->shadows, &fo), SAT_OK);
     fo.self = 1;
-    EXPECT_EQ(fiv_gl_set_options(s.shadows, &fo), SAT_ERR_MISMATCH);
+    EXPECT_EQ(fiv_gl_set_options(s->shadows, &fo), SAT_ERR_MISMATCH);
     fo.self = 0;
     fo.max_instances = 3;
-    EXPECT_EQ(fiv_gl_set_options(s.shadows, &fo), SAT_ERR_MISMATCH);
+    EXPECT_EQ(fiv_gl_set_options(s->shadows, &fo), SAT_ERR_MISMATCH);
     fo.max_instances = 65;
-    EXPECT_EQ(fiv_gl_set_options(s.shadows, &fo), SAT_ERR_ARGUMENT);
+    EXPECT_EQ(fiv_gl_set_options(s->shadows, &fo), SAT_ERR_ARGUMENT);
     EXPECT_EQ(fiv_gl_set_options(NULL, NULL), SAT_ERR_ARGUMENT);
     gl_f.DeleteTextures(1, &source);
-    gl_destroy(&s);
+    gl_destroy(s);
     gl_close();
+    sat__gl_close(&gl_f);
+    gl_context_close(&gl_screen);
 }

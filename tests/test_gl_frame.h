@@ -1,6 +1,6 @@
 /* A frame by public calls: nothing is made, uploaded or read in it, and its picture is the CPU's. Needs OSMesa. */
 
-enum { FT_W = 160, FT_H = 96, FT_N = FT_W * FT_H };
+enum { FT_W = 96, FT_H = 64, FT_N = FT_W * FT_H };
 
 /* ---- calls that no frame may have, counted on their way through get_proc */
 
@@ -49,11 +49,24 @@ static sat_gl_proc ft_get_proc(const char *name)
     return ft_context.get_proc(name);
 }
 
-static frame ft_frame;
+static frame ft_frame; /* made by the first test, for all of them */
+
+/* A tenth of the frame's drops: most of its time otherwise, and still thousands. */
+static void ft_less_rain(void)
+{
+    raindrop_rain_options o = raindrop_rain_defaults();
+    o.rate_mm_h = 15, o.box_size[0] = o.box_size[2] = 6, o.box_size[1] = 4, o.wind[0] = 1.2f;
+    memcpy(o.centre, ft_frame.camera.position, sizeof o.centre);
+    o.centre[2] -= 2.8f;
+    raindrop_rain_destroy(ft_frame.drops);
+    EXPECT_EQ(raindrop_rain_create(&ft_frame.drops, &o), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_rain(ft_frame.rain, ft_frame.drops), SAT_OK);
+}
 
 static int ft_open(void)
 {
     sat_threads serial;
+    if (ft_context.context) return 1;
     memset(&serial, 0, sizeof serial);
     if (!gl_context_open(&ft_context, 3, 3)) {
         expect_skip(ft_context.message);
@@ -61,6 +74,7 @@ static int ft_open(void)
     }
     if (!EXPECT_EQ(sat__gl_open(&ft_gl, ft_context.get_proc), SAT_OK)) return 0;
     if (!EXPECT(frame_create(&ft_frame, ft_get_proc, FT_W, FT_H, &serial))) puts(ft_frame.message);
+    else ft_less_rain();
     return ft_frame.message[0] == 0;
 }
 
@@ -99,24 +113,6 @@ static void ft_read_depth(float *out)
     t->DeleteFramebuffers(1, &framebuffer);
     t->DeleteTextures(1, &texture);
     t->DeleteProgram(program);
-}
-
-TEST(a_frame_uploads_reads_and_makes_nothing)
-{
-    unsigned screen, framebuffer;
-    sat_gl_target target;
-    long before;
-    int i;
-    if (!ft_open()) return;
-    EXPECT(ft_calls > 50); /* create did */
-    screen = gl_tools_texture(&ft_frame.scene.t, GL_TOOLS_RGBA8, FT_W, FT_H, 0, NULL);
-    framebuffer = gl_tools_framebuffer(&ft_frame.scene.t, screen, 0, 0);
-    target = sat_gl_to_framebuffer(framebuffer, 0, 0);
-    before = ft_calls;
-    for (i = 0; i < 3; i++) EXPECT(frame_draw(&ft_frame, &target, i ? 0.03 : 0));
-    EXPECT_EQ(ft_calls, before);
-    for (i = 0; i < FRAME_STAGES; i++) EXPECT(ft_frame.timer.seconds[i] >= 0);
-    ft_close();
 }
 
 /* ---- the CPU's picture of the same frame; rows from the bottom as in the textures */
@@ -255,7 +251,25 @@ TEST(a_frame_is_the_picture_of_the_cpu)
     EXPECT(lit > FT_N);
     EXPECT(sqrt(open_rms / lit) < 1e-3);
     EXPECT(sqrt(shade_rms / shade_all) < 1e-3);
-    EXPECT(sqrt(rms / (3 * FT_N)) < 1);
-    EXPECT(off[0] < 3 * FT_N / 50);
+    EXPECT(sqrt(rms / (3 * FT_N)) < 0.5);
+    EXPECT(off[0] < 3 * FT_N / 200);
+    EXPECT_EQ(ft_gl.GetError(), 0);
+}
+
+TEST(a_frame_uploads_reads_and_makes_nothing)
+{
+    unsigned screen, framebuffer;
+    sat_gl_target target;
+    long before;
+    int i;
+    if (!ft_open()) return;
+    EXPECT(ft_calls > 50); /* create did */
+    screen = gl_tools_texture(&ft_frame.scene.t, GL_TOOLS_RGBA8, FT_W, FT_H, 0, NULL);
+    framebuffer = gl_tools_framebuffer(&ft_frame.scene.t, screen, 0, 0);
+    target = sat_gl_to_framebuffer(framebuffer, 0, 0);
+    before = ft_calls;
+    for (i = 0; i < 3; i++) EXPECT(frame_draw(&ft_frame, &target, i ? 0.03 : 0));
+    EXPECT_EQ(ft_calls, before);
+    for (i = 0; i < FRAME_STAGES; i++) EXPECT(ft_frame.timer.seconds[i] >= 0);
     ft_close();
 }
