@@ -2712,7 +2712,7 @@ typedef struct sat__scan {
 } sat__scan;
 
 /* Work is cut into blocks of this many elements: an int counts the blocks of any array. */
-enum { SAT__SCAN_BLOCK = 1 << 14 };
+enum { SAT__SCAN_BLOCK = 1 << 14, SAT__SCAN_ELEMENT = 4096 }; /* bytes of the largest element */
 
 static void sat__scan_run(sat__scan *scan, size_t elements, sat_range_fn *body)
 {
@@ -2847,13 +2847,16 @@ static void sat__scan_balanced_tree(sat__scan *scan, unsigned char *out, unsigne
 
 static void sat__scan_sequential(sat__scan *scan, unsigned char *out, const unsigned char *in)
 {
+    union { /* the largest element, aligned for any type */
+        unsigned char bytes[SAT__SCAN_ELEMENT];
+        long double number;
+        void *pointer;
+    } sum;
     size_t i;
-    scan->threads = NULL;
     memmove(out, in, scan->size);
     for (i = 1; i < scan->n; i++) {
-        unsigned char *sum = scan->temporaries;
-        scan->combine(sum, out + (i - 1) * scan->size, in + i * scan->size, scan->user);
-        memcpy(out + i * scan->size, sum, scan->size);
+        scan->combine(sum.bytes, out + (i - 1) * scan->size, in + i * scan->size, scan->user);
+        memcpy(out + i * scan->size, sum.bytes, scan->size);
     }
     scan->counters.passes = 1;
     scan->counters.adds = scan->n - 1;
@@ -2888,11 +2891,11 @@ SAT_DEF sat_result sat_scan_any(void *out, const void *in, size_t n, size_t elem
     sat_scan_options resolved;
     sat_allocator allocator;
     sat__scan scan;
-    size_t elements, bytes;
-    unsigned char *scratch;
+    size_t elements, bytes = 0;
+    unsigned char *scratch = NULL;
     sat_result result = sat__scan_check(&resolved, &allocator, out, in, n, options);
     if (result) return result;
-    if (!combine || element_size < 1 || element_size > 4096 || (resolved.exclusive && !identity))
+    if (!combine || element_size < 1 || element_size > SAT__SCAN_ELEMENT || (resolved.exclusive && !identity))
         return SAT_ERR_ARGUMENT;
     if (n == 0) return SAT_OK;
 
@@ -2903,12 +2906,13 @@ SAT_DEF sat_result sat_scan_any(void *out, const void *in, size_t n, size_t elem
     scan.user = user;
     scan.k = resolved.k;
     scan.threads = resolved.counters ? NULL : &resolved.threads;
-    elements = 2 * (size_t)sat__worker_count(&resolved.threads) + sat__scan_scratch(&resolved, n);
-    if (!sat__multiply_size(&bytes, elements, element_size)) return SAT_ERR_SIZE;
-    scratch = (unsigned char *)sat__alloc(&allocator, bytes);
-    if (!scratch) return SAT_ERR_MEMORY;
-    scan.temporaries = scratch;
-    scratch += 2 * (size_t)sat__worker_count(&resolved.threads) * element_size;
+    if (resolved.algorithm != SAT_SCAN_SEQUENTIAL) {
+        elements = 2 * (size_t)sat__worker_count(&resolved.threads) + sat__scan_scratch(&resolved, n);
+        if (!sat__multiply_size(&bytes, elements, element_size)) return SAT_ERR_SIZE;
+        scan.temporaries = (unsigned char *)sat__alloc(&allocator, bytes);
+        if (!scan.temporaries) return SAT_ERR_MEMORY;
+        scratch = scan.temporaries + 2 * (size_t)sat__worker_count(&resolved.threads) * element_size;
+    }
 
     if (resolved.algorithm == SAT_SCAN_RECURSIVE_DOUBLING)
         sat__scan_recursive_doubling(&scan, (unsigned char *)out, scratch, in);
@@ -3265,7 +3269,7 @@ static sat_result sat__table_create(sat_table **out, int width, int height, int 
     t.tiles_x = (width - 1) / t.options.tile + 1;
     t.tiles_y = tile_rows;
     t.ring = ring;
-    t.bands = t.options.kind == SAT_KIND_TILED ? t.tiles_y : (width + SAT__STRIP - 1) / SAT__STRIP;
+    t.bands = t.options.kind == SAT_KIND_TILED ? t.tiles_y : (width - 1) / SAT__STRIP + 1;
     t.block_bytes = sat__lay_out(&t, NULL);
     if (!t.block_bytes || t.block_bytes > SIZE_MAX / 2 - sizeof t - SAT__LINE) return SAT_ERR_SIZE;
     t.block_bytes += sizeof t + SAT__LINE;

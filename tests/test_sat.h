@@ -177,6 +177,10 @@ TEST(scan_same_bits_for_any_worker_count)
 TEST(scan_refuses_bad_arguments_and_survives_a_failing_allocator)
 {
     float v[4] = {1, 2, 3, 4};
+    uint32_t one[8] = {1, 2, 3, 4, 1, 2, 3, 4};
+    sat_scan_counters counters;
+    size_t products = 0;
+    long calls;
     support_memory m;
     sat_scan_options o = sat_scan_defaults();
     EXPECT_EQ(sat_scan_f32(NULL, v, 4, NULL), SAT_ERR_ARGUMENT);
@@ -201,6 +205,14 @@ TEST(scan_refuses_bad_arguments_and_survives_a_failing_allocator)
     EXPECT_EQ(sat_scan_f32(v, v, 4, &o), SAT_OK);
     EXPECT(support_memory_clean(&m));
     EXPECT_NEAR(v[3], 10, 0);
+    o.algorithm = SAT_SCAN_SEQUENTIAL; /* allocates nothing, in place, counted and of any type, too */
+    o.counters = &counters;
+    calls = m.calls;
+    EXPECT_EQ(sat_scan_f32(v, v, 4, &o), SAT_OK);
+    EXPECT_EQ(sat_scan_any(one, one, 2, 16, multiply_matrices, NULL, &products, &o), SAT_OK);
+    EXPECT_EQ(m.calls, calls);
+    EXPECT_NEAR(v[3], 20, 0);
+    EXPECT(one[4] == 7 && one[5] == 10 && one[6] == 15 && one[7] == 22);
 }
 
 TEST(reduction_in_a_fixed_order)
@@ -1680,6 +1692,7 @@ TEST(bad_arguments_are_refused)
     sat_image view = sat_image_f32(p, 8, 8, 1), bad;
     sat_options o = sat_defaults();
     sat_table *t;
+    support_memory memory;
     sat_stream *s;
     const unsigned nine = 9;
     EXPECT_EQ(sat_create(NULL, 8, 8, 1, NULL), SAT_ERR_ARGUMENT);
@@ -1688,6 +1701,11 @@ TEST(bad_arguments_are_refused)
     EXPECT_EQ(sat_create(&t, 8, 8, 0, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(sat_create(&t, 8, 8, 5, NULL), SAT_ERR_ARGUMENT);
     EXPECT_EQ(sat_create(&t, 0x7ffffffe, 0x7ffffffe, 4, NULL), SAT_ERR_SIZE);
+    o.kind = SAT_KIND_FLOAT;
+    o.allocator = support_allocator(&memory);
+    memory.fail_at = 1; /* the widest row is asked for, with no overflow on the way */
+    if (SIZE_MAX > 0xffffffffu) EXPECT_EQ(sat_create(&t, 0x7ffffffe, 1, 1, &o), SAT_ERR_MEMORY);
+    o = sat_defaults();
     o.tile = 33;
     EXPECT_EQ(sat_create(&t, 8, 8, 1, &o), SAT_ERR_ARGUMENT);
     o.tile = 0;
