@@ -100,8 +100,9 @@
    - Lamps: a glint's light within 5 % of traced rays (8 % half a degree beside the bow), its place within a pixel of a
      drop 160 wide; lamps all around sum to a white sky within .5 %. Swinging drops keep the mean light of their streaks
      within .2 %; a still one is the spheroid of the moment.
-   - Environment: NaN counts as 0, infinity as the largest finite value, negative light as 0; all are counted. One texel
-     of 1e8 stays what it is: mips and footprints spread it, or `max_radiance` cuts it.
+   - Environment: NaN counts as 0, infinity (from 1e36 on, so that no sum of light overflows) as the largest value
+     below, negative light as 0; all are counted. One texel of 1e8 stays what it is: mips and footprints spread it, or
+     `max_radiance` cuts it.
    - The same bits for any number of workers, and of pictures with SSE2, NEON or plain C (raindrop_trace_n: but for the
      last count % lanes rays, whose last digits differ). The GPU's picture is within an RMSE of 5e-4 of the CPU's
      (tone-mapped luminance, quads, both unsorted; llvmpipe: 4e-5, with the longest streaks 2e-4), its drops within 3e-4
@@ -295,10 +296,10 @@ typedef struct raindrop_environment_options {
     float n;                      /* 1.33; 0.1..10; index of the drops */
     float scale;                  /* 1; 1e-18..1e18; 1/255.f for 8-bit input */
     int decode_srgb;              /* 0; 0..1; 1: scaled values are sRGB, for LDR pictures */
-    float max_radiance;           /* 0; 0..1e38; 0: none; otherwise brighter values become this one, and are
+    float max_radiance;           /* 0; 0..1e36; 0: none; otherwise brighter values become this one, and are
                                      counted */
     float sun_direction[3];       /* 0, 1, 0: a unit vector towards the sun, which lights the bows */
-    float sun_irradiance[3];      /* 1, 1, 1 */
+    float sun_irradiance[3];      /* 1, 1, 1; not negative */
     float bow_optical_depth;      /* 0; 0..10; 0: no bows; share of the sun's light that the rain in view scatters */
     int far_swing;                /* 0; 0..1; 1: the prefilter knows how the light of far drops swings with their shape,
                                      which raindrop_render_options.oscillation shows; takes 3 times as long to make */
@@ -312,8 +313,8 @@ typedef struct raindrop_environment_options {
 RAINDROP_DEF raindrop_environment_options raindrop_environment_defaults(void);
 
 typedef struct raindrop_environment_stats {
-    size_t nan, infinite, negative, clamped; /* channel values replaced: by 0, by the largest finite one, by 0, by
-                                                `max_radiance` */
+    size_t nan, infinite, negative, clamped; /* channel values replaced: by 0, by the largest one below 1e36, by 0,
+                                                by `max_radiance` */
     float largest;                           /* after that */
     size_t bytes;
 } raindrop_environment_stats;
@@ -797,6 +798,9 @@ RAINDROP_DEF const char *raindrop_explain_map(char *text, size_t size, const rai
 }
 #endif
 
+#define RAINDROP__MOST_LIGHT 1e36 /* in an environment: sums of some more do not overflow */
+#define RAINDROP__MAX_DROPS 33554432
+
 static const sat__field raindrop__environment_fields[] = {
     SAT__FIELD(raindrop_environment_options, 'i', layout, RAINDROP_LAYOUT_EQUIRECT, 0, RAINDROP_LAYOUT_CUBE, ' '),
     SAT__FIELD(raindrop_environment_options, 'i', filter, RAINDROP_FILTER_MIPS, 0, RAINDROP_FILTER_SAT, ' '),
@@ -807,7 +811,7 @@ static const sat__field raindrop__environment_fields[] = {
     SAT__FIELD(raindrop_environment_options, 'f', n, 1.33, 0.1, 10, ' '),
     SAT__FIELD(raindrop_environment_options, 'f', scale, 1, 1e-18, 1e18, ' '),
     SAT__FIELD(raindrop_environment_options, 'i', decode_srgb, 0, 0, 1, ' '),
-    SAT__FIELD(raindrop_environment_options, 'f', max_radiance, 0, 0, 1e38, ' '),
+    SAT__FIELD(raindrop_environment_options, 'f', max_radiance, 0, 0, RAINDROP__MOST_LIGHT, ' '),
     SAT__FIELD(raindrop_environment_options, 'f', bow_optical_depth, 0, 0, 10, ' '),
     SAT__FIELD(raindrop_environment_options, 'i', far_swing, 0, 0, 1, ' '),
     SAT__FIELD(raindrop_environment_options, 'i', bow_by_depth, 0, 0, 1, ' '),
@@ -829,7 +833,7 @@ static inline int raindrop__sun_is_valid(sat__text *t, const raindrop_environmen
 {
     float sun2 = raindrop__dot(o->sun_direction, o->sun_direction);
     if (!raindrop__vector_is_valid(t, "sun_direction", o->sun_direction, -1e18, 1e18)) return 0;
-    if (!raindrop__vector_is_valid(t, "sun_irradiance", o->sun_irradiance, -1e30, 1e30)) return 0;
+    if (!raindrop__vector_is_valid(t, "sun_irradiance", o->sun_irradiance, 0, 1e30)) return 0;
     if ((o->bow_optical_depth > 0 || o->bow_by_depth) && !(sun2 > 0.99f && sun2 < 1.01f))
         return raindrop__say(t, "sun_direction is no unit vector, which bows need");
 #ifdef RAINDROP_NO_BOW
@@ -871,7 +875,6 @@ RAINDROP_DEF const char *raindrop_explain_environment(char *text, size_t size, c
     return text;
 }
 
-#define RAINDROP__MAX_DROPS 33554432
 
 static const sat__field raindrop__rain_fields[] = {
     SAT__FIELD(raindrop_rain_options, 'd', rate_mm_h, 10, 0.01, 500, ' '),
@@ -1794,7 +1797,7 @@ typedef struct raindrop__sheet { const float *rgb; int width, height, wraps; } r
 static inline float raindrop__repair(float v, float largest, float limit, raindrop_environment_stats *stats)
 {
     if (sat__is_nan(v)) { stats->nan++; v = 0; }
-    else if (!sat__is_finite(v)) { stats->infinite++; v = v > 0 ? largest : 0; }
+    else if (!(fabsf(v) <= (float)RAINDROP__MOST_LIGHT)) { stats->infinite++; v = v > 0 ? largest : 0; }
     else if (v < 0) { stats->negative++; v = 0; }
     if (limit > 0 && v > limit) { stats->clamped++; v = limit; }
     if (v > stats->largest) stats->largest = v;
@@ -1823,7 +1826,7 @@ static inline void raindrop__read_picture(raindrop__picture *picture, const sat_
                 }
                 v *= o->scale;
                 if (o->decode_srgb && sat__is_finite(v)) v = sat__srgb_decode(v);
-                if (sat__is_finite(v) && v > largest) largest = v;
+                if (v <= (float)RAINDROP__MOST_LIGHT && v > largest) largest = v;
                 row[3 * x + c] = v;
             }
         }

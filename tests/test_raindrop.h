@@ -589,6 +589,55 @@ TEST(raindrop_environment_repairs_and_counts)
     raindrop_environment_destroy(environment);
 }
 
+/* Under a sky of the most light there may be, whatever takes means of it stays finite: blurred near drops above all. */
+TEST(raindrop_the_most_light_stays_finite)
+{
+    enum { W = 8, H = 64 };
+    static float sky[3 * 16 * 8], picture[3 * W * H];
+    static const float kinds[6][3] = {{0, 0, 0}, {0.01f, 1, 0}, {0.01f, 0, 0.25f}, {0, 0.005f, 0}, {1e18f, 0, 0},
+                                      {0.01f, 1e18f, 0.25f}}; /* exposure, aperture, oscillation */
+    raindrop_environment_options e = rt_no_far();
+    raindrop_environment_stats stats;
+    raindrop_environment *environment = NULL;
+    raindrop_rain *rain = NULL;
+    raindrop_rain_options r = raindrop_rain_defaults();
+    raindrop_lamp lamp = raindrop_lamp_defaults();
+    sat_image image = sat_image_f32(sky, 16, 8, 3);
+    int i, k, bright, bad = 0;
+    raindrop__set(lamp.position, 0, 1, -1);
+    raindrop__set(lamp.intensity, 1e18f, 1e18f, 1e18f);
+    r.count = 300;
+    r.box_size[0] = r.box_size[1] = r.box_size[2] = 0.5f;
+    EXPECT_EQ(raindrop_rain_create(&rain, &r), SAT_OK);
+    e.far_swing = e.bow_by_depth = 1;
+    e.bow_optical_depth = 10;
+    for (bright = 0; bright < 2; bright++) { /* 3e38 is no light: such a sky is as black as one of infinity */
+        for (i = 0; i < 3 * 16 * 8; i++) sky[i] = bright ? 3e38f : 1e36f;
+        if (!EXPECT_EQ(raindrop_environment_create(&environment, &image, &e, &stats), SAT_OK)) return;
+        EXPECT_EQ(stats.infinite, bright ? 3 * 16 * 8 : 0);
+        for (k = 0; k < 12; k++) {
+            raindrop_camera camera = raindrop_camera_defaults();
+            raindrop_render_options o = raindrop_render_defaults();
+            camera.exposure = kinds[k % 6][0];
+            camera.aperture = kinds[k % 6][1];
+            o.oscillation = kinds[k % 6][2];
+            o.orders = k < 6 ? 1 : 3;
+            o.exit_fresnel = k < 6;
+            o.lamps = &lamp;
+            o.lamp_count = k & 1;
+            EXPECT_EQ(raindrop_environment_render(picture, 0, W, H, &camera, environment, NULL), SAT_OK);
+            EXPECT_EQ(raindrop_veil(picture, 0, W, H, NULL, &camera, environment, NULL), SAT_OK);
+            EXPECT_EQ(raindrop_render(picture, 0, W, H, NULL, &camera, rain, environment, &o, NULL), SAT_OK);
+            for (i = 0; i < 3 * W * H; i++) bad += !sat__is_finite(picture[i]) || picture[i] < 0;
+        }
+        raindrop_environment_destroy(environment);
+    }
+    EXPECT_EQ(bad, 0);
+    e.sun_irradiance[1] = -1; /* a sun that takes light away */
+    EXPECT_EQ(raindrop_environment_create(&environment, &image, &e, NULL), SAT_ERR_ARGUMENT);
+    raindrop_rain_destroy(rain);
+}
+
 TEST(raindrop_environment_reads_every_format_and_layout)
 {
     enum { S = 32 };
