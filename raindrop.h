@@ -645,6 +645,12 @@ extern "C" {
 
 RAINDROP_DEF int raindrop_version(void) { return RAINDROP_VERSION; }
 
+/* A block that the object lies in itself: hence the allocator by value. */
+static inline void raindrop__release(sat_allocator memory, void *block, size_t bytes)
+{
+    sat__release(&memory, block, bytes);
+}
+
 /* ---- vectors and clamps */
 
 static inline float raindrop__dot(const float a[3], const float b[3])
@@ -1473,10 +1479,7 @@ RAINDROP_DEF sat_result raindrop_map_create(raindrop_map **out, const raindrop_m
 
 RAINDROP_DEF void raindrop_map_destroy(raindrop_map *map)
 {
-    if (map) {
-        sat_allocator memory = map->allocator;
-        sat__release(&memory, map->block, map->bytes);
-    }
+    if (map) raindrop__release(map->allocator, map->block, map->bytes);
 }
 
 RAINDROP_DEF int raindrop_map_levels(const raindrop_map *map) { return map ? map->levels : 0; }
@@ -1544,14 +1547,11 @@ static inline void raindrop__map_trilinear(float out[8], const raindrop_map *map
 
 RAINDROP_DEF void raindrop_map_sample(float out[8], const raindrop_map *map, float s, float t, float distance)
 {
-    int i;
     if (!out) return;
-    if (!map) {
-        for (i = 0; i < 8; i++) out[i] = 0;
-        return;
-    }
-    raindrop__map_trilinear(out, map, raindrop__clamp(s, -1, 1), raindrop__clamp(t, -1, 1),
-                            raindrop__map_lod(distance * distance));
+    memset(out, 0, 8 * sizeof *out);
+    if (map)
+        raindrop__map_trilinear(out, map, raindrop__clamp(s, -1, 1), raindrop__clamp(t, -1, 1),
+                                raindrop__map_lod(distance * distance));
 }
 #endif
 
@@ -2090,11 +2090,9 @@ static inline sat_result raindrop__make_table(raindrop_environment *e, const rai
 
 RAINDROP_DEF void raindrop_environment_destroy(raindrop_environment *environment)
 {
-    if (environment) {
-        sat_allocator memory = environment->allocator;
-        if (environment->table) sat_destroy(environment->table);
-        sat__release(&memory, environment->block, environment->bytes);
-    }
+    if (!environment) return;
+    if (environment->table) sat_destroy(environment->table);
+    raindrop__release(environment->allocator, environment->block, environment->bytes);
 }
 
 /* The object, its two octahedral pictures and the bows in one block, once to measure and once on it; returns where the
@@ -2399,7 +2397,6 @@ typedef struct raindrop__visible {
     uint32_t drop;             /* index; the top bit marks a far drop */
     uint32_t rows;
 } raindrop__visible;
-
 
 /* Why a drop is drawn or not, as in raindrop_render_stats. */
 typedef enum raindrop__fate {
@@ -2888,10 +2885,7 @@ RAINDROP_DEF sat_result raindrop_rain_create(raindrop_rain **out, const raindrop
 
 RAINDROP_DEF void raindrop_rain_destroy(raindrop_rain *rain)
 {
-    if (rain) {
-        sat_allocator memory = rain->allocator;
-        sat__release(&memory, rain->block, rain->bytes);
-    }
+    if (rain) raindrop__release(rain->allocator, rain->block, rain->bytes);
 }
 
 RAINDROP_DEF const raindrop_drop *raindrop_rain_drops(int *count, const raindrop_rain *rain)
@@ -4518,12 +4512,13 @@ static inline raindrop__frame raindrop__frame_of(float *rgb, ptrdiff_t stride, i
 static inline void raindrop__sum_stats(raindrop_render_stats *stats, const raindrop__frame *frame, int workers)
 {
     const raindrop_rain *rain = frame->rain;
-    size_t fates[RAINDROP__FATES];
+    size_t *const fates[RAINDROP__FATES] = {&stats->drawn_near, &stats->drawn_far, &stats->invalid, &stats->inside,
+                                            &stats->behind,     &stats->near_plane, &stats->outside, &stats->hidden,
+                                            &stats->below_threshold}; /* in the order of raindrop__fate */
     int i, k, chunks = raindrop__chunk_count(rain->count);
     memset(stats, 0, sizeof *stats);
-    memset(fates, 0, sizeof fates);
     for (i = 0; i < chunks; i++) {
-        for (k = 0; k < RAINDROP__FATES; k++) fates[k] += (size_t)rain->chunks[i].fates[k];
+        for (k = 0; k < RAINDROP__FATES; k++) *fates[k] += (size_t)rain->chunks[i].fates[k];
         stats->coverage_left_out += rain->chunks[i].coverage_left_out;
     }
     for (i = 0; i < workers; i++) {
@@ -4531,15 +4526,6 @@ static inline void raindrop__sum_stats(raindrop_render_stats *stats, const raind
         stats->order_fragments += rain->tally[i].order_fragments;
     }
     stats->drops = (size_t)rain->count;
-    stats->drawn_near = fates[RAINDROP__NEAR];
-    stats->drawn_far = fates[RAINDROP__FAR];
-    stats->invalid = fates[RAINDROP__INVALID];
-    stats->inside = fates[RAINDROP__INSIDE];
-    stats->behind = fates[RAINDROP__BEHIND];
-    stats->near_plane = fates[RAINDROP__NEAR_PLANE];
-    stats->outside = fates[RAINDROP__OUTSIDE];
-    stats->hidden = fates[RAINDROP__HIDDEN];
-    stats->below_threshold = fates[RAINDROP__BELOW];
 }
 
 RAINDROP_DEF sat_result raindrop_render(float *rgb, ptrdiff_t stride, int width, int height, const float *depth,
@@ -5963,20 +5949,14 @@ static inline void raindrop__gl_set_advance(raindrop_gl *g, double dt)
     sat__gl *gl = &g->gl;
     const unsigned program = g->advance;
     const raindrop_rain_options *o = &g->rain;
-    float v[4];
+    const float sizes[4] = {(float)raindrop__lambda(o->rate_mm_h), (float)o->diameter_min_mm,
+                            (float)o->diameter_max_mm, (float)o->diameter_mm},
+                step[4] = {(float)dt, (float)g->settled, (float)g->own, o->speed};
     sat__gl_set_float3(gl, program, "wind", o->wind);
     sat__gl_set_float3(gl, program, "centre", o->centre);
     sat__gl_set_float3(gl, program, "box", o->box_size);
-    v[0] = (float)raindrop__lambda(o->rate_mm_h);
-    v[1] = (float)o->diameter_min_mm;
-    v[2] = (float)o->diameter_max_mm;
-    v[3] = (float)o->diameter_mm;
-    sat__gl_set_float4(gl, program, "sizes", v);
-    v[0] = (float)dt;
-    v[1] = (float)g->settled;
-    v[2] = (float)g->own;
-    v[3] = o->speed;
-    sat__gl_set_float4(gl, program, "step_and", v);
+    sat__gl_set_float4(gl, program, "sizes", sizes);
+    sat__gl_set_float4(gl, program, "step_and", step);
     sat__gl_set_float2(gl, program, "fastest", (float)raindrop_terminal_velocity(o->diameter_max_mm),
                        (float)(o->oblate != 0));
     sat__gl_set_uint(gl, program, "seed", o->seed);
@@ -6021,29 +6001,27 @@ RAINDROP_DEF sat_result raindrop_gl_advance(raindrop_gl *g, double dt)
    >> OpenGL picture   drops, glints and veil
    ------------------------------------------------------------------------------------------------ */
 
+static inline void raindrop__gl_set_view(sat__gl *gl, unsigned program, const raindrop__frame *frame, float last)
+{
+    const float view[4] = {frame->half_width, frame->half_height, frame->focal, last};
+    sat__gl_set_float3(gl, program, "right", frame->camera.right);
+    sat__gl_set_float3(gl, program, "up", frame->camera.up);
+    sat__gl_set_float3(gl, program, "back", frame->camera.back);
+    sat__gl_set_float4(gl, program, "view", view);
+}
+
 static inline void raindrop__gl_set_draw(raindrop_gl *g, unsigned program, const raindrop__frame *frame,
                                          const float depth[2])
 {
     sat__gl *gl = &g->gl;
     const raindrop_camera *camera = &frame->camera;
-    float v[4];
+    const float limits[4] = {frame->options.look == RAINDROP_LOOK_AUTO ? frame->options.far_radius : 0,
+                             frame->options.coverage_threshold, depth[0], depth[1]},
+                shutter[4] = {camera->velocity[0], camera->velocity[1], camera->velocity[2], camera->exposure};
     sat__gl_set_float3(gl, program, "eye", camera->position);
-    sat__gl_set_float3(gl, program, "right", camera->right);
-    sat__gl_set_float3(gl, program, "up", camera->up);
-    sat__gl_set_float3(gl, program, "back", camera->back);
-    v[0] = frame->half_width;
-    v[1] = frame->half_height;
-    v[2] = frame->focal;
-    v[3] = camera->depth_near;
-    sat__gl_set_float4(gl, program, "view", v);
-    v[0] = frame->options.look == RAINDROP_LOOK_AUTO ? frame->options.far_radius : 0;
-    v[1] = frame->options.coverage_threshold;
-    v[2] = depth[0];
-    v[3] = depth[1];
-    sat__gl_set_float4(gl, program, "limits", v);
-    memcpy(v, camera->velocity, sizeof camera->velocity);
-    v[3] = camera->exposure;
-    sat__gl_set_float4(gl, program, "shutter", v);
+    raindrop__gl_set_view(gl, program, frame, camera->depth_near);
+    sat__gl_set_float4(gl, program, "limits", limits);
+    sat__gl_set_float4(gl, program, "shutter", shutter);
     sat__gl_set_float2(gl, program, "lens", camera->aperture, camera->focus_distance);
     sat__gl_set_float2(gl, program, "orders", (float)frame->options.orders, frame->options.orders_radius);
     sat__gl_set_float2(gl, program, "optics", g->n, (float)(frame->options.exit_fresnel != 0));
@@ -6250,27 +6228,13 @@ static inline void raindrop__gl_set_veil(raindrop_gl *g, unsigned program, const
                                          const float planes[2], const raindrop_veil_options *o)
 {
     sat__gl *gl = &g->gl;
-    float v[4];
-    sat__gl_set_float3(gl, program, "right", frame->camera.right);
-    sat__gl_set_float3(gl, program, "up", frame->camera.up);
-    sat__gl_set_float3(gl, program, "back", frame->camera.back);
+    const float rain[4] = {o->extinction, o->from, o->reach, 0},
+                maps[4] = {planes[0], planes[1], o->clip_zero_to_one ? 1.0f : 2, o->clip_zero_to_one ? 0 : -1.0f};
+    raindrop__gl_set_view(gl, program, frame, depth ? 1.0f : 0);
     sat__gl_set_float3(gl, program, "sun", g->sun_direction);
     sat__gl_set_float3(gl, program, "irradiance", g->sun_irradiance);
-    v[0] = frame->half_width;
-    v[1] = frame->half_height;
-    v[2] = frame->focal;
-    v[3] = depth ? 1.0f : 0;
-    sat__gl_set_float4(gl, program, "view", v);
-    v[0] = o->extinction;
-    v[1] = o->from;
-    v[2] = o->reach;
-    v[3] = 0;
-    sat__gl_set_float4(gl, program, "rain", v);
-    v[0] = planes[0];
-    v[1] = planes[1];
-    v[2] = o->clip_zero_to_one ? 1.0f : 2;
-    v[3] = o->clip_zero_to_one ? 0 : -1.0f;
-    sat__gl_set_float4(gl, program, "planes", v);
+    sat__gl_set_float4(gl, program, "rain", rain);
+    sat__gl_set_float4(gl, program, "planes", maps);
     SAT__GL_INPUTS(gl, g->far_drops, depth ? depth : g->far_drops, g->bow);
 }
 
