@@ -709,16 +709,7 @@ static inline float raindrop__uniform(uint32_t bits)
 #if defined(SAT__AVX2)
 enum { RAINDROP__LANES = 8 };
 typedef __m256 raindrop__v;
-static inline raindrop__v raindrop__load(const float *p) { return _mm256_loadu_ps(p); }
-static inline void raindrop__store(float *p, raindrop__v v) { _mm256_storeu_ps(p, v); }
-static inline raindrop__v raindrop__splat(float v) { return _mm256_set1_ps(v); }
-static inline raindrop__v raindrop__add(raindrop__v a, raindrop__v b) { return _mm256_add_ps(a, b); }
-static inline raindrop__v raindrop__sub(raindrop__v a, raindrop__v b) { return _mm256_sub_ps(a, b); }
-static inline raindrop__v raindrop__mul(raindrop__v a, raindrop__v b) { return _mm256_mul_ps(a, b); }
-static inline raindrop__v raindrop__div(raindrop__v a, raindrop__v b) { return _mm256_div_ps(a, b); }
-static inline raindrop__v raindrop__min(raindrop__v a, raindrop__v b) { return _mm256_min_ps(a, b); }
-static inline raindrop__v raindrop__max(raindrop__v a, raindrop__v b) { return _mm256_max_ps(a, b); }
-static inline raindrop__v raindrop__sqrt(raindrop__v a) { return _mm256_sqrt_ps(a); }
+#define RAINDROP__OF(eight, four) eight
 static inline raindrop__v raindrop__abs(raindrop__v a) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), a); }
 static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindrop__v yes, raindrop__v no)
 {
@@ -727,22 +718,28 @@ static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindr
 #else
 enum { RAINDROP__LANES = 4 };
 typedef sat__f32x4 raindrop__v;
-static inline raindrop__v raindrop__load(const float *p) { return sat__f32x4_load(p); }
-static inline void raindrop__store(float *p, raindrop__v v) { sat__f32x4_store(p, v); }
-static inline raindrop__v raindrop__splat(float v) { return sat__f32x4_set1(v); }
-static inline raindrop__v raindrop__add(raindrop__v a, raindrop__v b) { return sat__f32x4_add(a, b); }
-static inline raindrop__v raindrop__sub(raindrop__v a, raindrop__v b) { return sat__f32x4_sub(a, b); }
-static inline raindrop__v raindrop__mul(raindrop__v a, raindrop__v b) { return sat__f32x4_mul(a, b); }
-static inline raindrop__v raindrop__div(raindrop__v a, raindrop__v b) { return sat__f32x4_div(a, b); }
-static inline raindrop__v raindrop__min(raindrop__v a, raindrop__v b) { return sat__f32x4_min(a, b); }
-static inline raindrop__v raindrop__max(raindrop__v a, raindrop__v b) { return sat__f32x4_max(a, b); }
-static inline raindrop__v raindrop__sqrt(raindrop__v a) { return sat__f32x4_sqrt(a); }
+#define RAINDROP__OF(eight, four) four
 static inline raindrop__v raindrop__abs(raindrop__v a) { return sat__f32x4_abs(a); }
 static inline raindrop__v raindrop__if_less(raindrop__v a, raindrop__v b, raindrop__v yes, raindrop__v no)
 {
     return sat__f32x4_select(sat__f32x4_less(a, b), yes, no);
 }
 #endif
+static inline raindrop__v raindrop__load(const float *p) { return RAINDROP__OF(_mm256_loadu_ps, sat__f32x4_load)(p); }
+static inline void raindrop__store(float *p, raindrop__v v) { RAINDROP__OF(_mm256_storeu_ps, sat__f32x4_store)(p, v); }
+static inline raindrop__v raindrop__splat(float v) { return RAINDROP__OF(_mm256_set1_ps, sat__f32x4_set1)(v); }
+static inline raindrop__v raindrop__sqrt(raindrop__v a) { return RAINDROP__OF(_mm256_sqrt_ps, sat__f32x4_sqrt)(a); }
+#define RAINDROP__OPERATION(name)                                                                                      \
+    static inline raindrop__v raindrop__##name(raindrop__v a, raindrop__v b)                                           \
+    {                                                                                                                  \
+        return RAINDROP__OF(_mm256_##name##_ps, sat__f32x4_##name)(a, b);                                              \
+    }
+RAINDROP__OPERATION(add)
+RAINDROP__OPERATION(sub)
+RAINDROP__OPERATION(mul)
+RAINDROP__OPERATION(div)
+RAINDROP__OPERATION(min)
+RAINDROP__OPERATION(max)
 
 /* ------------------------------------------------------------------------------------------------
    >> options   tables of defaults and ranges, and what X_explain says; each function here writes one sentence about
@@ -1222,19 +1219,16 @@ RAINDROP__INLINE void raindrop__trace_block(const raindrop_ray_outputs *out, con
 {
     raindrop__v d[3], p[3];
     raindrop__rays rays;
-    d[0] = raindrop__load(in->direction[0] + at);
-    d[1] = raindrop__load(in->direction[1] + at);
-    d[2] = raindrop__load(in->direction[2] + at);
-    p[0] = raindrop__load(in->centre_offset[0] + at);
-    p[1] = raindrop__load(in->centre_offset[1] + at);
-    p[2] = raindrop__load(in->centre_offset[2] + at);
+    int i;
+    for (i = 0; i < 3; i++) {
+        d[i] = raindrop__load(in->direction[i] + at);
+        p[i] = raindrop__load(in->centre_offset[i] + at);
+    }
     raindrop__trace_v(&rays, d, p, raindrop__load(in->one_minus_b2 + at), n);
-    raindrop__keep(out->reflected[0], at, rays.reflected[0]);
-    raindrop__keep(out->reflected[1], at, rays.reflected[1]);
-    raindrop__keep(out->reflected[2], at, rays.reflected[2]);
-    raindrop__keep(out->refracted[0], at, rays.refracted[0]);
-    raindrop__keep(out->refracted[1], at, rays.refracted[1]);
-    raindrop__keep(out->refracted[2], at, rays.refracted[2]);
+    for (i = 0; i < 3; i++) {
+        raindrop__keep(out->reflected[i], at, rays.reflected[i]);
+        raindrop__keep(out->refracted[i], at, rays.refracted[i]);
+    }
     raindrop__keep(out->fresnel, at, rays.fresnel);
     raindrop__keep(out->transmit, at, rays.transmit);
     raindrop__keep(out->footprint_reflected, at, rays.footprint_reflected);
@@ -6161,22 +6155,18 @@ static inline void raindrop__gl_draw_glints(raindrop_gl *g, const raindrop__fram
     sat__gl *gl = &g->gl;
     const unsigned program = g->programs[RAINDROP__GL_GLINT];
     int i, path;
-    float v[4];
     sat__gl_set_float2(gl, program, "slice", 0, 3e38f);
     gl->BlendFuncSeparate(SAT__GL_SRC_ALPHA, SAT__GL_ONE, SAT__GL_ZERO, SAT__GL_ONE);
     for (i = 0; i < frame->options.lamp_count; i++) {
         const raindrop_lamp *lamp = &frame->options.lamps[i];
-        memcpy(v, lamp->position, sizeof lamp->position);
-        v[3] = lamp->radius;
-        sat__gl_set_float4(gl, program, "lamp", v);
+        const float place[4] = {lamp->position[0], lamp->position[1], lamp->position[2], lamp->radius};
+        float cone[4] = {lamp->inner, lamp->outer, 0, raindrop__water_of(g->n, frame->options.orders).bow};
+        sat__gl_set_float4(gl, program, "lamp", place);
         sat__gl_set_float3(gl, program, "intensity", lamp->intensity);
         sat__gl_set_float3(gl, program, "axis", lamp->direction);
-        v[0] = lamp->inner;
-        v[1] = lamp->outer;
-        v[3] = raindrop__water_of(g->n, frame->options.orders).bow;
         for (path = 0; path < (frame->options.orders ? RAINDROP__GLINTS : 2); path++) {
-            v[2] = (float)path;
-            sat__gl_set_float4(gl, program, "cone", v);
+            cone[2] = (float)path;
+            sat__gl_set_float4(gl, program, "cone", cone);
             raindrop__gl_draw_drops(g);
         }
     }
