@@ -1038,6 +1038,12 @@ TEST(raindrop_wind_carries_drops)
         EXPECT_REL(late.velocity[0], halves.velocity[0], 1e-6);
         EXPECT_NEAR(risen.velocity[1], 12 - vt, 1e-5 * 12);
     }
+    for (i = 0; i < 9; i++) { /* into a gust by one step and by many */
+        raindrop_drop whole = rt_fall(rt_diameters[i], 3, 1, 1, wind), many = rt_fall(rt_diameters[i], 3, 1, 100, wind);
+        EXPECT_REL(whole.velocity[0], many.velocity[0], 1e-4);
+        EXPECT_REL(whole.position[0], many.position[0], 0.125);
+        EXPECT_REL(whole.position[1], many.position[1], 1e-4);
+    }
     {   /* nothing moves while time stands still, not even by rounding; bad steps are refused */
         raindrop_drop a = rt_fall(1, 3, 0.1, 1, NULL), b = a;
         EXPECT_EQ(raindrop_fall(&a, wind, 0), SAT_OK);

@@ -571,6 +571,39 @@ TEST(raindrop_gl_rain_falls_as_on_the_cpu)
     rg_close(&s);
 }
 
+/* After steps and in winds whose way has no digits left for a place in the box. */
+TEST(raindrop_gl_rain_stays_in_its_box)
+{
+    enum { COUNT = 500 };
+    static const double steps[5] = {1e5, 1 / 60.0, 1e30, 1e300, 1};
+    rg_scene s;
+    raindrop_gl *g = NULL;
+    raindrop_drop back[COUNT];
+    raindrop_rain *rain = rg_rain(COUNT, 0.3f, 0);
+    float wind[3] = {1e4f, 1e4f, -1e4f};
+    int i, k, c, turn, out = 0;
+    if (!rg_open(&s)) {
+        raindrop_rain_destroy(rain);
+        return;
+    }
+    EXPECT_EQ(raindrop_gl_create(&g, s.context.get_proc, NULL), SAT_OK);
+    EXPECT_EQ(raindrop_gl_set_rain(g, rain), SAT_OK);
+    for (turn = 0; turn < 3; turn++) {
+        if (turn) EXPECT_EQ(raindrop_gl_set_wind(g, wind), SAT_OK);
+        for (k = 0; k < 5; k++) {
+            EXPECT_EQ(raindrop_gl_advance(g, steps[k]), SAT_OK);
+            EXPECT_EQ(raindrop_gl_read_drops(g, back, COUNT), SAT_OK);
+            for (i = 0; i < COUNT; i++)
+                for (c = 0; c < 3; c++) out += !(fabsf(back[i].position[c]) <= 0.150001f && back[i].radius > 0);
+        }
+        wind[0] = 3e38f;
+    }
+    EXPECT_EQ(out, 0);
+    raindrop_gl_destroy(g);
+    raindrop_rain_destroy(rain);
+    rg_close(&s);
+}
+
 TEST(raindrop_gl_steps_1um_drops)
 {
     rg_scene s;
