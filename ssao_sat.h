@@ -3027,24 +3027,33 @@ static const char ssao_sat__gl_range[] =
             result = vec4(r, 0.0, 0.0);
         });
 
-/* Texel b: share of the 32 x 32 sample in the first b of the bins of the depth range. */
-static const char ssao_sat__gl_shares[] =
+/* The bin of the depth range that each of the 32 x 32 samples falls into; -1: none. */
+static const char ssao_sat__gl_bins[] =
     SAT__GLSL(
         out vec4 result;
         float scaled(float z) { return orthographic() ? z : log(z); })
     SAT__GLSL(
         void main() {
             vec2 range = texelFetch(finer, ivec2(0), 0).xy;
-            float low = scaled(range.x), width = scaled(range.y) - low, below = 0.0, all = 0.0,
-                bin = floor(gl_FragCoord.x);
+            float z = distance_at(STEP * ((2 * ivec2(gl_FragCoord.xy) + 1) * size / (2 * GRID))),
+                low = scaled(range.x), width = scaled(range.y) - low, bin = 0.0;
+            if (width > 0.0) bin = clamp(floor((scaled(z) - low) / width * float(BINS)), 0.0, float(BINS - 1));
+            if (!(z >= (1.0 - RANGE_SLACK) * range.x && z <= (1.0 + RANGE_SLACK) * range.y)) bin = -1.0;
+            result = vec4(bin);
+        });
+
+/* Texel b: the share of the sample in the first b bins. */
+static const char ssao_sat__gl_shares[] =
+    SAT__GLSL(
+        out vec4 result;
+        void main() {
+            float below = 0.0, all = 0.0, b = floor(gl_FragCoord.x);
             for (int j = 0; j < GRID * GRID; j++) {
-                float z = distance_at(STEP * ((2 * ivec2(j % GRID, j / GRID) + 1) * size / (2 * GRID)));
-                if (!(z >= (1.0 - RANGE_SLACK) * range.x && z <= (1.0 + RANGE_SLACK) * range.y)) continue;
-                all += 1.0;
-                if ((width > 0.0 ? clamp(floor((scaled(z) - low) / width * float(BINS)), 0.0, float(BINS - 1)) : 0.0)
-                    < bin) below += 1.0;
+                float bin = texelFetch(finer, ivec2(j % GRID, j / GRID), 0).r;
+                if (bin >= 0.0) all += 1.0;
+                if (bin >= 0.0 && bin < b) below += 1.0;
             }
-            result = vec4(all > 0.0 ? below / all : bin / float(BINS));
+            result = vec4(all > 0.0 ? below / all : b / float(BINS));
         });
 
 /* Texel k: edge k; low value, quantum and highest level of slab k. The last has the farthest distance and the number of
@@ -3442,8 +3451,8 @@ enum { SSAO_SAT__IF_SLABS = 1, SSAO_SAT__IF_SINGLE = 2, SSAO_SAT__IF_BENT = 4, S
 /* The programs, in the order of the table. Those from SSAO_SAT__GL_ESTIMATE on read normals, and are there without and
    with them. */
 enum {
-    SSAO_SAT__GL_SAMPLE, SSAO_SAT__GL_RANGE, SSAO_SAT__GL_SHARES, SSAO_SAT__GL_EDGES, SSAO_SAT__GL_WORDS,
-    SSAO_SAT__GL_SCAN, SSAO_SAT__GL_DIFFERENCE, SSAO_SAT__GL_DIFFERENCE_SINGLE,
+    SSAO_SAT__GL_SAMPLE, SSAO_SAT__GL_RANGE, SSAO_SAT__GL_BINS, SSAO_SAT__GL_SHARES, SSAO_SAT__GL_EDGES,
+    SSAO_SAT__GL_WORDS, SSAO_SAT__GL_SCAN, SSAO_SAT__GL_DIFFERENCE, SSAO_SAT__GL_DIFFERENCE_SINGLE,
     SSAO_SAT__GL_ESTIMATE, SSAO_SAT__GL_ESTIMATE_SINGLE,
     SSAO_SAT__GL_UPSAMPLE, /* as ssao_sat__gl_output counts */
     SSAO_SAT__GL_PROGRAMS = SSAO_SAT__GL_UPSAMPLE + 3
@@ -3452,7 +3461,8 @@ enum {
 static const sat__gl_program ssao_sat__programs[SSAO_SAT__GL_PROGRAMS] = {
     {"ssao_sat: sample", 0, "depth", "#define FIRST\n", NULL, {ssao_sat__gl_range}},
     {"ssao_sat: range", 0, "finer", NULL, NULL, {ssao_sat__gl_range}},
-    {"ssao_sat: shares", SSAO_SAT__IF_SLABS, "depth finer", NULL, NULL, {ssao_sat__gl_shares}},
+    {"ssao_sat: bins", SSAO_SAT__IF_SLABS, "depth finer", NULL, NULL, {ssao_sat__gl_bins}},
+    {"ssao_sat: shares", SSAO_SAT__IF_SLABS, "finer", NULL, NULL, {ssao_sat__gl_shares}},
     {"ssao_sat: edges", 0, "finer shares", NULL, NULL, {ssao_sat__gl_edges}},
     {"ssao_sat: words", 0, "depth edges", NULL, NULL, {ssao_sat__gl_words}},
     {"ssao_sat: sums", 0, "table", NULL, NULL, {ssao_sat__gl_scan}},
@@ -3474,7 +3484,7 @@ static const sat__gl_program ssao_sat__programs[SSAO_SAT__GL_PROGRAMS] = {
 
 /* What they draw into. */
 enum {
-    SSAO_SAT__T_SAMPLE, SSAO_SAT__T_RANGE, SSAO_SAT__T_SHARES, SSAO_SAT__T_EDGES, SSAO_SAT__T_TABLE,
+    SSAO_SAT__T_SAMPLE, SSAO_SAT__T_RANGE, SSAO_SAT__T_BINS, SSAO_SAT__T_SHARES, SSAO_SAT__T_EDGES, SSAO_SAT__T_TABLE,
     SSAO_SAT__T_TABLE_1, SSAO_SAT__T_OPEN, SSAO_SAT__T_OUT, SSAO_SAT__T_BENT, SSAO_SAT__TARGETS, SSAO_SAT__GL_UNITS = 4
 };
 
@@ -3569,6 +3579,7 @@ static sat_result ssao_sat__gl_make_targets(ssao_sat_gl *g)
     const struct { unsigned internal; int width, height; } list[SSAO_SAT__TARGETS] = {
         {SAT__GL_RG32F, SSAO_SAT__GRID / 2, SSAO_SAT__GRID / 2},
         {SAT__GL_RG32F, 1, 1},
+        {SAT__GL_R32F, SSAO_SAT__GRID, slabs ? SSAO_SAT__GRID : 0},
         {SAT__GL_R32F, SSAO_SAT__BINS + 1, slabs ? 1 : 0},
         {SAT__GL_RGBA32F, g->options.slabs + 1, 1},
         {slabs ? SAT__GL_RGBA32UI : SAT__GL_R32UI, width, height},
@@ -3700,8 +3711,10 @@ static void ssao_sat__gl_find_edges(ssao_sat_gl *g, unsigned depth)
     float region[4];
     SSAO_SAT__GL_PASS(g, SSAO_SAT__GL_SAMPLE, &t[SSAO_SAT__T_SAMPLE], depth);
     SSAO_SAT__GL_PASS(g, SSAO_SAT__GL_RANGE, &t[SSAO_SAT__T_RANGE], t[SSAO_SAT__T_SAMPLE].texture);
-    if (g->given & SSAO_SAT__IF_SLABS)
-        SSAO_SAT__GL_PASS(g, SSAO_SAT__GL_SHARES, &t[SSAO_SAT__T_SHARES], depth, t[SSAO_SAT__T_RANGE].texture);
+    if (g->given & SSAO_SAT__IF_SLABS) {
+        SSAO_SAT__GL_PASS(g, SSAO_SAT__GL_BINS, &t[SSAO_SAT__T_BINS], depth, t[SSAO_SAT__T_RANGE].texture);
+        SSAO_SAT__GL_PASS(g, SSAO_SAT__GL_SHARES, &t[SSAO_SAT__T_SHARES], t[SSAO_SAT__T_BINS].texture);
+    }
     region[0] = (float)o->radius;
     region[1] = o->region_pixels > 0 ? 1e30f : (float)o->radius * g->fit.reach;
     region[2] = o->region_pixels > 0 ? (float)o->region_pixels / (float)g->step : g->limit;
