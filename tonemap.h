@@ -71,11 +71,11 @@
      Against OpenGL at most 1 code differs, in 2 % of codes (on a software renderer). 8-bit codes are at most one from
      the rounded value, and that in 2 % of cases, within 0.1 of a step.
      Luminances below 2^-100 are black, those above 2^100 count as 2^100. NaN and negative luminances count as 0,
-     infinity is white; none of them enters the log-average, and none changes a pixel outside the 41 x 41 around it
-     (1e30 does not either, but where the meter is within a hair of a step). A pixel of
-     NaN or negative luminance (ringing beside lamps) shows the mean of what the usable ones around it show, up to 3
-     pixels away. A negative component of a positive luminance is kept until the display cuts it. Output lies in [0, 1],
-     linear floats in [0, peak], for any input bits. PQ is within 3e-4. Black pictures stay black and leave the
+     infinity, if only in one component, is white; none of them enters the log-average, and none changes a pixel outside
+     the 41 x 41 around it (1e30 does not either, but where the meter is within a hair of a step). A pixel of NaN or
+     negative luminance (ringing beside lamps) shows the mean of what the usable ones around it show, up to 3 pixels
+     away. A negative component of a positive luminance is kept until the display cuts it. Output lies in [0, 1], linear
+     floats in [0, peak], for any input bits. PQ is within 3e-4. Black pictures stay black and leave the
      adaptation alone; constant ones get the key (to half of the meter's step of 1/64 octave).
 
      Deviations from the sources: eq A.1 averages positive luminances only and has no delta, which would depend on the
@@ -544,6 +544,7 @@ typedef struct tonemap__worker {
     uint32_t *bins, *histogram; /* memory; the same or NULL when nobody asks */
     int64_t log_sum;      /* of log2 of the positive luminances, in 2^-16 */
     uint64_t counted;     /* how many they are; with a mask, of its weights */
+    int beyond;           /* some luminance of the row is beyond TONEMAP__BRIGHTEST */
     const float *luma, *mask; /* weights of red, green and blue; of the row's pixels, or NULL */
     tonemap_stats stats;
 } tonemap__worker;
@@ -605,7 +606,7 @@ struct tonemap {
                                step; see tonemap__hold */
     float *luminance;       /* the picture, rows `row` floats apart */
     float *row_sum;         /* of each row */
-    unsigned char *row_unusable; /* some pixel of the row shows its neighbours */
+    unsigned char *row_odd; /* bits: 1: some pixel of the row shows its neighbours; 2: some is beyond the range */
     tonemap__worker *worker;
     double state[TONEMAP__STATES];
     tonemap__frame frame;
@@ -707,6 +708,7 @@ static inline void tonemap__measure_each(tonemap__worker *w, tonemap__line *line
         uint32_t bits, weight = w->mask ? tonemap__mask_weight(w->mask[x]) : 1;
         if (!(y >= TONEMAP__DARKEST && y <= TONEMAP__BRIGHTEST)) {
             int finite = sat__is_finite(y);
+            w->beyond |= y > TONEMAP__BRIGHTEST;
             y = tonemap__sane_luminance(y, &w->stats);
             if (!(y > 0) || !finite) { /* infinity is shown as white, but says nothing about the light */
                 luminance[x] = y;
@@ -842,8 +844,9 @@ static void tonemap__measure_bands(int begin, int end, int worker, void *context
         size_t unusable = w->stats.nan + w->stats.negative;
         const float *mask = map->options.meter_weights;
         w->mask = mask ? mask + (size_t)y * (size_t)map->width : NULL;
+        w->beyond = 0;
         map->row_sum[y] = tonemap__measure_row(w, luminance, pixels, job->hdr->channels, map->width);
-        map->row_unusable[y] = (unsigned char)(w->stats.nan + w->stats.negative > unusable);
+        map->row_odd[y] = (unsigned char)((w->stats.nan + w->stats.negative > unusable) + 2 * w->beyond);
         for (x = map->width; x < map->row; x++) luminance[x] = luminance[map->width - 1];
     }
 }
@@ -1607,7 +1610,7 @@ static inline void tonemap__steps_row(float *out, const tonemap *map, int j)
         v = sat__f32x4_max(sat__f32x4_min(v, sat__f32x4_set1(TONEMAP__LOCAL_CAP)), sat__f32x4_set1(1 / 1024.0f));
         sat__f32x4_store(out + x, sat__f32x4_mul(sat__f32x4_add(tonemap__log2_4(v), offset), steps));
     }
-    if (!map->row_unusable[j]) return;
+    if (!(map->row_odd[j] & 1)) return;
     for (last = 0; last < map->width && sat__float_bits(luminance[last]) == TONEMAP__UNUSABLE; last++) {}
     if (last == map->width) last = 0;
     for (x = 0; x < map->width; x++) {
@@ -2040,7 +2043,7 @@ static inline void tonemap__gamut4(sat__f32x4 *v, sat__f32x4 top, sat__f32x4 gre
 typedef struct tonemap__shading {
     const float *pixels, *luminance, *gain, *rho;
     const tonemap__colours *colours;
-    int channels;
+    int channels, beyond; /* some luminance is beyond the range */
     float floor, most, gamut;
     size_t clamped;
 } tonemap__shading;
@@ -2064,6 +2067,17 @@ static inline void tonemap__mix4(sat__f32x4 *v, sat__f32x4 luminance, const floa
             beyond, sat__f32x4_add(luminance, sat__f32x4_mul(sat__f32x4_sub(out[c], luminance), share)), out[c]);
 }
 
+/* Colours beyond the range come down to its brightest; all ones where they are infinite, which is shown as white. */
+static inline sat__i32x4 tonemap__limit4(sat__f32x4 *v, sat__f32x4 luminance, const tonemap__shading *s)
+{
+    sat__f32x4 own = tonemap__luminance4(s->colours->luma, s->channels, v[0], v[1], v[2]);
+    sat__i32x4 beyond = sat__f32x4_less_equal(sat__f32x4_set1(TONEMAP__BRIGHTEST), luminance);
+    int c;
+    for (c = 0; c < 3; c++)
+        v[c] = sat__f32x4_select(beyond, sat__f32x4_mul(v[c], sat__f32x4_div(luminance, own)), v[c]);
+    return sat__i32x4_and(beyond, sat__f32x4_less(sat__f32x4_set1(FLT_MAX), own));
+}
+
 /* Pixels [x, x + n) times their gain, clipped to [floor, most]. Minima and maxima are written so that NaN becomes the
    floor: it comes from pixels that are black. The last few are copied first: behind them the picture may end. */
 static inline void tonemap__shade(tonemap__planes out, tonemap__shading *s, int x, int n)
@@ -2078,16 +2092,19 @@ static inline void tonemap__shade(tonemap__planes out, tonemap__shading *s, int 
         const float *pixels = s->pixels + (size_t)(x + i) * channels;
         sat__f32x4 v[3], top, gain = sat__f32x4_load(s->gain + x + i),
                               luminance = sat__f32x4_load(s->luminance + x + i);
-        sat__i32x4 beyond;
+        sat__i32x4 beyond, white = sat__i32x4_set1(0);
         if (i + 4 > n) {
             memset(last, 0, sizeof last);
             pixels = (const float *)memcpy(last, pixels, (size_t)(n - i) * channels * sizeof(float));
         }
         tonemap__load_pixels(pixels, s->channels, v, v + 1, v + 2);
+        if (s->beyond) white = tonemap__limit4(v, luminance, s);
         if (s->colours->mixes && s->channels > 1) tonemap__mix4(v, luminance, s->colours->mix);
         if (TONEMAP__HAS_MESOPIC && s->rho)
             tonemap__shift_red4(v, luminance, sat__f32x4_load(s->rho + x + i), s->colours);
         for (c = 0; c < 3; c++) v[c] = sat__f32x4_max(sat__f32x4_mul(v[c], gain), least);
+        if (s->beyond)
+            for (c = 0; c < 3; c++) v[c] = sat__f32x4_select(white, sat__f32x4_set1(TONEMAP__GAMUT_TOP), v[c]);
         top = sat__f32x4_max(sat__f32x4_max(v[0], v[1]), v[2]);
         beyond = sat__i32x4_and(sat__f32x4_less(one, top), tonemap__inside4(i, n));
         over = sat__i32x4_sub(over, beyond);
@@ -2369,6 +2386,7 @@ static inline void tonemap__write_row(const tonemap__job *job, tonemap__worker *
     shading.most = curve ? 1e9f : 1;
     shading.floor = job->as_float ? 0 : TONEMAP__CODE_FLOOR;
     shading.gamut = channels > 1 && !curve ? map->frame.gamut : -1;
+    shading.beyond = map->row_odd[y] & 2;
     shading.clamped = 0;
     piece.channels = channels;
     piece.y = y;
@@ -2455,7 +2473,7 @@ static void tonemap__fill_bands(int begin, int end, int worker, void *context)
     int x, y = begin * TONEMAP__BAND, y1 = sat__min_int(end * TONEMAP__BAND, job->map->height);
     (void)worker;
     for (; y < y1; y++) {
-        if (!job->map->row_unusable[y]) continue;
+        if (!(job->map->row_odd[y] & 1)) continue;
         for (x = 0; x < job->map->width; x++)
             if (tonemap__is_unusable(job->map, x, y)) tonemap__fill_pixel(job, x, y);
     }
@@ -2470,7 +2488,7 @@ static inline void tonemap__carve(tonemap *map, sat__arena *arena)
     map->worker = (tonemap__worker *)sat__carve(arena, (size_t)map->workers, sizeof *map->worker);
     map->luminance = (float *)sat__carve(arena, height, row * sizeof(float));
     map->row_sum = (float *)sat__carve(arena, height, sizeof(float));
-    map->row_unusable = (unsigned char *)sat__carve(arena, height, 1);
+    map->row_odd = (unsigned char *)sat__carve(arena, height, 1);
     map->fine = (uint16_t *)sat__carve(arena, TONEMAP__CODES + 1, sizeof(uint16_t));
     map->meter = (tonemap__meter *)sat__carve(arena, 1, sizeof *map->meter);
     for (i = 0; i < map->workers; i++) {
@@ -3169,7 +3187,7 @@ static const char tonemap__glsl_map[] =
     SAT__GLSL(
         uniform sampler2D hdr;
         uniform float cd_per_unit, lux_per_cd;
-        uniform vec3 mix_r, mix_g, mix_b, red_x, red_step;
+        uniform vec3 luma, mix_r, mix_g, mix_b, red_x, red_step;
         uniform int mixes;
         out vec4 value;
         float tonemap_capacity(float cd) {
@@ -3197,6 +3215,12 @@ static const char tonemap__glsl_map[] =
             float lux = (cd_per_unit > 0.0 ? cd_per_unit : exp2(-first.x)) * lux_per_cd;
             float gain;
             if (!(y > 0.0)) return tonemap_encode(vec3(0.0));
+            if (!(y < TONEMAP_BRIGHTEST)) {
+                float light = luma.r * rgb.r + luma.g * rgb.g + luma.b * rgb.b;
+                if (floatBitsToUint(light) >= 0x7f800000u) /* infinite */
+                    return tonemap_encode(vec3(TONEMAP_OPERATOR > 5 ? 1.0 / peak : 1.0));
+                rgb *= y / light;
+            }
             if (mixes > 0) {
                 rgb = vec3(dot(mix_r, rgb), dot(mix_g, rgb), dot(mix_b, rgb));
                 float lowest = min(min(rgb.r, rgb.g), rgb.b);
@@ -3359,6 +3383,7 @@ static inline void tonemap__gl_define_options(tonemap_gl *g)
     sat__gl_define_float(gl, "TONEMAP_OCTAVE", TONEMAP__STEPS); /* in steps */
     sat__gl_define_float(gl, "TONEMAP_LOCAL_CAP", TONEMAP__LOCAL_CAP);
     sat__gl_define_float(gl, "TONEMAP_DARKEST", TONEMAP__DARKEST);
+    sat__gl_define_float(gl, "TONEMAP_BRIGHTEST", TONEMAP__BRIGHTEST);
     sat__gl_define_float(gl, "TONEMAP_GAMUT_TOP", TONEMAP__GAMUT_TOP);
     sat__gl_define_float(gl, "TONEMAP_HIGHLIGHTS", (float)TONEMAP__HIGHLIGHTS);
     sat__gl_define_text(gl, "TONEMAP_COUNTS", g->given & TONEMAP__IF_COUNTED ? "usampler2D" : "sampler2D");
@@ -3668,6 +3693,7 @@ static inline sat_result tonemap__gl_map(tonemap_gl *g, const sat_gl_target *to,
     sat__gl_set_float(gl, program, "peak", (float)g->options.peak);
     sat__gl_set_float(gl, program, "peak_cd", (float)(g->options.peak * g->options.white_cd));
     sat__gl_set_int(gl, program, "mixes", g->colours.mixes);
+    sat__gl_set_float3(gl, program, "luma", g->colours.luma);
     sat__gl_set_float3(gl, program, "mix_r", g->colours.mix);
     sat__gl_set_float3(gl, program, "mix_g", g->colours.mix + 3);
     sat__gl_set_float3(gl, program, "mix_b", g->colours.mix + 6);

@@ -638,7 +638,7 @@ TEST(errors_against_ray_tracing)
     REPORT("RMSE normal-guided", guided, "");
     REPORT("RMSE minimalist", published, "");
     EXPECT(slabs < 0.073); /* pictures this small are coarse: bench_ssao_sat states the figures at 512 x 512 */
-    EXPECT(ssim > 0.84);
+    EXPECT(ssim > 0.818); /* of 36 rays a pixel; 0.84 of 64 */
     EXPECT(four < 0.125);
     EXPECT(one < 0.14);
     EXPECT(slabs < four && four < one && one < guided);

@@ -634,6 +634,37 @@ TEST(a_bad_pixel_stays_in_its_window)
     free(pixels);
 }
 
+/* Infinity is white in any colours, and light beyond the range keeps its place above all else. */
+TEST(infinity_is_white)
+{
+    enum { W = 28, H = 18, INFINITE = 4, MARKS = 6 };
+    const float mark[MARKS][3] = {{INFINITY, INFINITY, INFINITY}, {INFINITY, 0, 0}, {0.1f, INFINITY, -1},
+                                  {0, 2, INFINITY}, {3e38f, 0, 0}, {3e38f, 3e38f, 3e38f}};
+    float p[W * H * 3];
+    unsigned char out[W * H * 3];
+    int i, k, variant, operation;
+    for (operation = 0; operation <= TONEMAP_HABLE; operation++)
+        for (variant = 0; variant < 8; variant++) {
+            tonemap_options o = tonemap_defaults();
+            o.operation = (tonemap_operator)operation;
+            if (tonemap__left_out(&o)) continue;
+            o.primaries = variant & 1 ? TONEMAP_PRIMARIES_2020 : TONEMAP_PRIMARIES_709;
+            o.display = variant == 2 ? TONEMAP_PRIMARIES_P3 : TONEMAP_PRIMARIES_709;
+            o.mesopic = TONEMAP__HAS_MESOPIC && variant > 3 ? TONEMAP_MESOPIC_LOCAL : TONEMAP_MESOPIC_OFF;
+            o.gamut = variant == 6 ? -1 : 0.5;
+            if (variant > 5) o.balance_red = 1.5, o.balance_blue = 0.6;
+            for (i = 0; i < W * H * 3; i++) p[i] = 0.1f + 0.01f * (float)(i % 30);
+            for (k = 0; k < MARKS; k++) memcpy(p + 3 * (2 * W + k + 1), mark[k], sizeof mark[k]);
+            EXPECT_EQ(tonemap_once_u8(out, p, W, H, 3, &o), SAT_OK);
+            for (k = 0; k < MARKS; k++) {
+                const unsigned char *c = out + 3 * (2 * W + k + 1);
+                int most = sat__max_int(sat__max_int(c[0], c[1]), c[2]);
+                if (k < INFINITE ? !EXPECT(c[0] >= 254 && c[1] >= 254 && c[2] >= 254) : !EXPECT(most > 250))
+                    printf("    operator %d, variant %d: mark %d is %d %d %d\n", operation, variant, k, c[0], c[1], c[2]);
+            }
+        }
+}
+
 TEST(any_bits_give_values_from_0_to_1)
 {
     enum { W = 64, H = 50, N = W * H * 4 };

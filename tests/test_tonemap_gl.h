@@ -208,6 +208,37 @@ TEST(gl_has_the_cpus_curves_and_colours)
     screen_close(&s);
 }
 
+/* As on the CPU, with other primaries and mesopic vision, and by a curve. */
+TEST(gl_infinity_is_white)
+{
+    enum { W = 24, H = 16 };
+    unsigned char out[W * H * 4];
+    int k;
+    screen s;
+    if (!screen_open(&s)) return;
+    for (k = 0; k < 3; k++) {
+        tonemap_options o = k == 2 ? local_options() : tonemap_defaults();
+        float *pixels = lit_pixels(W, H, 0), *red = pixels + 4 * (5 * W + 5), *far_red = red + 4 * 8;
+        tonemap_gl *gl = NULL;
+        unsigned hdr;
+        if (k == 1) o.operation = TONEMAP_ACES;
+        o.primaries = k == 2 ? TONEMAP_PRIMARIES_709 : TONEMAP_PRIMARIES_2020;
+        o.mesopic = k == 0 ? TONEMAP_MESOPIC_LOCAL : TONEMAP_MESOPIC_OFF;
+        red[0] = INFINITY, red[1] = 0, red[2] = -1;
+        far_red[0] = 3e38f, far_red[1] = far_red[2] = 0;
+        hdr = screen_texture(&s, SAT__GL_RGBA32F, W, H, pixels);
+        EXPECT_EQ(tonemap_gl_create(&gl, s.context.get_proc, W, H, &o), SAT_OK);
+        EXPECT_EQ(tonemap_gl_apply(gl, NULL, hdr, 0), SAT_OK);
+        screen_read(&s, out, tonemap_gl_texture(gl), W, H);
+        EXPECT(out[4 * (5 * W + 5)] >= 254 && out[4 * (5 * W + 5) + 1] >= 254 && out[4 * (5 * W + 5) + 2] >= 254);
+        EXPECT(out[4 * (5 * W + 13)] > 250);
+        tonemap_gl_destroy(gl);
+        s.gl.DeleteTextures(1, &hdr);
+        free(pixels);
+    }
+    screen_close(&s);
+}
+
 /* The ends of every option, in pairs: OpenGL takes what the CPU takes, and shows the same. Each costs a dozen programs:
    one of 19 of them, others in each build of the table, and all pairs of enumerations and switches. */
 TEST(gl_takes_every_corner_of_the_options)
