@@ -203,7 +203,7 @@ typedef struct fiv_environment_options {
                               of that; 0: none does */
     int max_lights;        /* 32; 0..FIV_MAX_LIGHTS; strongest patches first; those beyond stay in the cube, each
                               spread over its texel */
-    float max_radiance;    /* 1e10; 1e-30..1e38; larger values, infinity included, count as this much */
+    float max_radiance;    /* 1e10; 1e-30..1e30; larger values, infinity included, count as this much */
     sat_allocator allocator; /* malloc; used by create and destroy only */
     sat_threads threads;     /* serial; used by create and update; same bits for any worker count */
 } fiv_environment_options;
@@ -516,7 +516,7 @@ static const sat__field fiv__environment_fields[] = {
     SAT__FIELD(fiv_environment_options, 'i', resolution, 32, 8, 64, ' '),
     SAT__FIELD(fiv_environment_options, 'f', delta_ratio, 100, 0, 1e38, ' '),
     SAT__FIELD(fiv_environment_options, 'i', max_lights, 32, 0, FIV_MAX_LIGHTS, ' '),
-    SAT__FIELD(fiv_environment_options, 'f', max_radiance, 1e10, 1e-30, 1e38, ' '),
+    SAT__FIELD(fiv_environment_options, 'f', max_radiance, 1e10, 1e-30, 1e30, ' '),
     SAT__FIELD(fiv_environment_options, 'a', allocator, 0, 0, 0, ' '),
     SAT__FIELD(fiv_environment_options, 't', threads, 0, 0, 0, ' '),
 };
@@ -963,13 +963,14 @@ static inline double fiv__patch_light(const float *cell)
     return ((double)cell[0] + (double)cell[1] + (double)cell[2]) * (double)cell[3];
 }
 
-/* Power and mean direction of what the image holds above `floor` inside one patch. */
+/* Power and mean direction of what the image holds above `floor` inside one patch; where patches are smaller than the
+   texels of the image, so that not each holds a point, what the patch holds. */
 static void fiv__measure_light(double power[3], double direction[3], fiv_environment *e, const sat_image *image,
                                size_t patch, const float floor_rgb[3])
 {
     fiv__scan scan;
     float rgb[3 * FIV__BLOCK], middle[3];
-    int x, y, i, c, size = e->patch, height;
+    int x, y, i, c, size = e->patch, width, height;
     fiv_environment_stats ignored;
     double polar, reach = 3.0 / size, length;
     memset(&ignored, 0, sizeof ignored);
@@ -983,12 +984,13 @@ static void fiv__measure_light(double power[3], double direction[3], fiv_environ
     length = sqrt((double)fiv__dot(middle, middle));
     polar = acos((double)middle[1] / length) / 3.141592653589793;
     for (c = 0; c < 3; c++) power[c] = direction[c] = 0;
-    for (x = 0; x < image->width * scan.cut; x += FIV__BLOCK) {
+    width = image->width < size || 2 * image->height < size ? 0 : image->width * scan.cut;
+    for (x = 0; x < width; x += FIV__BLOCK) {
         fiv__scan_columns(&scan, x);
         for (y = sat__max_int(0, (int)((polar - reach) * height)); y < height && y < (polar + reach) * height + 1;
              y++) {
             double t = 3.141592653589793 * y / height, step = 3.141592653589793 / height, middle_angle = t + 0.5 * step;
-            double solid = (cos(t) - cos(t + step)) * 6.283185307179586 / (image->width * scan.cut);
+            double solid = (cos(t) - cos(t + step)) * 6.283185307179586 / width;
             fiv__scan_read(rgb, &scan, y / scan.cut, &ignored);
             for (i = 0; i < scan.count; i++) {
                 const float *p = rgb + 3 * ((scan.x0 + i) / scan.cut - scan.x0 / scan.cut);
@@ -1005,6 +1007,13 @@ static void fiv__measure_light(double power[3], double direction[3], fiv_environ
             }
         }
     }
+    for (c = 0; c < 3; c++) power[c] = power[c] > 0 ? power[c] : 0; /* a mean of equal floats may be the larger one */
+    if (power[0] + power[1] + power[2] > 0) return;
+    for (c = 0; c < 3; c++) {
+        const float *cell = e->source + 4 * patch;
+        power[c] = ((double)cell[c] - (double)floor_rgb[c]) * (double)cell[3];
+    }
+    for (c = 0; c < 3; c++) direction[c] = (power[0] + power[1] + power[2]) * (double)middle[c] / length;
 }
 
 /* 1 when a patch lies within one texel of the masks of a light. */

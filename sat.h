@@ -1017,9 +1017,13 @@ static inline void sat__fields_default(void *options, size_t size, const sat__fi
 static inline int sat__field_is_valid(const sat__field *field, const void *options)
 {
     const unsigned char *at = (const unsigned char *)options + field->offset;
-    double v = sat__field_value(field, options);
+    double v = sat__field_value(field, options), low = field->low, high = field->high;
     sat_allocator allocator, resolved;
     sat_threads threads;
+    if (field->type == 'f') { /* the float nearest to 1e-6 is in 1e-6.. */
+        low = (double)(float)low;
+        high = (double)(float)high;
+    }
     if (field->type == 't') {
         memcpy(&threads, at, sizeof threads);
         return sat__threads_are_valid(&threads);
@@ -1031,7 +1035,7 @@ static inline int sat__field_is_valid(const sat__field *field, const void *optio
     if (!sat__is_finite_double(v)) return field->also == 'I' && v > 0;
     if ((field->also == '0' && v == 0) || (field->also == '-' && v < 0)) return 1;
     if (field->also == '2' && ((int)v & ((int)v - 1))) return 0;
-    return v >= field->low && v <= field->high;
+    return v >= low && v <= high;
 }
 
 /* The first field that is outside its range, or NULL. */

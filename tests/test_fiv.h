@@ -321,6 +321,42 @@ TEST(bad_pixels_are_counted)
     fiv_environment_destroy(clean);
 }
 
+/* One bright texel of an image with fewer texels than the cube: most patches that it covers hold no point of the image.
+   Its light is its radiance times its solid angle all the same, whatever becomes a directional light. */
+TEST(coarse_images)
+{
+    static const int sizes[4][2] = {{1, 1}, {5, 1}, {8, 4}, {15, 7}};
+    static float pixels[15 * 7];
+    int i, y, ratio, resolution;
+    double pi = 3.14159265358979323846;
+    for (i = 0; i < 4; i++)
+        for (resolution = 8; resolution <= 16; resolution += 8)
+            for (ratio = 0; ratio < 3; ratio++)
+                for (y = 0; y < sizes[i][1]; y += 3) {
+                    int width = sizes[i][0], height = sizes[i][1], k, negative = 0;
+                    sat_image image = sat_image_f32(pixels, width, height, 1);
+                    fiv_environment_options o = fiv_environment_defaults();
+                    fiv_environment *e = NULL;
+                    double all = 0, truth = 1000 * 2 * pi / width * (cos(pi * y / height) - cos(pi * (y + 1) / height));
+                    test_lights l;
+                    size_t n;
+                    float vector[9];
+                    memset(pixels, 0, sizeof pixels);
+                    pixels[y * width + width / 3] = 1000;
+                    o.resolution = resolution;
+                    o.delta_ratio = ratio == 0 ? 100.0f : ratio == 1 ? 0.5f : 1e-30f;
+                    if (!EXPECT_EQ(fiv_environment_create(&e, &image, &o, NULL), SAT_OK)) return;
+                    l = test_get_lights(e);
+                    for (n = 0; n < l.count; n++) all += (double)l.powers[3 * n], negative += !(l.powers[3 * n] >= 0);
+                    EXPECT_EQ(negative, 0);
+                    EXPECT_REL(all, truth, 0.05);
+                    fiv_environment_vector(vector, e);
+                    for (k = 0; k < 9; k++) EXPECT(fabsf(vector[k]) <= 1.01f * (float)truth);
+                    test_free_lights(&l);
+                    fiv_environment_destroy(e);
+                }
+}
+
 /* A sun of 1e8 on one texel: split off or not, no sum may lose what lies beside it. */
 TEST(sun_of_1e8)
 {
@@ -1861,6 +1897,37 @@ TEST(failing_allocators)
     reference_mesh_free(&m);
 }
 
+#ifndef FIV_NO_MASKS
+TEST(loads_that_run_out_of_memory)
+{
+    reference_mesh m = reference_box(0.5f, 0.3f, 0.4f);
+    fiv_occluder_options options = test_small_set();
+    fiv_occluder *o, *back = NULL;
+    sat_result result = SAT_ERR_MEMORY;
+    size_t size;
+    void *bytes;
+    int fail;
+    options.rho = 2;
+    o = test_occluder(&m, &options, NULL);
+    size = fiv_occluder_save_size(o);
+    bytes = malloc(size);
+    EXPECT_EQ(fiv_occluder_save(bytes, size, o), SAT_OK);
+    for (fail = 1; fail < 9 && result == SAT_ERR_MEMORY; fail++) {
+        support_memory memory;
+        options.allocator = support_allocator(&memory);
+        memory.fail_at = fail;
+        result = fiv_occluder_load(&back, bytes, size, &options);
+        EXPECT((result == SAT_OK) == (back != NULL));
+        fiv_occluder_destroy(back);
+        EXPECT(support_memory_clean(&memory));
+    }
+    EXPECT(fail == 5 && result == SAT_OK); /* its tables, its masks, its mesh */
+    free(bytes);
+    fiv_occluder_destroy(o);
+    reference_mesh_free(&m);
+}
+#endif
+
 TEST(no_allocation_per_frame)
 {
     static float pixels[SKY_WIDTH * SKY_HEIGHT * 3], points[3 * COUNT], normals[3 * COUNT], rgb[3 * COUNT];
@@ -2055,6 +2122,7 @@ static void test_fields(const sat__field *fields, int count, const void *default
             if (at == 5 && f->type != 'f') continue;
             memcpy(o.bytes, defaults, size);
             sat__field_set(f, o.bytes, at == 5 ? (double)test_nan() : v);
+            EXPECT_EQ(sat__field_is_valid(f, o.bytes), at < 3);
             if (at < 3 && strncmp(explain(text, sizeof text, o.bytes), f->name, strlen(f->name)) != 0) {
                 EXPECT_EQ(use(o.bytes), *text ? SAT_ERR_ARGUMENT : SAT_OK); /* an end may not suit another option */
             } else {
