@@ -442,8 +442,9 @@ SAT_DEF sat_result sat_plan_options(sat_options *out, const sat_image *image, in
                                     double max_relative_error, size_t max_bytes, const sat_options *options);
 
 /* Box filter of an image that arrives a row at a time, of any height, in memory for 2 radius + 2 rows. The rows
-   that come out equal sat_box_filter of the whole image bit for bit. SAT_KIND_TILED keeps up to three tile rows more,
-   gives rows up to a tile side later, and takes a radius of at most 100000. */
+   that come out equal sat_box_filter of the whole image bit for bit (FIXED32: of the same quantum, as long as no pixel
+   times max_box_area, here 0 for the filter's own box, is beyond 2^31 quanta). SAT_KIND_TILED keeps up to three tile
+   rows more, gives rows up to a tile side later, and takes a radius of at most 100000. */
 typedef struct sat_stream sat_stream;
 SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, int radius, const sat_options *options);
 /* Takes the next row (an image of height 1) and writes at most one filtered row to out_row (width x channels floats);
@@ -6100,7 +6101,8 @@ SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, 
     if (sat__is_fixed(resolved.kind)) {
         if (!(resolved.quantum > 0) && !(resolved.max_value > 0))
             return SAT_ERR_ARGUMENT; /* the largest pixel is not known yet */
-        if (!(resolved.max_box_area > 0)) resolved.max_box_area = (2.0 * radius + 1) * (2.0 * radius + 1);
+        if (!(resolved.max_box_area > 0)) /* no box is wider than the image */
+            resolved.max_box_area = fmin(2.0 * radius + 1, width) * (2.0 * radius + 1);
     }
     memset(&resolved.threads, 0, sizeof resolved.threads);
     if (!sat__resolve_allocator(&allocator, &resolved.allocator)) return SAT_ERR_ARGUMENT;

@@ -1247,6 +1247,27 @@ TEST(fixed32_reads_constant_images_exactly)
 }
 
 /* Pixels that no sum of floats can hold are clamped in a stream as in a whole image. */
+/* A column of pixels: the box counts with the pixels it has, or 7 would come out as 5. */
+TEST(narrow_streams_of_integers_keep_their_pixels)
+{
+    const float pixels[2] = {7, 1e5f};
+    int i, n, k;
+    for (i = 0; i < 2; i++) {
+        sat_image view = sat_image_f32(&pixels[i], 1, 1, 1);
+        sat_options o = sat_defaults();
+        sat_stream *s;
+        float out = 0;
+        o.kind = SAT_KIND_FIXED32;
+        o.quantum = 1;
+        o.max_value = 1e5;
+        if (!EXPECT_EQ(sat_stream_create(&s, 1, 1, 10000, &o), SAT_OK)) continue;
+        EXPECT_EQ(sat_stream_push(s, &out, &n, &view), SAT_OK);
+        for (k = 0; k < 3 && !n; k++) EXPECT_EQ(sat_stream_push(s, &out, &n, NULL), SAT_OK);
+        EXPECT_NEAR(out, pixels[i], 0);
+        sat_stream_destroy(s);
+    }
+}
+
 TEST(streams_of_huge_pixels_equal_the_whole_image)
 {
     enum { W = 90, H = 70 };
