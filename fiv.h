@@ -55,7 +55,7 @@
 
    OPTIONS (macros)
      FIV_IMPLEMENTATION  the implementation, in one file     FIV_STATIC, FIV_DEF   linkage, everywhere
-     FIV_GL              the OpenGL part, everywhere         FIV_ASSERT(x)         default SAT_ASSERT
+     FIV_GL              the OpenGL part, everywhere
      FIV_NO_MASKS        no stored masks: no FIV_MASK, share, save (keep_masks must be 0)
      FIV_NO_SELF         no self-shadows (eq 13)             FIV_NO_DELTA          no split-off lights
 
@@ -498,10 +498,6 @@ FIV_DEF sat_result fiv_gl_bind(fiv_gl *gl, unsigned program, int first_unit);
 #define SAT_SIBLING_GL
 #endif
 #include "sat.h"
-
-#ifndef FIV_ASSERT
-#define FIV_ASSERT(condition) SAT_ASSERT(condition)
-#endif
 
 SAT__IEEE_BEGIN
 #ifdef __cplusplus
@@ -1337,7 +1333,7 @@ FIV_DEF sat_result fiv_environment_create(fiv_environment **out, const sat_image
     *made = e;
     for (i = 0; i < e.face * e.face; i++) made->angles[i] = fiv__texel_angle(i % e.face, i / e.face, e.face);
     result = fiv_environment_update(made, equirect_rgb, NULL);
-    FIV_ASSERT(result == SAT_OK);
+    SAT_ASSERT(result == SAT_OK);
     *out = made;
     if (stats) *stats = made->stats;
     return result;
@@ -3544,7 +3540,7 @@ static const fiv__own *fiv__own_mask(fiv__receiver *r, const fiv_instance *insta
     fiv__own *own = &r->own[(i % (2 * FIV__ROW) + 2 * FIV__ROW * (size_t)(instance - r->instances)) % FIV__SLOTS];
     uint64_t rows[FIV__MAX_ROWS];
     double sum[FIV__TERMS];
-    float offset[3], world[3], normal[3], distance;
+    float offset[3] = {0, 0, 0}, world[3], normal[3], distance;
     int k;
     if (own->instance == instance && own->receiver == i) return own;
     own->instance = instance;
@@ -3773,7 +3769,7 @@ static float fiv__horizon_cut(float normal[3], fiv__receiver *r, const fiv_occlu
 static int fiv__cast(fiv__shadow *shadow, float covered[FIV_MAX_LIGHTS], fiv__receiver *r, const fiv_instance *instance)
 {
     const fiv_occluder *o = instance->occluder;
-    float offset[3], world[3], distance, normal[3], v[FIV__TERMS], cut;
+    float offset[3], world[3], distance, normal[3] = {0, 0, 0}, v[FIV__TERMS], cut;
     int k, published = r->options->accuracy <= FIV_TRILINEAR, masks = 0, own = 0, inside = 0;
     float contact = 0, around[3], angle;
     fiv__cell cell;
@@ -3976,14 +3972,15 @@ static void fiv__gather_shadows(int64_t taken[3], float covered[FIV_MAX_LIGHTS],
 {
     fiv__shadow shadows[FIV_MAX_INSTANCES];
     float one[FIV_MAX_LIGHTS];
+    const int lights = r->environment->light_count;
     size_t i;
     int k, count = 0;
     taken[0] = taken[1] = taken[2] = 0;
-    for (k = 0; k < r->environment->light_count; k++) covered[k] = 0;
+    for (k = 0; k < lights; k++) covered[k] = 0;
     for (i = 0; i < r->instance_count; i++) {
         if (!fiv__cast(&shadows[count], one, r, &r->instances[i])) continue;
         for (k = 0; k < 3; k++) taken[k] += fiv__fixed(shadows[count].rgb[k], r->diffuse[k]);
-        for (k = 0; k < r->environment->light_count; k++) covered[k] = one[k] > covered[k] ? one[k] : covered[k];
+        for (k = 0; k < lights; k++) covered[k] = one[k] > covered[k] ? one[k] : covered[k];
         count++;
     }
     if (count < 2 || !r->options->overlap) return;
@@ -4182,6 +4179,8 @@ static sat_result fiv__run(fiv__job *job, const fiv_irradiance_options *options,
     job->stats = shares;
     sat__parallel_for(&o.threads, (int)used, fiv__run_shares, job);
     for (i = 0; i < used; i++) fiv__add_stats(&sum, &shares[i]);
+    job->options = NULL;
+    job->stats = NULL;
     if (stats) *stats = sum;
     return SAT_OK;
 }
@@ -5198,6 +5197,7 @@ static void fiv__gl_send_shells(fiv_gl *g, const fiv_occluder *o, int layer)
     float scale = 1 / (o->table_scale * fiv__gl_unit(o));
     g->gl.ActiveTexture(SAT__GL_TEXTURE0);
     g->gl.BindTexture(SAT__GL_TEXTURE_2D_ARRAY, g->shells);
+    SAT_ASSERT(grid->theta > 0);
     for (shell = 0; shell < grid->rho; shell++)
         for (row = 0; row < rows; row += at_once) {
             int n = sat__min_int(at_once, rows - row);

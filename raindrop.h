@@ -2131,7 +2131,7 @@ static inline sat_result raindrop__fill_environment(raindrop_environment *e, con
     e->filter = o->filter;
     memcpy(e->sun_direction, o->sun_direction, sizeof e->sun_direction);
     memcpy(e->sun_irradiance, o->sun_irradiance, sizeof e->sun_irradiance);
-    if (e->bow) memcpy(e->bow, bow, 3 * RAINDROP__BOW_BINS * sizeof *bow);
+    if (e->bow && bow) memcpy(e->bow, bow, 3 * RAINDROP__BOW_BINS * sizeof *bow);
     job.environment = e;
     job.picture = picture;
     job.options = o;
@@ -2668,7 +2668,7 @@ static inline void raindrop__reenter(raindrop_drop *drop, double at[3], const ra
 {
     const raindrop_rain_options *o = &job->rain->options;
     double size = (double)o->box_size[1], top = (double)o->centre[1] + size / 2,
-           old = job->rise - (double)drop->velocity[1], left = old > 0 ? below / old : 0, speed = old;
+           old = job->rise - (double)drop->velocity[1], left = old > 0 ? below / old : 0, speed;
     uint32_t stream = job->rain->step * 512u;
     int turn;
     if (o->diameter_mm > 0) {
@@ -3720,6 +3720,7 @@ static inline void raindrop__batch_lookup(float (*colour)[4], raindrop__batch *b
     raindrop__lookups at[2];
     float mirrored[4], through[4], uv[2], half = 0.5f * (float)sphere->resolution;
     int i, c;
+    SAT_ASSERT(batch->count > 0);
     if (!environment->table) {
         for (i = 0; i < batch->count; i += RAINDROP__LANES) {
             raindrop__batch_fold(&at[0], batch->reflected, batch->reflect_cone, i, half);
@@ -4036,8 +4037,9 @@ static inline void raindrop__draw_soft(raindrop__batch *batch, const raindrop__v
     float opacity = v->radius * v->radius / (path.radius * path.radius), alpha[RAINDROP__BATCH], span[2] = {0, 0},
           spacing;
     int x, y, j;
-    raindrop__swing swing;
+    raindrop__swing swing = {0, {0, 0}, {0, 0}, {0, 0}};
     const float focal_in_radii = batch->focal_in_radii;
+    SAT_ASSERT(batch->count == 0);
     batch->samples = samples;
     batch->gaze.orders = -1;
     if (moving && frame->options.oscillation > 0) {

@@ -380,6 +380,9 @@ static inline double sat_view_sum(const sat_view *view, int x0, int y0, int x1, 
     if (!((unsigned)((x0 ^ (x1 - 1)) | (y0 ^ (y1 - 1))) >> view->shift)) {
         const double quantum = view->quanta[(size_t)(y0 >> view->shift) * (size_t)view->tiles +
                                             (size_t)(x0 >> view->shift)];
+#ifdef __clang_analyzer__ /* quanta of flat tables are below 0: where there is one, there are cells */
+        if (!view->cells) return 0;
+#endif
         if (quantum >= 0) { /* cells are inclusive sums within the tile: nothing is taken off in its first row */
             const unsigned inner = (1u << view->shift) - 1;
             const uint32_t left = 0u - (uint32_t)(((unsigned)x0 & inner) != 0),
@@ -4529,6 +4532,7 @@ static void sat__build_above(const sat_table *t, int channel, int band, int rows
     double *above = sat__above(t, channel, band), *whole = t->whole + sat__tile_index(t, channel, band, 0), run = 0;
     const double *up = first ? NULL : sat__above(t, channel, band - 1),
                  *whole_up = first ? NULL : t->whole + sat__tile_index(t, channel, band - 1, 0);
+    SAT_ASSERT(above && whole && (first || (up && whole_up)));
     for (tx = 0; tx < t->tiles_x; tx++) {
         const sat__tile *tile = &t->tiles[sat__tile_index(t, channel, band, tx)];
         int x0 = tx << t->shift, w = sat__min_int(t->options.tile, t->width - x0);
@@ -4648,6 +4652,7 @@ static void sat__flat_piece(const sat_table *t, unsigned char *row, sat__carry *
     void *out = row + ((size_t)strip->x0 + 1) * t->element,
          *column = t->columns + (size_t)strip->channel * t->columns_stride + (size_t)strip->x0 * t->element;
     int32_t signs = 0;
+    SAT_ASSERT(integers || t->options.kind != SAT_KIND_FIXED32);
     if (integers) sat__quantise(t, integers, in, n);
     switch (t->options.kind) {
     case SAT_KIND_DOUBLE:
@@ -5358,7 +5363,7 @@ static void sat__line_sums(double *sum, sat__filter_line *f, const sat__run *run
             sum[i] = one ? high[i] - low[i - skip] : ((edge - low[i - skip]) + rest) + high[i];
     }
     for (i = inside; i < n; i++) {
-        double left = i < skip ? 0 : low[i - skip];
+        double left = low && i >= skip ? low[i - skip] : 0;
         sum[i] = one ? whole - left : ((edge - left) + rest) + whole;
     }
     for (tx = first; tx <= last; tx++) sat__add_spikes(sum, f, run, tx);

@@ -914,6 +914,7 @@ static inline softassign__row softassign__matrix_row(const softassign *s, int ro
     ptrdiff_t at = s->in_place ? softassign__element(&s->problem, row, 0) : (ptrdiff_t)row * s->columns;
     if (s->wide) r.d = (s->in_place ? s->problem.cost_double : s->wide_matrix) + at;
     else r.f = (s->in_place ? s->problem.cost : s->matrix) + at;
+    SAT_ASSERT(r.f || r.d);
     return r;
 }
 
@@ -3673,6 +3674,7 @@ static void softassign__entropic(softassign *s, softassign__sweep *w, double *be
     const softassign_options *o = &s->options;
     double best = -(double)SOFTASSIGN__INFINITY, eps = o->temperature * softassign__mean_least(s);
     int step, sweep, j, stop = 0;
+    SAT_ASSERT(best_price && s->price_f);
     if (!(eps > 0)) eps = 1e-30;
     for (j = 0; j < s->columns; j++) best_price[j] = 0;
     for (j = 0; j < s->columns; j++)
@@ -4659,6 +4661,7 @@ static sat_result softassign__solve_published(softassign *s, softassign__publish
     if (!(p->largest > 1e-30)) p->largest = 1;
     softassign__list_all(s);
     softassign__certify(s);
+    SAT_ASSERT(p->m && p->best && p->column && p->outlier);
     if (wide) softassign__published_f64(p);
     else softassign__published_f32(p);
     if (wide) softassign__read_soft_f64(p, s->shown);

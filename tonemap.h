@@ -1014,6 +1014,7 @@ static inline int tonemap__measured_state(tonemap *map, double *state)
     tonemap__collect(map, &log_sum);
     if (!map->counted) return 0;
     average = tonemap__log_average(log_sum, (size_t)map->counted);
+    SAT_ASSERT(histogram || !ashikhmin);
     if (histogram) {
         tonemap__open_meter(m, histogram, (size_t)map->counted);
         low = tonemap__quantile(histogram, (size_t)map->counted, 0.01);
