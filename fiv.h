@@ -3267,12 +3267,16 @@ typedef struct fiv__around {
     float all[3][FIV__VIEWS], taken[3][FIV__VIEWS], angle[FIV__VIEWS];
 } fiv__around;
 
-/* A receiver as the views of a face see it. */
+/* A receiver as the views of a face see it, and one row of them. */
 typedef struct fiv__facing {
     int side, column[FIV__VIEWS], beyond; /* texels; bytes above it stand between the receiver and the light */
     float part[FIV__VIEWS], up[FIV__VIEWS];
     const float *normal;
     const uint64_t *hit;   /* in place of depth maps */
+    int y;                 /* the row of views: */
+    float down, height;
+    const uint8_t *row;    /* texels around the receiver's height */
+    const float *light;    /* the first view's */
 } fiv__facing;
 
 /* 0..1: bilinear between the comparisons at four texels. */
@@ -3300,22 +3304,20 @@ static inline void fiv__add_channel(float all[FIV__VIEWS], float taken[FIV__VIEW
     }
 }
 
-/* A row of views. `row`: the texels around the receiver's height; light: the first view's. */
-static void fiv__add_views(fiv__around *sum, const fiv__facing *f, int y, const uint8_t *row, float down, float height,
-                           const float *light)
+static void fiv__add_views(fiv__around *sum, const fiv__facing *f)
 {
     float covered[FIV__VIEWS], over[FIV__VIEWS];
     int x, c;
     for (x = 0; x < FIV__VIEWS; x++) {
-        over[x] = height + f->up[x] > 0 ? 1.0f : 0.0f;
+        over[x] = f->height + f->up[x] > 0 ? 1.0f : 0.0f;
         if (!(over[x] > 0)) covered[x] = 0;
-        else if (f->hit) covered[x] = (float)(*f->hit >> (FIV__VIEWS * y + x) & 1);
-        else covered[x] = fiv__view_covered(row + x * f->side + f->column[x], FIV__VIEWS * f->side, f->beyond,
-                                            f->part[x], down);
+        else if (f->hit) covered[x] = (float)(*f->hit >> (FIV__VIEWS * f->y + x) & 1);
+        else covered[x] = fiv__view_covered(f->row + x * f->side + f->column[x], FIV__VIEWS * f->side, f->beyond,
+                                            f->part[x], f->down);
     }
     for (c = 0; c < 3; c++)
-        fiv__add_channel(sum->all[c], sum->taken[c], light + 3 * c * FIV__ALL_VIEWS, f->normal, over, covered);
-    for (x = 0; x < FIV__VIEWS; x++) sum->angle[x] += light[9 * FIV__ALL_VIEWS + x] * covered[x];
+        fiv__add_channel(sum->all[c], sum->taken[c], f->light + 3 * c * FIV__ALL_VIEWS, f->normal, over, covered);
+    for (x = 0; x < FIV__VIEWS; x++) sum->angle[x] += f->light[9 * FIV__ALL_VIEWS + x] * covered[x];
 }
 
 /* What an occluder takes of the light above the horizon, as a part of `diffuse`, and the solid angle that it covers
@@ -3325,7 +3327,7 @@ static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o
 {
     float offset[3], normal[3];
     uint64_t hit[6];
-    int side = o->contact_side, face, x, y, c;
+    int side = o->contact_side, face, x, c;
     float shift = 0.5f * (float)(side - 1), least = 0.5f / (float)(side - 2), all[3] = {0, 0, 0};
     const float *tangent = o->view_tangent, *scale = o->view_scale;
     fiv__around sum;
@@ -3347,13 +3349,14 @@ static void fiv__look_around(float taken[3], float *angle, const fiv_occluder *o
             f.part[x] = fiv__view_texel(&f.column[x], (-offset[ax.u] - depth * tangent[x]) * scale[x] + shift, side);
             f.up[x] = normal[ax.u] * tangent[x];
         }
-        for (y = 0; y < FIV__VIEWS; y++) {
-            int line, row = face * FIV__VIEWS + y;
-            float height = ahead + normal[ax.v] * tangent[y];
-            float down = fiv__view_texel(&line, (-offset[ax.v] - depth * tangent[y]) * scale[y] + shift, side);
-            if (height + wide <= 0) continue;
-            fiv__add_views(&sum, &f, y, o->contact + (o->few ? 0 : (size_t)((row * side + line) * FIV__VIEWS * side)),
-                           down, height, o->contact_light + row * FIV__VIEWS);
+        for (f.y = 0; f.y < FIV__VIEWS; f.y++) {
+            int line, row = face * FIV__VIEWS + f.y;
+            f.height = ahead + normal[ax.v] * tangent[f.y];
+            if (f.height + wide <= 0) continue;
+            f.down = fiv__view_texel(&line, (-offset[ax.v] - depth * tangent[f.y]) * scale[f.y] + shift, side);
+            f.row = o->contact + (o->few ? 0 : (size_t)((row * side + line) * FIV__VIEWS * side));
+            f.light = o->contact_light + row * FIV__VIEWS;
+            fiv__add_views(&sum, &f);
         }
     }
     *angle = 0;
