@@ -487,12 +487,15 @@ TEST(softassign_gl_corners_of_options_in_pairs)
     for (a = 0; a < 8; a++)
         for (b = a; b < 8; b++)
             for (k = 0; k < 9; k++) {
+                /* a pair of which one is at its default is that one alone: met once, beside itself */
+                const int met = a == b ? k / 3 > 0 : k / 3 == 0 || k % 3 == 0;
                 const sat__field *f = fields[a], *g = fields[b];
                 const double first[3] = {f->initial, f->low, f->high < 2e9 || f->type == 'd' ? f->high : 3};
                 const double second[3] = {g->initial, g->low, g->high < 2e9 || g->type == 'd' ? g->high : 3};
                 softassign_options o = softassign_defaults();
                 softassign_stats r;
                 double soft_cost;
+                if (met) continue;
                 for (i = 0; a + b + k && i < 3; i++) o.iterations[i] = 2;
                 if (k / 3) sat__field_set(f, &o, first[k / 3]);
                 if (k % 3) sat__field_set(g, &o, second[k % 3]);
@@ -511,7 +514,7 @@ TEST(softassign_gl_corners_of_options_in_pairs)
                 }
             }
     EXPECT_EQ(wrong, 0);
-    EXPECT(compared == 36 * 9 * CELLS);
+    EXPECT(compared == (8 * 3 + 28 * 4) * CELLS);
     softassign_gl_destroy(gl);
     free(cost);
     close_gl();
