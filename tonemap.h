@@ -72,7 +72,8 @@
      the rounded value, and that in 2 % of cases, within 0.1 of a step.
      Luminances below 2^-100 are black, those above 2^100 count as 2^100. NaN and negative luminances count as 0,
      infinity, if only in one component, is white; none of them enters the log-average, and none changes a pixel outside
-     the 41 x 41 around it (1e30 does not either, but where the meter is within a hair of a step). A pixel of NaN or
+     the 41 x 41 around it. A firefly, of 1e4 or of 1e30, moves the meter by one pixel's part: outside by up to 3 codes
+     in 120 x 90 pixels, by 1 with a fixed exposure (soft = 0: local scales may jump). A pixel of NaN or
      negative luminance (ringing beside lamps) shows the mean of what the usable ones around it show, up to 3 pixels
      away. A negative component of a positive luminance is kept until the display cuts it. Output lies in [0, 1], linear
      floats in [0, peak], for any input bits. PQ is within 3e-4. Black pictures stay black and leave the

@@ -1113,6 +1113,35 @@ TEST(a_firefly_does_not_darken_ashikhmin)
     free(pixels);
 }
 
+/* Whatever its size: a pixel's part of the meter, nothing with a fixed exposure but the rounding of the key. */
+TEST(a_firefly_moves_the_meter_by_one_pixel)
+{
+    enum { W = 120, H = 90 };
+    static const float sizes[] = {1e4f, 1e8f, 1e30f};
+    uint64_t seed;
+    int operation, k, fixed;
+    for (operation = 0; operation <= TONEMAP_HABLE; operation++)
+        for (fixed = 0; fixed < 2; fixed++)
+            for (seed = 1; seed < 4; seed++) {
+                float *pixels = room_pixels(W, H, 60 + seed), *centre = pixels + 3 * (H / 2 * W + W / 2);
+                sat_image view = sat_image_f32(pixels, W, H, 3);
+                tonemap_options o = tonemap_defaults();
+                shot clean, firefly[3];
+                o.operation = (tonemap_operator)operation;
+                o.exposure = fixed;
+                clean = shoot(&view, &o);
+                for (k = 0; k < 3; k++) {
+                    centre[0] = centre[1] = centre[2] = sizes[k];
+                    firefly[k] = shoot(&view, &o);
+                    EXPECT(worst_outside(clean.u8, firefly[k].u8, W, H) <= (fixed ? 1 : 3));
+                    EXPECT(worst_outside(firefly[0].u8, firefly[k].u8, W, H) <= 1);
+                }
+                shot_free(&clean);
+                for (k = 0; k < 3; k++) shot_free(&firefly[k]);
+                free(pixels);
+            }
+}
+
 /* ---- key and white */
 
 TEST(key_and_white_are_reinhards_estimate)
