@@ -3256,10 +3256,12 @@ static size_t sat__lay_out(sat_table *t, unsigned char *base)
     return arena.overflow ? 0 : arena.used;
 }
 
-/* rows: corner rows to store, and tile_rows: strips above to store. */
-static sat_result sat__table_create(sat_table **out, int width, int height, int rows, int tile_rows, int ring,
-                                    int channels, const sat_options *options)
+/* rows: corner rows to store, and tile_rows: strips above to store; ring: both begin again at their end. */
+typedef struct sat__shape { int width, height, channels, rows, tile_rows, ring; } sat__shape;
+
+static sat_result sat__table_create(sat_table **out, sat__shape shape, const sat_options *options)
 {
+    const int width = shape.width, height = shape.height, channels = shape.channels;
     sat_table t, *table;
     unsigned char *base;
     memset(&t, 0, sizeof t);
@@ -3270,13 +3272,13 @@ static sat_result sat__table_create(sat_table **out, int width, int height, int 
     if (width == 0x7fffffff || height == 0x7fffffff) return SAT_ERR_SIZE;
     t.width = width;
     t.height = height;
-    t.rows = rows;
+    t.rows = shape.rows;
     t.channels = channels;
     t.element = sat__kind_size(t.options.kind);
     while (1 << t.shift < t.options.tile) t.shift++;
     t.tiles_x = (width - 1) / t.options.tile + 1;
-    t.tiles_y = tile_rows;
-    t.ring = ring;
+    t.tiles_y = shape.tile_rows;
+    t.ring = shape.ring;
     t.bands = t.options.kind == SAT_KIND_TILED ? t.tiles_y : (width - 1) / SAT__STRIP + 1;
     t.block_bytes = sat__lay_out(&t, NULL);
     if (!t.block_bytes || t.block_bytes > SIZE_MAX / 2 - sizeof t - SAT__LINE) return SAT_ERR_SIZE;
@@ -3295,14 +3297,15 @@ static sat_result sat__table_create(sat_table **out, int width, int height, int 
 
 SAT_DEF sat_result sat_create(sat_table **out, int width, int height, int channels, const sat_options *options)
 {
-    int tile = options ? options->tile : 32, tiled;
+    int tile = options ? options->tile : 32;
+    sat__shape shape = {width, height, channels, height, 1, 0};
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (tile < 1 || height < 1) return SAT_ERR_ARGUMENT;
     if (height == 0x7fffffff) return SAT_ERR_ARGUMENT;
-    tiled = !options || options->kind == SAT_KIND_TILED;
-    return sat__table_create(out, width, height, tiled ? height : height + 1, (height - 1) / tile + 1, 0, channels,
-                             options);
+    if (options && options->kind != SAT_KIND_TILED) shape.rows++;
+    shape.tile_rows = (height - 1) / tile + 1;
+    return sat__table_create(out, shape, options);
 }
 
 SAT_DEF void sat_destroy(sat_table *table)
@@ -4294,12 +4297,13 @@ static sat__extent sat__take_apart(const sat__job *job, sat__place at, const sat
 
 /* Sixteen columns of a tile, a cache line of cells: their sums stay in registers, those of the rows go from one sixteen
    to the next in `carries`, four equal lanes each. Reads and writes whole sixteens. */
-static void sat__sum_lines(uint32_t *cells, size_t stride, int32_t *carries, const float *p, ptrdiff_t step, int rows,
-                           float scale, int stream)
+static void sat__sum_lines(uint32_t *cells, int32_t *carries, const float *p, ptrdiff_t step, float scale,
+                           const sat__job *job)
 {
+    const size_t stride = job->table->stride;
     const sat__f32x4 scale4 = sat__f32x4_set1(scale);
     sat__i32x4 c0 = sat__i32x4_set1(0), c1 = c0, c2 = c0, c3 = c0;
-    int y;
+    int y, rows = job->rows, stream = job->stream;
     for (y = 0; y < rows; y++, p += step, cells += stride, carries += 4) {
         int32_t *out = (int32_t *)(void *)cells;
         sat__i32x4 s0, s1, s2, s3;
@@ -4345,8 +4349,7 @@ static void sat__sum_tile(const sat__job *job, sat__place at, const sat__source 
     memset(carries, 0, 4 * (size_t)job->rows * sizeof *carries);
     if (lines)
         for (i = 0; i < w; i += 16)
-            sat__sum_lines(cells + i, t->stride, carries, from->p + i, from->step, job->rows,
-                           quantum > 0 ? (float)(1 / quantum) : 0, job->stream);
+            sat__sum_lines(cells + i, carries, from->p + i, from->step, quantum > 0 ? (float)(1 / quantum) : 0, job);
     for (y = 0; y < job->rows; y++) {
         double spiky = 0;
         uint32_t sum = (uint32_t)carries[4 * y];
@@ -5657,41 +5660,53 @@ static void sat__survey(sat_table *t, const sat_image *image, double *tile_sums,
     total->negative = 0; /* the tile sums are of magnitudes already */
 }
 
-static sat_result sat__plan(sat_kind *kind, int whole, const sat_image *image, int box_width, int box_height,
-                            double max_relative_error, size_t max_bytes, const sat_options *options)
+/* What a plan is asked for; whole: with boxes as large as the image in mind, not those of the request. */
+typedef struct sat__request {
+    int whole, box_width, box_height;
+    double max_relative_error;
+    size_t max_bytes; /* 0: any */
+} sat__request;
+
+static sat_result sat__plan(sat_kind *kind, const sat_image *image, sat__request request, const sat_options *options)
 {
     static const sat_kind cheapest_first[] = {SAT_KIND_FLOAT, SAT_KIND_FIXED32, SAT_KIND_TILED, SAT_KIND_DOUBLE};
     sat_options resolved = options ? *options : sat_defaults();
     sat_table *survey, t;
     double allowed, area, best = -1, *tile_sums, largest_tile = 0;
     sat_result result;
-    int i;
-    if (!kind || !sat__image_is_valid(image) || box_width < 1 || box_height < 1 || !(max_relative_error >= 0))
+    int i, box_width, box_height;
+    sat__shape shape = {0, 0, 0, 2, 1, 0};
+    if (!kind || !sat__image_is_valid(image) || request.box_width < 1 || request.box_height < 1 ||
+        !(request.max_relative_error >= 0))
         return SAT_ERR_ARGUMENT;
     resolved.kind = SAT_KIND_DOUBLE;
     resolved.subtract_mean = 0;
     /* a one-row table holds all the scratch memory this needs; its row takes the tile sums */
-    result = sat__table_create(&survey, image->width, image->height, 2, 1, 0, image->channels, &resolved);
+    shape.width = image->width;
+    shape.height = image->height;
+    shape.channels = image->channels;
+    result = sat__table_create(&survey, shape, &resolved);
     if (result) return result;
     tile_sums = (double *)(void *)sat__row(survey, 0, 0);
     sat__resolve(survey, image);
     sat__survey(survey, image, tile_sums, &largest_tile);
     survey->total[0].tile_largest = sat__tile_quantum(largest_tile, 31);
-    box_width = sat__min_int(box_width, image->width);
-    box_height = sat__min_int(box_height, image->height);
+    box_width = sat__min_int(request.box_width, image->width);
+    box_height = sat__min_int(request.box_height, image->height);
     area = (double)box_width * box_height;
-    allowed = max_relative_error * survey->total[0].sum_abs / ((double)image->width * image->height * image->channels);
+    allowed = request.max_relative_error * survey->total[0].sum_abs / ((double)image->width * image->height * image->channels);
     result = SAT_ERR_LIMIT;
     for (i = 0; i < (int)SAT__COUNT(cheapest_first) && result; i++) {
         double error;
         t = *survey;
         t.options.kind = cheapest_first[i];
         t.options.max_value = survey->total[0].largest;
-        if (!(t.options.max_box_area > 0)) t.options.max_box_area = whole ? (double)image->width * image->height : area;
+        if (!(t.options.max_box_area > 0))
+            t.options.max_box_area = request.whole ? (double)image->width * image->height : area;
         t.rows = image->height + (t.options.kind != SAT_KIND_TILED);
         t.tiles_y = (image->height - 1) / resolved.tile + 1;
         t.element = sat__kind_size(t.options.kind);
-        if (max_bytes && (sat__lay_out(&t, NULL) == 0 || sat__lay_out(&t, NULL) > max_bytes)) continue;
+        if (request.max_bytes && (sat__lay_out(&t, NULL) == 0 || sat__lay_out(&t, NULL) > request.max_bytes)) continue;
         t.quantum = resolved.quantum;
         if (sat__resolve(&t, image)) continue;
         error = sat__sum_bound(&t, &survey->total[0], (double)box_width, (double)box_height) / area;
@@ -5708,16 +5723,18 @@ static sat_result sat__plan(sat_kind *kind, int whole, const sat_image *image, i
 SAT_DEF sat_result sat_plan(sat_kind *kind, const sat_image *image, int box_width, int box_height,
                             double max_relative_error, size_t max_bytes, const sat_options *options)
 {
-    return sat__plan(kind, 1, image, box_width, box_height, max_relative_error, max_bytes, options);
+    const sat__request request = {1, box_width, box_height, max_relative_error, max_bytes};
+    return sat__plan(kind, image, request, options);
 }
 
 SAT_DEF sat_result sat_plan_options(sat_options *out, const sat_image *image, int box_width, int box_height,
                                     double max_relative_error, size_t max_bytes, const sat_options *options)
 {
+    const sat__request request = {0, box_width, box_height, max_relative_error, max_bytes};
     sat_kind kind = SAT_KIND_TILED;
     sat_result result;
     if (!out) return SAT_ERR_ARGUMENT;
-    result = sat__plan(&kind, 0, image, box_width, box_height, max_relative_error, max_bytes, options);
+    result = sat__plan(&kind, image, request, options);
     if (result != SAT_OK && result != SAT_ERR_LIMIT) return result;
     *out = options ? *options : sat_defaults();
     out->kind = kind;
@@ -6097,7 +6114,7 @@ SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, 
     sat_allocator allocator;
     sat_stream *stream;
     sat_result result;
-    int bands;
+    sat__shape shape = {0, 0, 0, 0, 1, 0};
     if (!out) return SAT_ERR_ARGUMENT;
     *out = NULL;
     if (resolved.kind == SAT_KIND_TILED && radius > SAT__MAX_STREAM_RADIUS) return SAT_ERR_SIZE;
@@ -6115,11 +6132,15 @@ SAT_DEF sat_result sat_stream_create(sat_stream **out, int width, int channels, 
     if (!stream) return SAT_ERR_MEMORY;
     memset(stream, 0, sizeof *stream);
     stream->radius = radius;
-    bands = (2 * radius + 1) / resolved.tile + 3;
-    if (resolved.kind == SAT_KIND_TILED)
-        result = sat__table_create(&stream->table, width, 2 * radius + 2, bands * resolved.tile, bands, 1, channels,
-                                   &resolved);
-    else result = sat__table_create(&stream->table, width, 2 * radius + 2, 2 * radius + 2, 1, 0, channels, &resolved);
+    shape.width = width;
+    shape.channels = channels;
+    shape.height = shape.rows = 2 * radius + 2;
+    if (resolved.kind == SAT_KIND_TILED) {
+        shape.tile_rows = (2 * radius + 1) / resolved.tile + 3;
+        shape.rows = shape.tile_rows * resolved.tile;
+        shape.ring = 1;
+    }
+    result = sat__table_create(&stream->table, shape, &resolved);
     if (result) sat__release(&allocator, stream, sizeof *stream);
     else *out = stream;
     return result;
