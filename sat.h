@@ -2728,21 +2728,25 @@ static void sat__scan_run(sat__scan *scan, size_t elements, sat_range_fn *body)
     scan->counters.passes++;
 }
 
-/* target = source[0] + source[step] + ... + source[(terms-1) step], left to right, after *first when it is given. */
-static void sat__scan_fold(sat__scan *scan, unsigned char *target, const unsigned char *first,
-                           const unsigned char *source, size_t terms, size_t step, int worker)
+/* source[0] + source[step] + ... + source[(count - 1) step], left to right, after *first when it is given. */
+typedef struct sat__terms {
+    const unsigned char *first, *source;
+    size_t count, step;
+} sat__terms;
+
+static void sat__scan_fold(sat__scan *scan, unsigned char *target, sat__terms of, int worker)
 {
     unsigned char *left = scan->temporaries + (size_t)worker * 2 * scan->size, *next = left + scan->size, *swap;
-    size_t i = first ? 0 : 1;
-    memcpy(left, first ? first : source, scan->size);
+    size_t i = of.first ? 0 : 1;
+    memcpy(left, of.first ? of.first : of.source, scan->size);
     if (!scan->threads) {
-        scan->counters.reads += terms + (first != NULL);
-        scan->counters.adds += terms - (first == NULL);
+        scan->counters.reads += of.count + (of.first != NULL);
+        scan->counters.adds += of.count - (of.first == NULL);
         scan->counters.writes++;
         scan->counters.nodes++;
     }
-    for (; i < terms; i++) {
-        scan->combine(next, left, source + i * step * scan->size, scan->user);
+    for (; i < of.count; i++) {
+        scan->combine(next, left, of.source + i * of.step * scan->size, scan->user);
         swap = left;
         left = next;
         next = swap;
@@ -2761,11 +2765,11 @@ static void sat__scan_doubling(int begin, int end, int worker, void *context)
     if (stop > scan->n) stop = scan->n;
     if (i < final_in_both) i = final_in_both;
     for (; i < stop; i++) {
-        size_t terms = i / offset + 1;
-        if (terms > (size_t)scan->k) terms = (size_t)scan->k;
+        sat__terms of = {NULL, NULL, i / offset + 1, offset};
+        if (of.count > (size_t)scan->k) of.count = (size_t)scan->k;
         if (i >= offset) {
-            sat__scan_fold(scan, scan->out + i * scan->size, NULL, scan->in + (i - (terms - 1) * offset) * scan->size,
-                           terms, offset, worker);
+            of.source = scan->in + (i - (of.count - 1) * offset) * scan->size;
+            sat__scan_fold(scan, scan->out + i * scan->size, of, worker);
             continue;
         }
         memcpy(scan->out + i * scan->size, scan->in + i * scan->size, scan->size);
@@ -2808,8 +2812,8 @@ static void sat__scan_reduce(int begin, int end, int worker, void *context)
     size_t nodes = (scan->n + k - 1) / k;
     if (stop > nodes) stop = nodes;
     for (; g < stop; g++) {
-        size_t terms = scan->n - g * k < k ? scan->n - g * k : k;
-        sat__scan_fold(scan, scan->out + g * scan->size, NULL, scan->in + g * k * scan->size, terms, 1, worker);
+        const sat__terms of = {NULL, scan->in + g * k * scan->size, scan->n - g * k < k ? scan->n - g * k : k, 1};
+        sat__scan_fold(scan, scan->out + g * scan->size, of, worker);
     }
 }
 
@@ -2819,13 +2823,12 @@ static void sat__scan_expand(int begin, int end, int worker, void *context)
 {
     sat__scan *scan = (sat__scan *)context;
     size_t k = (size_t)scan->k, g = (size_t)begin * SAT__SCAN_BLOCK, stop = (size_t)end * SAT__SCAN_BLOCK;
-    size_t groups = (scan->n + k - 1) / k, d;
+    size_t groups = (scan->n + k - 1) / k;
     if (stop > groups) stop = groups;
     for (; g < stop; g++) {
-        const unsigned char *uncle = g ? scan->uncles + (g - 1) * scan->size : NULL;
-        for (d = scan->n - g * k < k ? scan->n - g * k : k; d-- > 0;)
-            sat__scan_fold(scan, scan->out + (g * k + d) * scan->size, uncle, scan->in + g * k * scan->size, d + 1, 1,
-                           worker);
+        sat__terms of = {g ? scan->uncles + (g - 1) * scan->size : NULL, scan->in + g * k * scan->size, 0, 1};
+        for (of.count = scan->n - g * k < k ? scan->n - g * k : k; of.count > 0; of.count--)
+            sat__scan_fold(scan, scan->out + (g * k + of.count - 1) * scan->size, of, worker);
     }
 }
 
@@ -5694,10 +5697,12 @@ static sat_result sat__plan(sat_kind *kind, const sat_image *image, sat__request
     box_width = sat__min_int(request.box_width, image->width);
     box_height = sat__min_int(request.box_height, image->height);
     area = (double)box_width * box_height;
-    allowed = request.max_relative_error * survey->total[0].sum_abs / ((double)image->width * image->height * image->channels);
+    allowed = request.max_relative_error * survey->total[0].sum_abs /
+              ((double)image->width * image->height * image->channels);
     result = SAT_ERR_LIMIT;
     for (i = 0; i < (int)SAT__COUNT(cheapest_first) && result; i++) {
         double error;
+        size_t bytes;
         t = *survey;
         t.options.kind = cheapest_first[i];
         t.options.max_value = survey->total[0].largest;
@@ -5706,7 +5711,8 @@ static sat_result sat__plan(sat_kind *kind, const sat_image *image, sat__request
         t.rows = image->height + (t.options.kind != SAT_KIND_TILED);
         t.tiles_y = (image->height - 1) / resolved.tile + 1;
         t.element = sat__kind_size(t.options.kind);
-        if (request.max_bytes && (sat__lay_out(&t, NULL) == 0 || sat__lay_out(&t, NULL) > request.max_bytes)) continue;
+        bytes = sat__lay_out(&t, NULL);
+        if (request.max_bytes && (bytes == 0 || bytes > request.max_bytes)) continue;
         t.quantum = resolved.quantum;
         if (sat__resolve(&t, image)) continue;
         error = sat__sum_bound(&t, &survey->total[0], (double)box_width, (double)box_height) / area;
@@ -5876,13 +5882,21 @@ static float sat__moment_mean(float *p, int w, int h, size_t *bad)
     return mean;
 }
 
-/* Local sums of (p - mean_p), or of (p - mean_p)(q - mean_q) where there is a q. */
-static void sat__moment_sums(double *out, size_t stride, const float *p, double mean_p, const float *q, double mean_q,
-                             int w, int h)
+/* A channel of a tile, and what is taken off it. */
+typedef struct sat__centred {
+    const float *pixels;
+    double mean;
+} sat__centred;
+
+/* Local sums of a's pixels less their mean, or of their products with b's where there is a b. */
+static void sat__moment_sums(double *out, size_t stride, const sat__centred *a, const sat__centred *b, int w, int h)
 {
+    const float *p = a->pixels, *q = b ? b->pixels : NULL;
+    const double mean_p = a->mean, mean_q = b ? b->mean : 0;
     int x, y;
-    for (y = 0; y < h; y++, out += stride, p += SAT__MOMENT_TILE, q += q ? SAT__MOMENT_TILE : 0) {
+    for (y = 0; y < h; y++, out += stride, p += SAT__MOMENT_TILE) {
         double run = 0;
+        if (q && y) q += SAT__MOMENT_TILE;
         for (x = 0; x < w; x++) {
             double d = (double)p[x] - mean_p;
             run += q ? d * ((double)q[x] - mean_q) : d;
@@ -5909,16 +5923,19 @@ static void sat__moments_rows(int begin, int end, int worker, void *context)
         for (tx = 0; tx < m->tiles_x; tx++) {
             int x0 = tx * SIDE, w = sat__min_int(SIDE, m->width - x0);
             size_t at = (size_t)y0 * m->stride + (size_t)x0, tiles = (size_t)m->tiles_x * (size_t)m->tiles_y;
-            float mean[4];
+            sat__centred of[4];
             for (c = 0; c < m->channels; c++) {
+                double *sums = m->sums + at;
+                float mean;
                 for (y = 0; y < h; y++) sat__read_row(tile + c * AREA + y * SIDE, b->image, y0 + y, x0, x0 + w, c);
-                mean[c] = sat__moment_mean(tile + c * AREA, w, h, &m->bad[ty]);
-                m->means[(size_t)c * tiles + (size_t)ty * (size_t)m->tiles_x + (size_t)tx] = mean[c];
-                sat__moment_sums(m->sums + (size_t)c * m->plane + at, m->stride, tile + c * AREA, (double)mean[c], NULL,
-                                 0, w, h);
+                mean = sat__moment_mean(tile + c * AREA, w, h, &m->bad[ty]);
+                m->means[(size_t)c * tiles + (size_t)ty * (size_t)m->tiles_x + (size_t)tx] = mean;
+                of[c].pixels = tile + c * AREA;
+                of[c].mean = (double)mean;
+                sat__moment_sums(sums + (size_t)c * m->plane, m->stride, &of[c], NULL, w, h);
                 for (other = m->options.covariance ? 0 : c; other <= c; other++)
-                    sat__moment_sums(m->sums + (size_t)sat__moment_plane(m, other, c) * m->plane + at, m->stride,
-                                     tile + c * AREA, (double)mean[c], tile + other * AREA, (double)mean[other], w, h);
+                    sat__moment_sums(sums + (size_t)sat__moment_plane(m, other, c) * m->plane, m->stride, &of[c],
+                                     &of[other], w, h);
             }
         }
     }

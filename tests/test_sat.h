@@ -651,7 +651,7 @@ TEST(streams_equal_the_whole_image_bit_for_bit)
             whole = filtered(t, W, H, 2, rs[r]);
             if (!EXPECT_EQ(sat_stream_create(&s, W, 2, rs[r], &o), SAT_OK)) return;
             for (y = 0;; y++) {
-                sat_image row = sat_image_f32(p + (size_t)y * W * 2, W, 1, 2);
+                sat_image row = sat_image_f32(p + (size_t)(y < H ? y : 0) * W * 2, W, 1, 2);
                 EXPECT_EQ(sat_stream_push(s, row_out, &got, y < H ? &row : NULL), SAT_OK);
                 if (y >= H && !got) break;
                 if (!got) continue;
@@ -1290,7 +1290,7 @@ TEST(streams_of_huge_pixels_equal_the_whole_image)
             whole = filtered(t, W, H, 1, 2);
             if (!EXPECT_EQ(sat_stream_create(&s, W, 1, 2, &o), SAT_OK)) return;
             for (y = 0;; y++) {
-                sat_image row = sat_image_f32(p + (size_t)y * W, W, 1, 1);
+                sat_image row = sat_image_f32(p + (size_t)(y < H ? y : 0) * W, W, 1, 1);
                 EXPECT_EQ(sat_stream_push(s, row_out, &got, y < H ? &row : NULL), SAT_OK);
                 if (y >= H && !got) break;
                 if (got) EXPECT(memcmp(row_out, whole + (size_t)given++ * W, sizeof row_out) == 0);
