@@ -10,6 +10,8 @@
 
 #include <ctype.h>
 
+#include "support.h"
+
 enum { GL_SHARE_NAMES = 1 << 16, GL_SHARE_KNOWN = 8192 }; /* more than the tests make */
 
 static sat_gl_get_proc *gl_share_real;
@@ -35,13 +37,6 @@ static void gl_share_keep(unsigned name)
     if (gl_share_count == GL_SHARE_KNOWN) return;
     gl_share_known[gl_share_count].hash = gl_share_hash[name];
     gl_share_known[gl_share_count++].name = name;
-}
-
-static uint64_t gl_share_add(uint64_t hash, const char *text, size_t n)
-{
-    size_t i;
-    for (i = 0; i < n; i++) hash = (hash ^ (unsigned char)text[i]) * UINT64_C(0x100000001b3);
-    return hash;
 }
 
 /* Whether a word stands in a text. */
@@ -90,7 +85,7 @@ static void SAT__GL_CALL gl_share_source(unsigned shader, int count, const char 
     gl_share_strip(text);
     given = text;
     gl_share_gl.ShaderSource(shader, 1, &given, NULL);
-    gl_share_hash[shader] = gl_share_add(gl_share_hash[shader], text, strlen(text));
+    gl_share_hash[shader] = support_hash_add(gl_share_hash[shader], text, strlen(text));
     gl_share_alias[shader] = gl_share_find(shader);
     free(text);
 }
@@ -127,8 +122,8 @@ static unsigned SAT__GL_CALL gl_share_create_program(void)
 
 static void SAT__GL_CALL gl_share_attach(unsigned program, unsigned shader)
 {
-    gl_share_hash[program] = gl_share_add(gl_share_hash[program], (const char *)&gl_share_hash[shader],
-                                          sizeof gl_share_hash[shader]);
+    gl_share_hash[program] = support_hash_add(gl_share_hash[program], &gl_share_hash[shader],
+                                              sizeof gl_share_hash[shader]);
     gl_share_gl.AttachShader(program, gl_share_name(shader));
 }
 
@@ -136,7 +131,7 @@ static void SAT__GL_CALL gl_share_varyings(unsigned program, int count, const ch
 {
     int i;
     for (i = 0; i < count; i++)
-        gl_share_hash[program] = gl_share_add(gl_share_hash[program], names[i], strlen(names[i]) + 1);
+        gl_share_hash[program] = support_hash_add(gl_share_hash[program], names[i], strlen(names[i]) + 1);
     gl_share_gl.TransformFeedbackVaryings(program, count, names, mode);
 }
 
